@@ -123,7 +123,7 @@ from kahanmaps.maps.orbits import Iterates as Iterates
 from kahanmaps.maps.orbits import Orbit as Orbit
 from kahanmaps.maps.polarised import polarised_map as polarised_map
 from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
-from kahanmaps.paper.examiner import VerifyOptions as VerifyOptions
+from kahanmaps.paper.verifier import VerifyOptions as VerifyOptions
 from kahanmaps.paper.verify import verify as _verify  # noqa: F401
 from kahanmaps.paper.verify import verify_universal as verify_universal
 from kahanmaps.plots.plot import draw_orbits as _draw_orbits

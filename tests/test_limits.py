@@ -50,7 +50,7 @@ from kahanmaps.maps.kahan import Kahan
 from kahanmaps.maps.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.maps.residues.projective import ProjectiveMap
-from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -189,7 +189,7 @@ check_options: Callable[[F], F] = stack(
     ),
     click.option("--steps", type=int, metavar="N", help="Steps of that orbit (default 10)."),
     evidence_options,
-    click.option("--max-digits", type=Whole(1), metavar="N", help="Its digit budget (default: by dimension)."),
+    click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget of that orbit (default by dimension)."),
     verbose_option,
     output_options,
 )

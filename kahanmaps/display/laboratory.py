@@ -150,7 +150,7 @@ def heights_html(survey: HeightSurvey) -> str:
 
 @html_form.register
 def singularities_html(run: SingularityRun, map_: BirationalMap | None = None) -> str:
-    """Each contracted hypersurface and its fate; `map_` tells what eps is, where it is not Kahan's."""
+    """Each contracted hypersurface and its outcome; `map_` tells what eps is, where it is not Kahan's."""
     rows = [
         (
             _code(h.polynomial),
@@ -160,7 +160,7 @@ def singularities_html(run: SingularityRun, map_: BirationalMap | None = None) -
         )
         for h in run.hypersurfaces[:_ROWS]
     ]
-    inside = markup.table(["hypersurface", "fate", "contracted at step", "confined at step"], rows) if rows else ""
+    inside = markup.table(["hypersurface", "outcome", "contracted at step", "confined at step"], rows) if rows else ""
     inside += _notes([_rest(run.hypersurfaces)])
     return markup.titled(f"singularities: {run.text}", inside, eps_sentence(run.eps, map_))
 

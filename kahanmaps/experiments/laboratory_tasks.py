@@ -261,7 +261,7 @@ def confinement(
     report: bool = False,
 ) -> Result:
     """Are singularities confined? The hypersurfaces that the map contracts; without eps two values are compared."""
-    from kahanmaps.laboratory.singular.fates import NOT_CONTRACTED, UNDECIDED
+    from kahanmaps.laboratory.singular.outcomes import NOT_CONTRACTED, UNDECIDED
     from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 
     values = default_eps(system.map, seed) if eps is None else (eps,)

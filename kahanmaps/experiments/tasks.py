@@ -93,7 +93,7 @@ def verify_member(
     report: bool = False,
 ) -> Result:
     """Every statement of the paper, for one member of the family."""
-    from kahanmaps.paper.examiner import VerifyOptions
+    from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify
 
     settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
@@ -111,7 +111,7 @@ def verify_in_general(
     report: bool = False,
 ) -> Result:
     """Every statement of the paper, for the member in general."""
-    from kahanmaps.paper.examiner import VerifyOptions
+    from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify_universal
 
     settings = Settings(seed=seed, error_bits=error_bits)

@@ -11,7 +11,7 @@ from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curve
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.preserve.pencil import GROWTH_ON
-from kahanmaps.laboratory.singular.fates import CONFINED
+from kahanmaps.laboratory.singular.outcomes import CONFINED
 
 PROVED, EXPLAINED, MEASURED, ESTIMATED = "proved", "explained", "measured", "estimated"
 _CURVES = {0: "rational curves", 1: "elliptic curves, of genus 1"}

@@ -9,7 +9,7 @@ from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.checks.claims import Evidence
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.errors import counted
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 from kahanmaps.paper.evaluate import UNDEFINED, evaluate, witness_of
 from kahanmaps.paper.registry import claims
 
@@ -24,12 +24,12 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     Raises Contradiction where the two sides are different rational functions.
     """
     claim = next(found for found in claims() if found.key == key)
-    bounds = realise.universal_bound_objects(blocks, order)
+    bounds = objects_over.universal_bound_objects(blocks, order)
     for _ in claim.function(bounds):
         pass
     vectors = sorted(bounds.used - {"roots"})
     try:
-        objects = realise.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
+        objects = objects_over.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
         outcome = evaluate(claim, objects)
     except (BudgetExceeded, *UNDEFINED):
         return None

@@ -34,7 +34,7 @@ SECTIONS: dict[int, tuple[str, str]] = {
     7: ("Integrals of motion", "integrals_of_motion"),
     8: ("Invariant Poisson structure", "poisson_structure"),
     9: ("Differential equations for the conserved quantities", "differential_equations"),
-    10: ("Beyond the paper", "beyond"),
+    10: ("Beyond the paper", "further_claims"),
 }
 
 

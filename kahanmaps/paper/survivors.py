@@ -16,12 +16,12 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import monomials
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
-from kahanmaps.paper.beyond import STATEMENTS
 from kahanmaps.paper.evaluate import UNDEFINED, Outcome, same, witness_of
-from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.paper.further_claims import STATEMENTS
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, claims
 from kahanmaps.paper.variations import VARIATIONS
+from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify_universal
 
 _MOST_ONES = 7

@@ -39,12 +39,12 @@ from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.maps.convention import CONVENTION
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
-from kahanmaps.paper.examiner import Examiner, VerifyOptions
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.proofs import PROOF_BUDGET, normal_form_proof
 from kahanmaps.paper.registry import Claim, Kind
+from kahanmaps.paper.verifier import Verifier, VerifyOptions
 from kahanmaps.version import __version__
 
 MAX_M = 8
@@ -93,9 +93,9 @@ def verify(
         raise InputError(f"found a member with m = {member.m}, expected m <= {MAX_M}")
     if -1 in member.signs:
         member = FamilyMember(member.A, member.chosen.K)  # f is the system that the file stands for
-    examiner = _MemberExaminer(member, settings, options)
-    findings = examiner.findings()
-    notes = examiner.notes()
+    verifier = _MemberVerifier(member, settings, options)
+    findings = verifier.findings()
+    notes = verifier.notes()
     context = {
         **settings.context([file]),
         "m": member.m,
@@ -125,8 +125,8 @@ def verify_universal(m: int, settings: Settings | None = None, options: VerifyOp
         raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M}")
     if settings.eps is not None:
         raise InputError("found an eps, expected none: universal claims are for every eps")
-    examiner = _UniversalExaminer(m, settings, options)
-    findings = examiner.findings()
+    verifier = _UniversalVerifier(m, settings, options)
+    findings = verifier.findings()
     context = {
         "version": __version__,
         "system": f"universal, m = {m}",
@@ -140,10 +140,10 @@ def verify_universal(m: int, settings: Settings | None = None, options: VerifyOp
         "order": options.order,
         "controls": options.controls,
     }
-    return Report("verify", tuple(findings), context, examiner.notes())
+    return Report("verify", tuple(findings), context, verifier.notes())
 
 
-class _MemberExaminer(Examiner):
+class _MemberVerifier(Verifier):
     """A given member."""
 
     def __init__(self, member: FamilyMember, settings: Settings, options: VerifyOptions) -> None:
@@ -151,7 +151,7 @@ class _MemberExaminer(Examiner):
         self.member = member
         self._seed = seed_for(settings.seed, member.A, member.H, settings.eps)
         self.m = member.m
-        self.roots = realise.rational_roots(member)
+        self.roots = objects_over.rational_roots(member)
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
         # Where chi splits over Q one pool of points serves all claims.
@@ -171,7 +171,7 @@ class _MemberExaminer(Examiner):
                     chi = chi_of(self.member.A)
                     self.settings.progress("looking for a prime at which chi splits")
                     # One prime in m! splits at worst, so that this fails with probability e^-40.
-                    found = realise.split_prime_field(chi, rng, 40 * math.factorial(self.m))
+                    found = objects_over.split_prime_field(chi, rng, 40 * math.factorial(self.m))
                     if found is None:
                         return None
                     K, mod_roots = found
@@ -179,7 +179,7 @@ class _MemberExaminer(Examiner):
                 else:
                     K = random_prime_field(rng)
                     roots = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
-                return realise.point_over(self.member, K, roots, self.settings.eps, rng, self.options.order)
+                return objects_over.point_over(self.member, K, roots, self.settings.eps, rng, self.options.order)
             except BadPrime:
                 continue
 
@@ -187,10 +187,10 @@ class _MemberExaminer(Examiner):
         if roots and self.roots is None:
             return None
         rng = random.Random(f"exact {self._seed} {number}")
-        return realise.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
+        return objects_over.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
-        return realise.bound_objects(self.member, self.settings.eps, self.options.order)
+        return objects_over.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, roots: bool) -> int:
         if not roots or self.roots is not None:
@@ -246,7 +246,7 @@ class _MemberExaminer(Examiner):
         vectors = needs - {"roots"}
         if ("roots" in needs and self.roots is None) or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
             return None
-        objects = realise.member_functions(
+        objects = objects_over.member_functions(
             self.member, sorted(needs - {"roots"}), self.settings.eps, PROOF_BUDGET, self.options.order
         )
         try:
@@ -262,7 +262,7 @@ class _MemberExaminer(Examiner):
     def also(self, claim: Claim) -> Iterable[Evidence]:
         rng = random.Random(f"also {self._seed} {claim.key}")
         if claim.blockwise and claim.symplectic and self.member.is_generic:
-            objects = realise.etale_objects(self.member, rng, self.settings.eps, self.options.order)
+            objects = objects_over.etale_objects(self.member, rng, self.settings.eps, self.options.order)
             chi = format_univariate(chi_of(self.member.A))
             text = f"held at an exact random point of the normal form over Q[t]/({chi})"
             try:
@@ -275,7 +275,7 @@ class _MemberExaminer(Examiner):
             yield self._by_balls(claim, self.options.ball_bits, rng)
 
     def _by_balls(self, claim: Claim, bits: int, rng: random.Random) -> Evidence:
-        objects = realise.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
+        objects = objects_over.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
         widest, pairs = -math.inf, 0
         try:
             with objects.K.working():
@@ -298,12 +298,12 @@ class _MemberExaminer(Examiner):
         if self.member.is_generic and not self.options.controls:
             found.append(NOTE_ON_PROOFS)
         if self.options.ball_bits is not None and self.member.is_generic:
-            enclosures = realise.root_enclosures(self.member, self.options.ball_bits)
+            enclosures = objects_over.root_enclosures(self.member, self.options.ball_bits)
             found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
         return found
 
 
-class _UniversalExaminer(Examiner):
+class _UniversalVerifier(Verifier):
     """The member in general."""
 
     def __init__(self, m: int, settings: Settings, options: VerifyOptions) -> None:
@@ -315,14 +315,14 @@ class _UniversalExaminer(Examiner):
         if key not in self._points:
             rng = random.Random(f"universal {self.settings.seed} {number}")
             field = random_prime_field(rng)
-            self._points[key] = realise.random_objects(self.m, field, rng, self.options.order)
+            self._points[key] = objects_over.random_objects(self.m, field, rng, self.options.order)
         return self._points[key]
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
         return None
 
     def bounds(self) -> PaperObjects:
-        return realise.universal_bound_objects(self.m, self.options.order)
+        return objects_over.universal_bound_objects(self.m, self.options.order)
 
     def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
         if not claim.symplectic:

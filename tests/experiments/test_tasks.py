@@ -31,7 +31,7 @@ from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits import Orbit
-from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 
 FALSE = """

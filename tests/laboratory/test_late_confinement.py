@@ -30,7 +30,9 @@ from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, o
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.modular_points import rank
-from kahanmaps.laboratory.singular.fates import (
+from kahanmaps.laboratory.singular.following import Range, walked
+from kahanmaps.laboratory.singular.jets import PrecisionTooLow
+from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
     NO_TIME,
     NOT_CONFINED,
@@ -39,10 +41,8 @@ from kahanmaps.laboratory.singular.fates import (
     Hypersurface,
     _joined,
     _tangents,
-    fate_of,
+    outcome_of,
 )
-from kahanmaps.laboratory.singular.following import Range, walked
-from kahanmaps.laboratory.singular.jets import PrecisionTooLow
 from kahanmaps.laboratory.singular.singularities import (
     MAX_DIGITS,
     Patterns,
@@ -393,7 +393,7 @@ def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
 def lorenz_along(seed, limits):
     """What becomes of x^2 = 2 z^2, which has points in GF(p) for every other prime only."""
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
-    return fate_of(load("lorenz").map, fmpq(1, 7), x**2 - 2 * z**2, "?", False, None, random.Random(seed), limits)
+    return outcome_of(load("lorenz").map, fmpq(1, 7), x**2 - 2 * z**2, "?", False, None, random.Random(seed), limits)
 
 
 def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():

@@ -18,8 +18,8 @@ from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed, recurrence_of
 from kahanmaps.laboratory.singular import contracted
-from kahanmaps.laboratory.singular.fates import CONFINED
 from kahanmaps.laboratory.singular.orders import Orders
+from kahanmaps.laboratory.singular.outcomes import CONFINED
 from kahanmaps.laboratory.singular.singularities import default_eps, patterns, singularities
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.systems.quadratic import QuadraticSystem

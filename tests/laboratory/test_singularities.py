@@ -17,7 +17,6 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.singular import contracted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
-from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.singular.jets import (
     Jet,
     NotGeneric,
@@ -27,6 +26,7 @@ from kahanmaps.laboratory.singular.jets import (
     valuation,
     walk,
 )
+from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.singular.singularities import _range, default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
@@ -201,14 +201,14 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     unwritten = singularities(system, "4/13")
     assert unwritten.verdict == written.verdict
 
-    def fates(run):
+    def outcomes(run):
         return {
             (h.multiplicity, h.status, h.contracted_at, h.confined_at, tuple(step.rank for step in h.steps))
             for h in run.hypersurfaces
             if not h.is_pole and h.polynomial != "Z"
         }
 
-    assert fates(unwritten) == fates(written)
+    assert outcomes(unwritten) == outcomes(written)
     assert {h.polynomial for h in unwritten.hypersurfaces if h.is_pole} == {
         h.polynomial for h in written.hypersurfaces if h.is_pole
     }
@@ -219,7 +219,7 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
 def test_zeros_without_points_are_undecided(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.singular.written._MAX_TERMS", 0)
     monkeypatch.setattr(
-        "kahanmaps.laboratory.singular.fates._fate_at", lambda *_, **__: (_ for _ in ()).throw(NotGeneric())
+        "kahanmaps.laboratory.singular.outcomes._outcome_at", lambda *_, **__: (_ for _ in ()).throw(NotGeneric())
     )
     run = singularities(load("weierstrass").system, "4/13")
     assert run.verdict == "undecided"

@@ -14,7 +14,7 @@ from kahanmaps.errors import BadPrime
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Claim, claims
 
@@ -67,17 +67,17 @@ def file(name: str) -> SystemFile:
 def point(name: str, number: int = 0) -> PaperObjects:
     """A random point of a member over a field GF(p) in which chi splits; the same one for all tests."""
     found, rng = member(name), random.Random(f"{name} {number}")
-    rational = realise.rational_roots(found)
+    rational = objects_over.rational_roots(found)
     while True:
         try:
             if rational is None:
-                split = realise.split_prime_field(chi_of(found.A), rng, 100_000)
+                split = objects_over.split_prime_field(chi_of(found.A), rng, 100_000)
                 assert split is not None
                 K, roots = split
             else:
                 K = random_prime_field(rng)
                 roots = tuple(K.convert(root) for root in rational)
-            return realise.point_over(found, K, roots, None, rng, 3)
+            return objects_over.point_over(found, K, roots, None, rng, 3)
         except BadPrime:
             continue
 

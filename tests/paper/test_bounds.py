@@ -11,11 +11,11 @@ from bound_helpers import covers, lowest, true_size
 from paper.members import member
 
 from kahanmaps.checks.settings import Settings
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 from kahanmaps.paper.controls import broken
-from kahanmaps.paper.examiner import ClaimAtPoints, VerifyOptions
 from kahanmaps.paper.registry import Kind, claims
-from kahanmaps.paper.verify import _MemberExaminer
+from kahanmaps.paper.verifier import ClaimAtPoints, VerifyOptions
+from kahanmaps.paper.verify import _MemberVerifier
 
 # The letters of the paper
 
@@ -48,9 +48,9 @@ LARGE = {"Phi(Phi(x))", "Pi^-1", "inhomogeneous x~", "slope of H~", "dPhi"}
 def both(name, letter):
     """A letter over rational functions and over bounds."""
     found = member(name)
-    bounds = realise.bound_objects(found, None, 3)
+    bounds = objects_over.bound_objects(found, None, 3)
     bound = letter(bounds)
-    functions = realise.member_functions(found, sorted(bounds.used - {"roots"}), None, 10**9, 3)
+    functions = objects_over.member_functions(found, sorted(bounds.used - {"roots"}), None, 10**9, 3)
     value = letter(functions)
     return (bound.entry if hasattr(bound, "entry") else bound), (
         value.entries() if hasattr(value, "entries") else [value]
@@ -77,7 +77,7 @@ def test_the_bound_of_a_letter_is_not_far_from_the_truth():
 
 def is_short(claim):
     """Whether it speaks of x and two more vectors at most: equations for systems of many letters are too long here."""
-    bounds = realise.bound_objects(member("m=1"), None, 3)
+    bounds = objects_over.bound_objects(member("m=1"), None, 3)
     for _ in claim.function(bounds):
         pass
     return len(bounds.used - {"roots"}) <= 3
@@ -105,12 +105,12 @@ def difference_sizes(claim, o):
 @pytest.mark.parametrize(("claim", "control"), BROKEN, ids=[f"{claim.key}, {control}" for claim, control in BROKEN])
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
     found = member("m=1")
-    examined = _MemberExaminer(found, Settings(), VerifyOptions())
-    bounds = broken(control, realise.bound_objects(found, None, 3))
+    examined = _MemberVerifier(found, Settings(), VerifyOptions())
+    bounds = broken(control, objects_over.bound_objects(found, None, 3))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
     statement = ClaimAtPoints(examined, claim)
     needs, (equation, poles) = statement.needs, statement.bound
-    functions = realise.member_functions(found, sorted(needs - {"roots"}), None, 10**9, 3)
+    functions = objects_over.member_functions(found, sorted(needs - {"roots"}), None, 10**9, 3)
     sizes = difference_sizes(claim, broken(control, functions))
     for above, below in sizes:
         assert true_size(above)[0] <= equation.degree
@@ -121,7 +121,7 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, 
 
 @pytest.mark.parametrize("m", [1, 3])
 def test_the_bounds_of_the_member_in_general_are_those_of_matrices_of_its_size(m):
-    objects = realise.universal_bound_objects(m, 3)
+    objects = objects_over.universal_bound_objects(m, 3)
     assert [(matrix.nrows(), matrix.ncols()) for matrix in (objects.A, objects.J, objects.x)] == [
         (2 * m, 2 * m),
         (2 * m, 2 * m),

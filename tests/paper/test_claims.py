@@ -18,7 +18,7 @@ from paper.members import LARGE_SPECTRA, SPECTRA, member, point, values
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularMatrix, SingularStep
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.registry import SECTIONS, Claim, Kind, claim, claims
 
@@ -230,8 +230,8 @@ def test_a_control_leaves_the_unbroken_objects_as_they_were():
 )
 def test_misprints_fail_by_these_numbers(key, values_):
     drawn = draw_with_eigenvalues([1, -2, 3], seed=7)
-    roots = realise.rational_roots(drawn)
+    roots = objects_over.rational_roots(drawn)
     for seed in range(2):
-        objects = realise.point_over(drawn, QQ, roots, None, random.Random(seed), 3)
+        objects = objects_over.point_over(drawn, QQ, roots, None, random.Random(seed), 3)
         (misprint,) = [claim for claim in claims() if claim.key == key]
         assert list(misprint.function(objects)) == values_

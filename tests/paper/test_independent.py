@@ -34,7 +34,7 @@ from paper.independent import (
 from paper.members import member, values
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 
 NAMES = ["m=2, split", "m=3, split"]
 
@@ -44,8 +44,8 @@ class Case:
 
     def __init__(self, name):
         found = member(name)
-        roots = realise.rational_roots(found)
-        self.o = realise.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
+        roots = objects_over.rational_roots(found)
+        self.o = objects_over.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
         n = found.dim
         self.x = [fraction(entry) for entry in self.o.x.entries()]
         self.y = [fraction(entry) for entry in self.o.vector("y").entries()]

@@ -17,12 +17,12 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import decide
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
-from kahanmaps.paper import examiner, proofs, verify
+from kahanmaps.paper import proofs, verifier, verify
 from kahanmaps.paper.evaluate import evaluate, witness_of
-from kahanmaps.paper.examiner import ClaimAtPoints, VerifyOptions
 from kahanmaps.paper.proofs import normal_form_proof
 from kahanmaps.paper.registry import Claim, Kind, claims
-from kahanmaps.paper.verify import _MemberExaminer, _UniversalExaminer
+from kahanmaps.paper.verifier import ClaimAtPoints, VerifyOptions
+from kahanmaps.paper.verify import _MemberVerifier, _UniversalVerifier
 
 IDENTITIES = [c for c in claims() if c.kind is Kind.EQUAL and not c.misprint and c.symplectic]
 over_identities = pytest.mark.parametrize("claim", IDENTITIES, ids=[c.key for c in IDENTITIES])
@@ -51,7 +51,7 @@ def only(monkeypatch):
     """Make the list of claims hold one claim only."""
 
     def register(claim):
-        for module in (proofs, examiner):
+        for module in (proofs, verifier):
             monkeypatch.setattr(module, "claims", lambda: (claim,))
         return claim
 
@@ -64,7 +64,7 @@ def examine(only):
 
     def run(claim, name="m=2, split"):
         normal_form_proof.cache_clear()
-        return _MemberExaminer(member(name), Settings(), VerifyOptions()).examine(only(claim))
+        return _MemberVerifier(member(name), Settings(), VerifyOptions()).verify_claim(only(claim))
 
     return run
 
@@ -213,14 +213,14 @@ def test_without_a_proof_a_true_claim_is_supported(monkeypatch, examine):
 
 
 def test_a_claim_that_holds_at_points_but_not_in_normal_form_is_a_contradiction(monkeypatch, examine):
-    original = proofs.realise.normal_form_objects
+    original = proofs.objects_over.normal_form_objects
 
     def broken(*arguments):
         o = original(*arguments)
         o.J = o.J + o.I
         return o
 
-    monkeypatch.setattr(proofs.realise, "normal_form_objects", broken)
+    monkeypatch.setattr(proofs.objects_over, "normal_form_objects", broken)
     finding = examine(fabricated(lambda o: [(o.dot(o.x, o.J * o.x), o.K.zero)]))
     assert (finding.verdict, finding.evidence.method) == (Verdict.REFUTED, "contradiction")
     assert finding.witness is not None
@@ -290,7 +290,7 @@ def test_a_rank_that_is_not_attained_is_refuted(examine):
 
 
 def test_a_false_claim_is_refuted_for_the_member_in_general():
-    finding = _UniversalExaminer(2, Settings(), VerifyOptions()).examine(fabricated(false_claim))
+    finding = _UniversalVerifier(2, Settings(), VerifyOptions()).verify_claim(fabricated(false_claim))
     assert finding.verdict is Verdict.REFUTED
 
 
@@ -330,7 +330,7 @@ def test_every_random_point_is_another():
             tried.append((o.K.characteristic, tuple(map(int, o.x.entries()))))
         yield o.n, o.n
 
-    statement = ClaimAtPoints(_MemberExaminer(member("m=2, split"), Settings(), VerifyOptions()), fabricated(claim))
+    statement = ClaimAtPoints(_MemberVerifier(member("m=2, split"), Settings(), VerifyOptions()), fabricated(claim))
     statement.bound = (Size(1, 10.0), 0)
     evidence = decide(statement, 0, error_bits=400).evidence
     assert len(evidence.data["primes"]) == evidence.data["points"] >= 6

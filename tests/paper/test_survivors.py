@@ -13,7 +13,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.maps.kahan import KahanMap, KahanMapOver
-from kahanmaps.paper.beyond import STATEMENTS
+from kahanmaps.paper.further_claims import STATEMENTS
 from kahanmaps.paper.survivors import smallest_counterexample, survivors, table
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

@@ -25,11 +25,11 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.paper import realise
+from kahanmaps.paper import objects_over
 from kahanmaps.paper import verify as verify_module
 from kahanmaps.paper.controls import CONTROLS
-from kahanmaps.paper.examiner import VerifyOptions
 from kahanmaps.paper.registry import Kind, claims
+from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
@@ -171,10 +171,10 @@ def test_roots_are_shown_to_twenty_digits_however_narrow_the_balls():
     """The square root of 2, 1.41421356237309504880168872420969807856967..., and with it 20 digits at most."""
     member = draw_with_chi(fmpq_poly([-2, 0, 1]), seed=1)
     for bits_, digits in ((200, "1.4142135623730950488"), (2000, "1.4142135623730950488")):
-        (minus, plus) = realise.root_enclosures(member, bits_)
+        (minus, plus) = objects_over.root_enclosures(member, bits_)
         assert minus.startswith(f"[-{digits} +/- ")
         assert plus.startswith(f"[{digits} +/- ")
-    assert realise.root_enclosures(member, 40)[1].startswith("[1.41421356237309")
+    assert objects_over.root_enclosures(member, 40)[1].startswith("[1.41421356237309")
 
 
 @pytest.mark.parametrize("section", range(1, 11))
@@ -309,8 +309,8 @@ def test_what_is_said_in_general_only_is_not_refuted_by_a_special_member():
 
 def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
     """chi = t^2 - 2: what needs the roots is shown at a point over a prime field in which chi splits."""
-    examiner = verify_module._MemberExaminer(draw_with_chi(fmpq_poly([-2, 0, 1]), 1), Settings(), VerifyOptions())
-    found = [examiner.examine(claim) for claim in STATED if claim.kind is not Kind.EQUAL and claim.makes_sense(2)]
+    verifier = verify_module._MemberVerifier(draw_with_chi(fmpq_poly([-2, 0, 1]), 1), Settings(), VerifyOptions())
+    found = [verifier.verify_claim(claim) for claim in STATED if claim.kind is not Kind.EQUAL and claim.makes_sense(2)]
     assert len(found) > 10
     assert {finding.verdict for finding in found} == {PROVED}
     assert {finding.evidence.method for finding in found} == {"exact rational point", "point over GF(p)"}
@@ -328,18 +328,18 @@ def test_statements_that_something_differs_are_proved_where_the_roots_are_irrati
 )
 def test_the_degree_of_the_splitting_field_counts_where_roots_are_needed(chi, degrees):
     member = draw_with_chi(fmpq_poly(chi), 1)
-    examiner = verify_module._MemberExaminer(member, Settings(), VerifyOptions())
-    assert (examiner.conjugates(False), examiner.conjugates(True)) == degrees
+    verifier = verify_module._MemberVerifier(member, Settings(), VerifyOptions())
+    assert (verifier.conjugates(False), verifier.conjugates(True)) == degrees
 
 
 def test_a_rank_that_is_defined_nowhere_is_undecided(monkeypatch):
     def nowhere(claim, objects):
         raise SingularStep("made up")
 
-    monkeypatch.setattr("kahanmaps.paper.examiner.evaluate", nowhere)
-    examiner = verify_module._MemberExaminer(special_member(), Settings(), VerifyOptions())
+    monkeypatch.setattr("kahanmaps.paper.verifier.evaluate", nowhere)
+    verifier = verify_module._MemberVerifier(special_member(), Settings(), VerifyOptions())
     (ranks,) = [claim for claim in claims() if claim.key == "hamiltonians-are-independent"]
-    found = examiner.examine(ranks)
+    found = verifier.verify_claim(ranks)
     assert found.verdict is UNDECIDED
     assert found.evidence.summary == "the claim is not defined at any of 40 random points"
 
@@ -357,7 +357,7 @@ def test_what_is_special_about_a_member_is_said(H, reason):
     """A = diag(1, 2, 1, 2): H is a cubic in x1, x3 plus one in x2, x4."""
     A = fmpq_mat(4, 4, [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2])
     member = FamilyMember(A, parse_polynomial(H, ["x1", "x2", "x3", "x4"]))
-    assert verify_module._MemberExaminer(member, Settings(), VerifyOptions()).what_is_special() == reason
+    assert verify_module._MemberVerifier(member, Settings(), VerifyOptions()).what_is_special() == reason
 
 
 def test_identities_are_proved_for_a_special_member_as_well():
@@ -386,13 +386,13 @@ def test_the_zero_hamiltonian_refutes_nothing():
 
 def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
     examined = []
-    original = verify_module._MemberExaminer.__init__
+    original = verify_module._MemberVerifier.__init__
 
     def spy(self, found, settings, options):
         examined.append(found)
         original(self, found, settings, options)
 
-    monkeypatch.setattr(verify_module._MemberExaminer, "__init__", spy)
+    monkeypatch.setattr(verify_module._MemberVerifier, "__init__", spy)
     plain = member("m=3, split")
     signed = FamilyMember(plain.A, plain.H, (1, -1, 1))
     report = verify(SystemFile.from_member(signed), options=VerifyOptions(sections=(4,)))
@@ -444,7 +444,7 @@ def test_the_witness_of_the_misprint_in_the_two_forms_is_a_rational_point_with_b
 
 def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
     """Objects for derivatives are given the matrices B_i; drawn ones have none and compute them from the sign."""
-    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
+    objects = objects_over.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
     trivial = CONTROLS["B=I"].function
     given = objects.changed(associate_matrices=(objects.I * objects.number(5),))
     assert trivial(given).associate_matrices == (objects.I,)
@@ -452,7 +452,7 @@ def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
 
 
 def test_a_quadratic_system_without_structure_is_drawn_with_terms_of_all_degrees():
-    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
+    objects = objects_over.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
     drawn, homogeneous = objects.arbitrary_system(), objects.arbitrary_system(homogeneous=True)
     zero = objects.vector("x") * objects.number(0)
     assert drawn.value(zero.entries()) != homogeneous.value(zero.entries())
@@ -460,7 +460,7 @@ def test_a_quadratic_system_without_structure_is_drawn_with_terms_of_all_degrees
 
 @pytest.mark.parametrize("m", [6, 7, 9])
 def test_of_many_sign_vectors_all_single_flips_are_tried_and_up_to_four_others(m):
-    samples = [realise.sign_sample(m, random.Random(seed)) for seed in range(20)]
+    samples = [objects_over.sign_sample(m, random.Random(seed)) for seed in range(20)]
     if m == 6:
         assert samples == [None] * 20
         return

@@ -13,7 +13,7 @@ from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
-from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.portraits import portrait_figure
 from kahanmaps.reports.report import report_html, write_report

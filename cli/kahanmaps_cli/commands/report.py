@@ -176,7 +176,7 @@ def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tu
     settings = Settings(eps=eps, seed=options["seed"], progress=progress)
     left_out: list[str] = []
     if options["source"] == "verify":
-        from kahanmaps.paper.examiner import VerifyOptions
+        from kahanmaps.paper.verifier import VerifyOptions
         from kahanmaps.paper.verify import verify
 
         reports = [verify(file, settings, VerifyOptions(options["sections"] or None))]

@@ -21,7 +21,7 @@ from kahanmaps_cli.terminal import formula, tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.singular.fates import Hypersurface
+    from kahanmaps.laboratory.singular.outcomes import Hypersurface
     from kahanmaps.laboratory.singular.singularities import SingularityRun
 
 
@@ -59,12 +59,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     steps are single maps, and each hypersurface is told with the map that
     contracts it.
 
-    Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their fate,
+    Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their outcome,
     known by random points.
 
     Exit status: 0 done, 2 wrong use, 3 undecided (stopped by the clock, or two points or two eps that differ).
     """
-    from kahanmaps.laboratory.singular.fates import UNDECIDED
+    from kahanmaps.laboratory.singular.outcomes import UNDECIDED
     from kahanmaps.laboratory.singular.singularities import default_eps, singularities, symbolic_denominator
 
     eps = the_eps(options["eps"], options["time_step"], required=False)

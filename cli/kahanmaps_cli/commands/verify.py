@@ -74,8 +74,8 @@ def command(system: str | None, **options: Any) -> int:
     Misprints are expected to be refuted and do not count.
     """
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.survivors import survivors
+    from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
 
     if options["as_json"] and options["as_markdown"]:

@@ -26,10 +26,10 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.components import Component, Kind, components
-from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED, Hypersurface
 from kahanmaps.laboratory.singular.following import Range, orders_at, walked
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of
 from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
+from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
 

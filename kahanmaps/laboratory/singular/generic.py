@@ -18,7 +18,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.singular.fates import Hypersurface
+from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.written import name_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import BirationalMap

@@ -30,20 +30,20 @@ from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
 from kahanmaps.laboratory.singular.contracted import Untold, contracted
-from kahanmaps.laboratory.singular.fates import (
+from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular.orders import Fraction
+from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
     FIRST_STEPS,
     NOT_CONFINED,
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
-    fate_of,
-    fates_at_random,
+    outcome_of,
+    outcomes_at_random,
     untold,
     unwritten,
 )
-from kahanmaps.laboratory.singular.following import Range
-from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.laboratory.singular.written import (
     Word,
     affine,
@@ -159,10 +159,10 @@ def singularities(
     seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
-    """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their fate.
+    """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their outcome.
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
-    above, fewer where series are needed all the way. Hypersurfaces are exact, their fate is that of two random points
+    above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
     modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
     SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or coefficients of
     more than 10,000 digits, or so long that writing formulas would take more than `seconds`. Source:
@@ -215,7 +215,7 @@ def singularities(
             break
         text = name_of(one.form, map_)
         progress(f"following {text[:40]}")
-        found.append(fate_of(map_, exact_eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, *followed))
+        found.append(outcome_of(map_, exact_eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, *followed))
     if critical_degree is None and not stopped:
         progress("following critical points")
         if over.is_bilinear:
@@ -258,13 +258,13 @@ def _without_forms(
             "found a composition of maps whose forms on projective space are too large, expected smaller maps, or such "
             "with equations that are linear in both points: of these the singularities are known by random points"
         )
-    found = fates_at_random(map_, eps, rng, limits)
+    found = outcomes_at_random(map_, eps, rng, limits)
     return SingularityRun(eps, "?", line.degree, None, tuple(found), limits.is_over, False, True)
 
 
 @dataclass(frozen=True)
 class Patterns:
-    """What the fates of contracted hypersurfaces say of degrees: how many of them tell how they go on.
+    """What the outcomes of contracted hypersurfaces say of degrees: how many of them tell how they go on.
 
     Degrees drop below powers of the first only where the images of contracted hypersurfaces meet points without a
     value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
@@ -407,7 +407,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     rng = random.Random(f"patterns {seed_for(seed, map_.subject, eps)}")
     equations = map_.at(eps).equations
     if period_of(equations) > 1:
-        found = fates_at_random(map_, eps, rng, limits)
+        found = outcomes_at_random(map_, eps, rng, limits)
         return _refused(eps, True, limits.is_over) or _patterns(0, found)
     try:
         degree, hypersurfaces = contracted(map_, eps, rng, limits)

@@ -19,8 +19,8 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.errors import counted
-from kahanmaps.laboratory.singular.fates import Followed, Hypersurface, fate_of
 from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular.outcomes import Followed, Hypersurface, outcome_of
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
@@ -112,7 +112,7 @@ def followed_map_by_map(
             text = name_of(one.form, map_)
             progress(f"following {text[:40]}")
             found.append(
-                fate_of(
+                outcome_of(
                     map_, eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, critical, excess,
                     (stage, period),
                 )

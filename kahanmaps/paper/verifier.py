@@ -1,4 +1,4 @@
-"""How one claim is examined: random points over GF(p), proof, exact points, and its controls.
+"""How one claim is verified: random points over GF(p), proof, exact points, and its controls.
 
 What is common to a given member and to the member in general; `verify.py` has the two.
 """
@@ -49,7 +49,7 @@ class VerifyOptions:
                 )
 
 
-class Examiner(ABC):
+class Verifier(ABC):
     """What is common to a given member and to the universal one."""
 
     m: int
@@ -78,7 +78,7 @@ class Examiner(ABC):
                 if self.outside(claim) is None and not any(finding.is_as_expected for finding in controls):
                     without.append(claim.key)
             else:
-                found.append(self.examine(claim))
+                found.append(self.verify_claim(claim))
             for objects in self._points.values():  # or they would remember the values of all claims
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
@@ -86,7 +86,7 @@ class Examiner(ABC):
             found.append(_last_word(found, without))
         return found
 
-    # what the two kinds of examiners fill in
+    # what the two kinds of verifiers fill in
 
     @abstractmethod
     def point(self, roots: bool, number: int) -> PaperObjects | None:
@@ -120,15 +120,15 @@ class Examiner(ABC):
         """Why a statement for generic A and H may fail here."""
         return "its A or H is special"
 
-    # the examination
+    # one claim
 
-    def examine(self, claim: Claim) -> Finding:
+    def verify_claim(self, claim: Claim) -> Finding:
         """The finding on one claim."""
         reason = self.outside(claim)
         if reason is not None:
             return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", reason))
         if claim.kind is not Kind.EQUAL:
-            return self._examine_existence(claim)
+            return self._verify_existence(claim)
         statement = ClaimAtPoints(self, claim)
         decision = decide(statement, self.settings.seed, self.settings.error_bits)
         found = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
@@ -152,7 +152,7 @@ class Examiner(ABC):
                 return self._finding(claim, Verdict.PROVED, proof, also)
         return replace(found, also=(*found.also, *also))
 
-    def _examine_existence(self, claim: Claim) -> Finding:
+    def _verify_existence(self, claim: Claim) -> Finding:
         """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
         roots, outcome, tried = False, None, 0
         for number in range(_POLES):
@@ -196,7 +196,7 @@ class Examiner(ABC):
     def controls(self, claim: Claim) -> list[Finding]:
         """The claim on broken input, one finding for every control that it names: each is expected to be refuted."""
         if claim.misprint:
-            return [self.examine(claim)]
+            return [self.verify_claim(claim)]
         found = []
         for name in claim.breaks:
             if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
@@ -271,19 +271,19 @@ class Examiner(ABC):
 
 
 class ClaimAtPoints:
-    """A claim as `decide` takes it: at the points of an examiner."""
+    """A claim as `decide` takes it: at the points of an verifier."""
 
     name = "claim"
     no_value = "a denominator seems to vanish identically"
     patience = _POLES
 
-    def __init__(self, examiner: Examiner, claim: Claim) -> None:
-        self._examiner, self._claim = examiner, claim
-        bounds = examiner.bounds()
+    def __init__(self, verifier: Verifier, claim: Claim) -> None:
+        self._verifier, self._claim = verifier, claim
+        bounds = verifier.bounds()
         self.bound = bound_of(cast(BoundField, bounds.K), claim.function(bounds))
         self.needs = bounds.used
         self._roots = "roots" in self.needs
-        self.conjugates = examiner.conjugates(self._roots)
+        self.conjugates = verifier.conjugates(self._roots)
 
     @property
     def where(self) -> str:
@@ -295,7 +295,7 @@ class ClaimAtPoints:
     def trials(self, seed: int) -> Iterator[Trial]:
         """The claim at one random point after the other."""
         for number in count():
-            objects = self._examiner.point(self._roots, number)
+            objects = self._verifier.point(self._roots, number)
             if objects is None:
                 return
             try:
@@ -317,7 +317,7 @@ class ClaimAtPoints:
 
     def _refutation(self, outcome: Outcome) -> Decision:
         for number in range(12):
-            objects = self._examiner.exact_point(self._roots, number)
+            objects = self._verifier.exact_point(self._roots, number)
             if objects is None:
                 break
             try:

@@ -87,15 +87,15 @@ class Hypersurface:
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
         if self.orders.returns:
             after, other = self.orders.returns
-            fate = f"comes back as C{other + 1} after {counted(after, 'step')}"
+            outcome = f"comes back as C{other + 1} after {counted(after, 'step')}"
         elif self.confined_at is not None:
-            fate = f"a hypersurface again after {counted(self.confined_at, 'step')}"
+            outcome = f"a hypersurface again after {counted(self.confined_at, 'step')}"
         elif self.orders.recurrences:
-            fate = f"its orders repeat after {counted(self.orders.settled_at, 'step')}"
+            outcome = f"its orders repeat after {counted(self.orders.settled_at, 'step')}"
         else:
-            fate = f"followed for {counted(self.followed, 'step')}"
+            outcome = f"followed for {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
-        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", fate]
+        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", outcome]
         return "; ".join([", ".join(parts), *self.orders.told])
 
     def to_json(self) -> dict[str, Any]:
@@ -116,7 +116,7 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class _Fate:
+class _Outcome:
     """What became of one point: see Hypersurface."""
 
     status: str
@@ -128,10 +128,10 @@ class _Fate:
     orders: Orders = NO_ORDERS
 
 
-_UNKNOWN = _Fate(UNDECIDED)
+_UNKNOWN = _Outcome(UNDECIDED)
 
 
-def fate_of(
+def outcome_of(
     map_: BirationalMap,
     eps: fmpq,
     factor: Any,
@@ -151,20 +151,20 @@ def fate_of(
     and the length of a word, this map contracts it, and steps are single maps.
     Source: grammaticos-ramani-papageorgiou-1991.
     """
-    fates: list[_Fate] = []
+    outcomes: list[_Outcome] = []
     primes: list[int] = []
     forms = [*critical, *excess]
     stage, period = place or (0, 1)
     at = None if place is None else stage
 
-    def told(fate: _Fate, note: str = "") -> Hypersurface:
+    def told(outcome: _Outcome, note: str = "") -> Hypersurface:
         degree = int(factor.total_degree())
         return Hypersurface(
-            text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, stage=at, **vars(fate)
+            text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, stage=at, **vars(outcome)
         )
 
     for _ in range(_TRIES):
-        if len(fates) == _POINTS or limits.is_over:
+        if len(outcomes) == _POINTS or limits.is_over:
             break
         field = random_prime_field(rng)
         try:
@@ -184,18 +184,20 @@ def fate_of(
         if start is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(equations, *start, rng, limits, tracked=tracked))
+            outcomes.append(_outcome_at(equations, *start, rng, limits, tracked=tracked))
             primes.append(field.prime)
         except NotGeneric:
             continue
         except PrecisionTooLow:
             return told(_UNKNOWN, NO_TIME if limits.is_over else "the series lost all their terms")
-    if len(fates) < _POINTS:
+    if len(outcomes) < _POINTS:
         return told(_UNKNOWN, NO_TIME)
-    one, other = ((fate.status, fate.contracted_at, fate.confined_at, fate.orders.known) for fate in fates)
+    one, other = (
+        (outcome.status, outcome.contracted_at, outcome.confined_at, outcome.orders.known) for outcome in outcomes
+    )
     if one != other:
-        return told(_Fate(UNDECIDED, steps=fates[0].steps), "two points tell different things")
-    return told(fates[0])
+        return told(_Outcome(UNDECIDED, steps=outcomes[0].steps), "two points tell different things")
+    return told(outcomes[0])
 
 
 def untold(reason: str) -> Hypersurface:
@@ -204,7 +206,7 @@ def untold(reason: str) -> Hypersurface:
 
 
 def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """The contracted hypersurfaces without their polynomials, told apart by multiplicity and fate of random points.
+    """The contracted hypersurfaces without their polynomials, told apart by multiplicity and outcome of random points.
 
     At one exact `eps` (half the time step), on lines modulo random primes. Poles and infinity are left out. One with a
     multiplicity of which no point was found is undecided. Source: zander-2021.
@@ -212,7 +214,7 @@ def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range)
     return _at_random(map_, eps, rng, limits, False)
 
 
-def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
+def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """As `unwritten`, with the poles and infinity: without any polynomial."""
     found = _at_random(map_, eps, rng, limits, True) + _at_random(map_, eps, rng, limits, False)
     for _ in range(_TRIES):
@@ -221,12 +223,12 @@ def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: 
             equations = map_.at(eps, field).equations
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
             tangents = _tangents(point, [0] * map_.dim + [1], field)
-            fate = _UNKNOWN if tangents is None else _fate_at(equations, point, tangents, rng, limits)
+            outcome = _UNKNOWN if tangents is None else _outcome_at(equations, point, tangents, rng, limits)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            fate = _UNKNOWN
-        return [*found, Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(fate))]
+            outcome = _UNKNOWN
+        return [*found, Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(outcome))]
     return found
 
 
@@ -249,13 +251,13 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             if tangents is None or limits.is_over:
                 continue
             try:
-                fate = _fate_at(equations, critical.point, tangents, rng, limits)
+                outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
-                fate = _UNKNOWN
-            key = (critical.multiplicity, fate.status, fate.contracted_at, fate.confined_at)
-            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(fate))
+                outcome = _UNKNOWN
+            key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
+            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(outcome))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
         untried = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
@@ -264,7 +266,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
 
 
 def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
-    """Two points of the same multiplicity with the same fate as one."""
+    """Two points of the same multiplicity with the same outcome as one."""
     settled = None if None in (before.settled_at, new.settled_at) else max(before.settled_at or 0, new.settled_at or 0)
     return replace(
         before,
@@ -283,14 +285,14 @@ def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]
     return (NOT_CONFINED, down, None) if up is None else (CONFINED, down, up)
 
 
-def _fate_at(
+def _outcome_at(
     equations: Sequence[Equation],
     point: Sequence[int],
     tangents: list[list[int]],
     rng: random.Random,
     limits: Range,
     tracked: AlongCurves = NOTHING,
-) -> _Fate:
+) -> _Outcome:
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
@@ -299,7 +301,7 @@ def _fate_at(
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
-        return _Fate(status, down, up, tuple(run), len(run), 0)
+        return _Outcome(status, down, up, tuple(run), len(run), 0)
     if up is None:
         orders = orders_at(equations, point, direction, tracked, (limits.shown, limits.reach), limits)
         if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
@@ -312,7 +314,7 @@ def _fate_at(
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         orders = replace(NO_ORDERS, followed=orders.followed)
-    return _Fate(status, down, up, tuple(run), orders.followed, settled, orders)
+    return _Outcome(status, down, up, tuple(run), orders.followed, settled, orders)
 
 
 def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:
