@@ -38,7 +38,9 @@ def _silently(function: Callable[[click.Context, str], Sequence[str]]) -> Comple
 @_silently
 def complete_system(context: click.Context, incomplete: str) -> list[str]:
     """Names of the catalogue, and system files."""
-    return [*_catalogue_names(incomplete), *toml_files(incomplete)]
+    from kahanmaps.documents.catalog import names
+
+    return [*(name for name in names() if name.startswith(incomplete)), *toml_files(incomplete)]
 
 
 @_silently
@@ -61,9 +63,3 @@ def toml_files(incomplete: str) -> list[str]:
             elif entry.name.endswith(".toml"):
                 found.append(prefix + entry.name)
     return sorted(found)
-
-
-def _catalogue_names(incomplete: str) -> list[str]:
-    from kahanmaps.documents.catalog import names
-
-    return [name for name in names() if name.startswith(incomplete)]

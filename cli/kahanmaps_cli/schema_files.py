@@ -34,6 +34,7 @@ def schema_titles() -> dict[str, str]:
 def schema(name: str) -> dict[str, Any]:
     """One schema, complete in itself. Raises InputError for a name that there is not."""
     from kahanmaps.errors import InputError, suggestion
+    from kahanmaps.experiments.spec import spec_schema
     from kahanmaps.version import __version__
 
     known = schema_titles()
@@ -41,14 +42,8 @@ def schema(name: str) -> dict[str, Any]:
     if name not in known:
         hint = suggestion(name, [*known, *ALIASES]) or "; 'kahanmaps schema' lists them"
         raise InputError(f"there is no schema {name[:60]!r}{hint}")
-    found = _spec_schema() if name == _SPEC else _bundled(_read(f"{name}.json"))
+    found = {"title": _SPEC_TITLE, **spec_schema()} if name == _SPEC else _bundled(_read(f"{name}.json"))
     return {"$schema": DIALECT, "$comment": f"kahanmaps {__version__}", **found}
-
-
-def _spec_schema() -> dict[str, Any]:
-    from kahanmaps.experiments.spec import spec_schema
-
-    return {"title": _SPEC_TITLE, **spec_schema()}
 
 
 def _read(name: str) -> dict[str, Any]:

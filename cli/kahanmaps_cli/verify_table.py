@@ -132,18 +132,14 @@ def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) ->
     for finding in findings:
         formula, *more = _rows(finding, verbose)
         verdict = f"{finding.verdict}\nas printed" if finding.place.get("misprint") else str(finding.verdict)
+        is_broken = controls and "broken" in finding.place
         table.add_row(
             styled(finding.place["place"]),
             styled("\n  ".join([formula, *more])),
-            styled(_decided(finding, controls)),
+            styled(str(finding.place["broken"]) if is_broken else _how(finding.evidence)),
             styled(verdict, verdict_style(finding)),
         )
     return table
-
-
-def _decided(finding: Finding, controls: bool) -> str:
-    """Which hypothesis was broken, or what kind of evidence decided."""
-    return str(finding.place["broken"]) if controls and "broken" in finding.place else _how(finding.evidence)
 
 
 def _how(evidence: Evidence) -> str:

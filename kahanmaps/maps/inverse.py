@@ -64,7 +64,8 @@ def inverse_rows(rows: Rows) -> Rows:
         sum((entry.compose(*old, ctx=context) * y for entry, y in zip(row, new, strict=True)), context.constant(0))
         for row in rows
     ]
-    found = _solved(equations, list(range(n)), _on_graph(rows))
+    field, sample = _graph_point(rows)
+    found = _solved(equations, list(range(n)), lambda polynomial: _vanishes(polynomial, field, sample))
     home = ring(names)
     back = [home.constant(0)] * n + list(home.gens())
     inverse = []
@@ -138,11 +139,6 @@ def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool
             value = value * given**exponent
         total = total + value
     return bool(total == 0)
-
-
-def _on_graph(rows: Rows) -> Callable[[Any], bool]:
-    field, sample = _graph_point(rows)
-    return lambda polynomial: _vanishes(polynomial, field, sample)
 
 
 def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:

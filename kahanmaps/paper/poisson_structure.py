@@ -184,7 +184,8 @@ def jacobi_identity(o: PaperObjects) -> Pairs:
 def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
     """The Jacobi identity of `factor` Pi, a constant matrix."""
     Pi = factor * o.Pi(o.x)
-    along = [factor * _derivative_of_tensor(o, o.K.column([Pi[i, k] for k in range(o.n)])) for i in range(o.n)]
+    rows = [o.K.column([Pi[i, k] for k in range(o.n)]) for i in range(o.n)]
+    along = [factor * (_derivative_of_square(o, row) * -(o.eps * o.eps)) for row in rows]  # Pi = J - eps^2 f'^2 J
     for i, j, k in combinations(range(o.n), 3):
         yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
 
@@ -408,11 +409,6 @@ def _two_sums(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:
         o.trace(B.transpose() * derivative * o.df) * eighth,
         o.trace(B.transpose() * o.df * derivative) * eighth,
     )
-
-
-def _derivative_of_tensor(o: PaperObjects, v: Any) -> Any:
-    """The derivative of Pi along v."""
-    return _derivative_of_square(o, v) * (-(o.eps * o.eps))
 
 
 def _derivative_of_square(o: PaperObjects, v: Any) -> Any:

@@ -152,10 +152,6 @@ def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
 Small = tuple[list[Slot], Callable[[Sequence[Slot]], PaperObjects]]
 
 
-def _inhomogeneous() -> Small:
-    return _slots(1, (3, 2, 1)), lambda ones: _objects(1, (1,), ones)
-
-
 def _steps() -> Small:
     twice = QQ.identity(2) * fmpq(-2)
     return _slots(1, (3,)), lambda ones: _objects(1, (1,), ones, associate_matrices=(twice,))
@@ -172,13 +168,12 @@ def _any_structure() -> Small:
     return pairs + _slots(2, (3,)), make
 
 
-def _derogatory() -> Small:
-    return _slots(2, (3,), planar=False), lambda ones: _objects(2, (1, 1), ones, associate_matrices=(QQ.identity(4),))
-
-
 _SMALL: dict[str, Callable[[], Small]] = {
-    "inhomogeneous": _inhomogeneous,
+    "inhomogeneous": lambda: (_slots(1, (3, 2, 1)), lambda ones: _objects(1, (1,), ones)),
     "steps": _steps,
     "any-structure": _any_structure,
-    "derogatory": _derogatory,
+    "derogatory": lambda: (
+        _slots(2, (3,), planar=False),
+        lambda ones: _objects(2, (1, 1), ones, associate_matrices=(QQ.identity(4),)),
+    ),
 }

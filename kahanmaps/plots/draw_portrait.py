@@ -41,9 +41,11 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         )
     space = len(found.labels) == 3
     with drawing(style):
+        import matplotlib as mpl
+
         figure = new_figure(style, _aspect(found, equal))
         if space:
-            _lighten_grid()
+            mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if space else {})
         inside = _inside(found.points, found.window) if space else found.points
         if found.flow is not None:
@@ -239,13 +241,6 @@ def _finish(axes: Any, labels: tuple[str, ...], window: Window) -> None:
 def _write_note(axes: Any, note: str, style: Style) -> None:
     if note:
         axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
-
-
-def _lighten_grid() -> None:
-    """Axes in space take these settings when they are made."""
-    import matplotlib as mpl
-
-    mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})
 
 
 def _make_room(axes: Any, window: Window | None) -> None:

@@ -49,7 +49,8 @@ def draw_degrees(
     if not 1 <= len(growths) <= _MOST_SYSTEMS:
         raise InputError(f"found {len(growths)} systems, expected 1 to {_MOST_SYSTEMS} in one picture")
     style = style or Style()
-    scale = _scale(scale, "log" if any(map(_is_exponential, growths.values())) else "linear")
+    is_log = any(one.looks_exponential or one.growth is GrowthClass.EXPONENTIAL for one in growths.values())
+    scale = _scale(scale, "log" if is_log else "linear")
     labels = [_degree_label(name, growth) for name, growth in growths.items()]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, most=1))
@@ -110,10 +111,6 @@ def _scale(asked: str | None, default: str) -> str:
     if asked is not None and asked not in SCALES:
         raise InputError(f"found the scale {asked[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
     return asked or default
-
-
-def _is_exponential(growth: DegreeGrowth) -> bool:
-    return growth.growth is GrowthClass.EXPONENTIAL or growth.looks_exponential
 
 
 def _step_axis(axes: Axes, scale: str, longest: int) -> None:

@@ -87,7 +87,9 @@ def _claim(finding: Finding, ids: Counter[str]) -> str:
     `ids` counts those that are on the page: a control has the key of its claim, once for each hypothesis it breaks.
     """
     key = finding.place.get("key")
-    mark = f' id="{_new_id(f"claim-{_slug(str(key))}", ids)}"' if key else ""
+    name = f"claim-{_slug(str(key))}"
+    ids[name] += 1
+    mark = f' id="{name if ids[name] == 1 else f"{name}-{ids[name]}"}"' if key else ""
     place = finding.place.get("place")
     words = finding.claim.removeprefix(f"{place}: ")
     above = f"<strong>{text(place)}</strong> " if place else ""
@@ -105,11 +107,6 @@ def _orbits(file: SystemFile, report: Report, pictures: Pictures) -> str:
     if file.member is not None:
         return invariant_curves_figure(file, given, pictures)
     return portrait_figure(file, given, pictures)
-
-
-def _new_id(name: str, ids: Counter[str]) -> str:
-    ids[name] += 1
-    return name if ids[name] == 1 else f"{name}-{ids[name]}"
 
 
 def _slug(words: str) -> str:

@@ -103,7 +103,7 @@ def command(system: str | None, **options: Any) -> int:
 
     def cell(file: SystemFile, progress: Progress) -> Cell:
         reversor, runs = censuses(file, progress)
-        common = _common(runs)
+        common = [law for law in runs[0][1].compatible if all(law in found.compatible for _, found in runs)]
         longest = ", ".join(f"{census.longest} modulo {census.prime}" for census, _ in runs)
         line = f"longest cycle {longest}\tcompatible with {', '.join(common) or 'none of the laws'}"
         return Cell(
@@ -114,11 +114,6 @@ def command(system: str | None, **options: Any) -> int:
         )
 
     return table(system, options, cell)
-
-
-def _common(runs: list[tuple[Census, Comparison]]) -> list[str]:
-    """The laws that all runs are compatible with."""
-    return [law for law in runs[0][1].compatible if all(law in found.compatible for _, found in runs)]
 
 
 def _prime(text: str) -> int:

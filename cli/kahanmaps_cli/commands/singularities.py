@@ -101,14 +101,6 @@ def _why(runs: list[SingularityRun], agree: bool) -> str:
     return next(h.note for run in runs for h in run.hypersurfaces if h.note)
 
 
-def _ranks(found: Hypersurface) -> str:
-    return " ".join(str(step.rank) for step in found.steps)
-
-
-def _poles(found: Hypersurface) -> str:
-    return " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
-
-
 def _told(found: Hypersurface) -> str:
     if found.status == "confined":
         return f"contracted by step {found.contracted_at}, confined after {found.confined_at} steps"
@@ -135,7 +127,9 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
             kind += "" if found.stage is None else f", of map {found.stage + 1}"
             tell(f"{formula(found.polynomial, 200)}\t{kind}\t{_told(found)}")
             if found.steps:
-                tell(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
+                ranks = " ".join(str(step.rank) for step in found.steps)
+                poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
+                tell(f"  ranks {ranks}\tpoles {poles}")
     tell(f"\n# {verdict}")
 
 

@@ -322,11 +322,6 @@ def _sound(z: Any, before: Any, width: int, fine: Any) -> None:
                 fine[i] = 0.0
 
 
-def _stamp() -> int:
-    """A checksum of the formulas' file: machine code kept on disk goes by the age of this file alone."""
-    return zlib.crc32(Path(float_steps.__file__).read_bytes())
-
-
 def _planar_kernel(stamp: int) -> Any:
     def planar_advance(
         lanes: Lanes, lo: int, hi: int, blocks: Blocks, span: Span, record: Any, room: PlanarRoom
@@ -603,7 +598,8 @@ def _generic_kernel(stamp: int) -> Any:
     return generic_advance
 
 
-_STAMP = _stamp()
+# A checksum of the formulas' file: machine code kept on disk goes by the age of this file alone.
+_STAMP = zlib.crc32(Path(float_steps.__file__).read_bytes())
 _kernel = partial(compiled, error_model="numpy", nogil=True)
 planar_advance = _kernel(_planar_kernel(_STAMP))
 generic_advance = _kernel(_generic_kernel(_STAMP))
