@@ -1,11 +1,12 @@
 """What a notebook asks a value for, and JSON a formula: how it looks. The answers are in kahanmaps.display.
 
 That folder knows all values and stands above them, so that no value knows HTML or LaTeX. It is imported when somebody
-looks: hence by its name, the one place where an import points up.
+looks, and so is the font of formulas: hence by their names, the one file where imports point up.
 """
 
 from __future__ import annotations
 
+import builtins
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from importlib import import_module
@@ -21,7 +22,8 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         _load(self)
-        return html_form(self)
+        html = html_form(self)
+        return _font() + html if "<math" in html else html
 
 
 class Printed(Displayed):
@@ -86,6 +88,16 @@ def text_form(value: object) -> str:
 def latex_form(value: object) -> str:
     """The value as LaTeX: the files of kahanmaps.display register what they know."""
     raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as a formula")
+
+
+def _font() -> str:
+    """The font of formulas, where it is a notebook that shows one, and it has not got the font yet."""
+    shell: Any = getattr(builtins, "get_ipython", lambda: None)()
+    if not hasattr(shell, "kernel") or hasattr(shell, "kahanmaps_font"):
+        return ""
+    shell.kahanmaps_font = True
+    style = import_module("kahanmaps.reports.stylesheet")
+    return f"<style>{style.font_face()} .formula {style.FORMULAS}</style>"
 
 
 def _load(value: object) -> None:

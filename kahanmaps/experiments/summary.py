@@ -33,6 +33,7 @@ _FEW = 5  # different values, whose counts are kept
 _RELATED = 3  # names suggested for a mistaken one
 _LISTED = 60
 # Characters in tables for the eye; texts are what failures say, and what systems are.
+_LONGEST_DECIMAL = 16
 _LONGEST_SHOWN_NUMBER, _LONGEST_SHOWN_TEXT = 24, 160
 
 Number = int | float | str
@@ -389,9 +390,12 @@ def _shortened(value: Any, digits: int) -> str:
 
     >>> _shortened(0.123456789, 4), _shortened("7/3", 4), _shortened("1" * 30 + "/7", 4)
     ('0.1235', '7/3', '~1.587e+28')
+    >>> _shortened("2.29663026288653824570", 4), _shortened("0.125", 2)
+    ('2.297', '0.125')
     """
-    if isinstance(value, float):
-        return f"{value:.{digits}g}"
+    is_decimal = isinstance(value, str) and "." in value and _is_number(value)
+    if isinstance(value, float) or (is_decimal and len(value) > _LONGEST_DECIMAL):
+        return f"{float(value):.{digits}g}"
     text = plain(value)
     is_number = _is_number(value)
     longest = _LONGEST_SHOWN_NUMBER if is_number else _LONGEST_SHOWN_TEXT

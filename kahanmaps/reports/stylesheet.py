@@ -10,6 +10,7 @@ from base64 import b64encode
 from functools import cache
 from importlib import resources
 
+FORMULAS = 'math { font-size: 1.18em; font-family: "kahanmaps math", math; }'
 STYLESHEET = """
 :root { color-scheme: light dark; --back: #ffffff; --text: #1f2328; --soft: #59636e; --line: #d1d9e0; --card: #f6f8fa;
   --link: #0b57d0; }
@@ -32,7 +33,6 @@ ul.statements > li { display: grid; grid-template-columns: 7.2rem minmax(0, 1fr)
 @media (max-width: 34rem) { ul.statements > li { grid-template-columns: minmax(0, 1fr); gap: 0; padding: .45rem 0; } }
 .verdict { font-weight: 600; }
 .formula { line-height: 1.9; }
-math { font-size: 1.18em; font-family: "kahanmaps math", math; }
 .wide, section { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .95em; }
 caption { text-align: left; padding-bottom: .2rem; }
@@ -57,6 +57,7 @@ figure { margin: 1rem 0; }
   details::details-content { content-visibility: visible; height: auto; }
 }
 """
+STYLESHEET += FORMULAS
 
 
 @cache

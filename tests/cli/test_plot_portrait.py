@@ -42,6 +42,12 @@ def test_a_portrait_is_drawn_in_the_terminal_unless_a_file_is_named(kahanmaps):
     assert outcome.err == "lotka_volterra: 1 orbit, 30 steps, eps = 1/20 (time step 2 eps = 1/10)\n"
 
 
+def test_lines_between_steps_are_told_where_orbits_fill_no_curve(kahanmaps):
+    said = "fill no curve that could be followed: lines join each point"
+    assert said in kahanmaps("plot portrait paper_m2 --eps 1/20 --start 1,2,3,4 --steps 50 --lines").err
+    assert said not in kahanmaps("plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 900 --lines").err
+
+
 def test_a_file_carries_its_recipe(kahanmaps, tmp_path):
     assert kahanmaps(LV + " --size 4 -q -o", tmp_path / "lv.svg").status == 0
     recipe = read_recipe(str(tmp_path / "lv.svg"))

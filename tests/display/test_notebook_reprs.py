@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import builtins
 import time
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -106,6 +108,18 @@ def test_a_file_shows_equations_parameters_and_integrals(top):
     assert "a1 = 1, a2 = -2, a3 = 1" in text
     alttexts = [one.get("alttext") for one in html_of(top).iter("math")]
     assert "-(eps^2*x2^2 - 1)/(2*eps^2*x3^2 + 1)" in alttexts
+
+
+def test_a_notebook_gets_the_font_of_formulas_once(top, monkeypatch):
+    assert "@font-face" not in top._repr_html_()
+    shell = SimpleNamespace(kernel=None)
+    monkeypatch.setattr(builtins, "get_ipython", lambda: shell, raising=False)
+    first, second = top._repr_html_(), top._repr_html_()
+    assert first.startswith("<style>@font-face")
+    assert first.endswith(second)
+    assert "@font-face" not in second
+    monkeypatch.setattr(builtins, "get_ipython", lambda: SimpleNamespace(), raising=False)  # IPython in a terminal
+    assert top._repr_html_() == second
 
 
 def test_a_name_cannot_bring_elements_along(top):

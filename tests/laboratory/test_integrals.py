@@ -417,3 +417,10 @@ def test_orbits_have_settled_where_the_last_of_several_degrees_showed_no_more(co
     profile = Profile(3, codimensions, codimensions, None, True, True)
     assert (profile.is_settled, profile.degree, profile.with_known) == (settled, len(codimensions), 0)
     assert profile.first_degree == next((d for d, k in enumerate(codimensions, 1) if k), None)
+
+
+def test_formulas_with_symbols_that_depend_at_the_values_of_the_file_say_so():
+    said = "at a1 = 0, a2 = 0, a3 = 1 only 0 of the 2 formulas are independent"
+    symbols = ["a1", "a2", "a3"]
+    assert said in find_integrals(load("euler_top", {"a1": 0, "a2": 0}), symbols=symbols).reason
+    assert find_integrals(load("euler_top"), symbols=symbols).reason == ""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.errors import counted
 from kahanmaps_cli.options import (
     backward_option,
     eps_of,
@@ -217,6 +218,10 @@ def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fi
     euler = orbits.euler() if options["euler"] else None
     shown = portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
     shown = replace(shown, flow=orbits.flow(axes, shown.window, options))
+    chords = sum(one is None for one in shown.joined)
+    if chords:
+        what = f"{chords} of {counted(len(shown.joined), 'orbit')}"
+        orbits.notes.append(f"{what} fill no curve that could be followed: lines join each point with the next step")
     if levels is not None:
         shown = replace(shown, levels=_levels(orbits, levels, axes, options["levels_at"], shown.window))
     count = found.points.shape[0] * found.points.shape[1]

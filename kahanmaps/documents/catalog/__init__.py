@@ -140,7 +140,8 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 
 def _is_path(text: str) -> bool:
     separators = [mark for mark in (os.sep, os.altsep) if mark]
-    return text.endswith(_ENDING) or any(mark in text for mark in separators) or os.path.exists(text)
+    is_file = "." in text and "(" not in text  # with the ending of files, or one that was mistyped
+    return is_file or any(mark in text for mark in separators) or os.path.exists(text)
 
 
 def _unknown(name: str) -> InputError:

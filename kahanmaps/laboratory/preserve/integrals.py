@@ -32,7 +32,12 @@ from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.interpolated import bases_of
-from kahanmaps.laboratory.preserve.iterates import IntegralInIterates, integrals_in_iterates, verdict_on_ratio
+from kahanmaps.laboratory.preserve.iterates import (
+    IntegralInIterates,
+    gradient_of,
+    integrals_in_iterates,
+    verdict_on_ratio,
+)
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.search import AFFINE, Found, may_be_conjugate, repeat, search
 from kahanmaps.maps.implicit import BirationalMap
@@ -350,7 +355,25 @@ def find_integrals(
             f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q of the degrees and "
             "sizes that were tried: coefficients of Hirota-Kimura bases are such integrals"
         )
-    return replace(done, reason="; ".join(filter(None, (reason, _unfinished(profile, max_degree)))))
+    reasons = (reason, _at_the_values(laboratory, done), _unfinished(profile, max_degree))
+    return replace(done, reason="; ".join(filter(None, reasons)))
+
+
+def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
+    """That formulas with symbols depend on each other, or vanish, where these have the values that the file gives."""
+    values = [laboratory.file.parameters.get(name) for name in laboratory.symbols]
+    if not values or None in values:
+        return ""
+    prime = laboratory.maps[0].prime
+    map_ = laboratory.map_at(prime, [int(GF(prime).convert(value)) for value in values], laboratory.maps[0].eps)
+    point = map_.random_point()
+    rows = [gradient_at(map_, one.function, point) for one in search.integrals]
+    rows += [gradient_of(one.ratio, laboratory.map, map_, point) for one in search.in_iterates]
+    left = rank(rows, prime)
+    if left == len(rows):
+        return ""
+    told = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
+    return f"at {told} only {left} of the {len(rows)} formulas are independent: without --symbolic others may be found"
 
 
 def _unfinished(profile: Profile, max_degree: int | None) -> str:

@@ -33,7 +33,7 @@ from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import Point, exponents_up_to, rank
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, rank
 from kahanmaps.laboratory.preserve.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.branches import pattern
 from kahanmaps.laboratory.preserve.identities import judged
@@ -210,7 +210,7 @@ def integrals_in_iterates(
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]
                 for ratio in _ratios(one, functions if back is None else [back(F, one.shift) for F in functions]):
-                    row = _gradient(laboratory, ratio, point)
+                    row = gradient_of(ratio, laboratory.map, laboratory.maps[0], point)
                     if rank([*known, row], prime) == len(known):
                         continue
                     known.append(row)
@@ -302,13 +302,12 @@ def _ratios(lift: Lift, functions: Sequence[fmpq_mpoly]) -> Iterator[RatioOfIter
             yield RatioOfIterates(lift, tuple(functions), (first, k), (0, 1))
 
 
-def _gradient(laboratory: Laboratory, ratio: RatioOfIterates, point: Point) -> list[int]:
-    """A multiple of the gradient with respect to the first point, on the first map of the laboratory."""
-    map_ = laboratory.maps[0]
+def gradient_of(ratio: RatioOfIterates, exact: BirationalMap, map_: ModularMap, point: Point) -> list[int]:
+    """A multiple of the gradient with respect to the first point, on a map modulo a prime."""
     field = DualField(GF(map_.prime))
     values = [field.convert(value) for value in map_.values]
     eps = field.convert(map_.eps)
-    over = laboratory.map.at(eps, field, values)
+    over = exact.at(eps, field, values)
     row = []
     for k in range(map_.dim):
         points = [tuple(field.dual(c, int(i == k)) for i, c in enumerate(point))]
