@@ -97,6 +97,28 @@ def test_heights_over_a_number_field_grow_as_over_q():
     assert "of points over QQ[t]/(t^2 - 2)" in found.text
 
 
+def test_commuting_systems_over_a_number_field_are_found_and_commute():
+    def found(equations: str, a: str, **options) -> km.CommutingSystems:
+        return km.find_commuting(km.System(equations, a=a), **options)
+
+    squares = found("x' = a*x^2; y' = y^2", "root of t^2 - 2")
+    assert squares.complete
+    assert squares.dimension == 2
+    (family,) = squares.families
+    assert {tuple(g.rhs) for g in family.directions} >= {("x^2*a", "0"), ("0", "y^2*a"), ("2*x^2", "0")}
+    f = km.System("x' = a*x^2; y' = y^2", a="root of t^2 - 2")
+    for g in family.directions:
+        assert km.check_commute(f, km.System(dict(zip("xy", g.rhs, strict=True)), a="root of t^2 - 2")).holds
+    assert [g.trivial for g in found(TOP, CUBIC).solutions] == ["0", "f", "-f"]
+    # x' = a^2 x, y' = 2 y: for a^2 = 2 the matrix of f is a multiple of 1, and every linear field commutes with it.
+    assert found("x' = a^2*x; y' = 2*y", "root of t^2 - 2").dimension == 4
+    assert found("x' = a^2*x; y' = 2*y", "root of t^2 - 3").dimension == 2
+    with pytest.raises(InputError, match="found a variable t"):
+        found("t' = a*t^2", "root of t^2 - 2")
+    with pytest.raises(InputError, match="expected a quadratic vector field without eps"):
+        km.find_commuting("lyness")
+
+
 def test_analyze_says_once_what_is_not_done_over_a_number_field():
     found = km.analyze(km.System(TOP, a="root of t^2 - 2"), seconds=20)
     assert found.conclusion.sentence.startswith("Superintegrable (proved): 2 independent integrals")
