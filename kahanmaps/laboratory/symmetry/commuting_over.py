@@ -92,5 +92,6 @@ def find_commuting(
             replace(family, base=over(family.base), directions=tuple(map(over, family.directions)))
             for family in found.families
         ],
+        irrational=[],  # these are not over the field either, but over its products with others
         root=str(given.root),
     )
