@@ -94,6 +94,7 @@ from kahanmaps.laboratory.singular.singularities import SingularityRun as Singul
 from kahanmaps.laboratory.singular.singularities import singularities as _singularities
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems as CommutingSystems
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems as _commuting_systems
+from kahanmaps.laboratory.symmetry.commuting_over import find_commuting as _find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries as Symmetries
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as _linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import Equivalence as Equivalence
@@ -157,6 +158,7 @@ find_poisson = opened(_find_poisson)
 scan = opened(_scan)
 singularities = opened(_singularities)
 commuting_systems = opened(_commuting_systems)
+find_commuting = opened(_find_commuting)
 linear_symmetries = opened(_linear_symmetries)
 equivalent_system = opened(_equivalent_system)
 fixed_points = opened(_fixed_points)
@@ -169,7 +171,6 @@ portrait = opened(_draw_orbits)
 # The same under the names of the commands.
 cycles = cycle_census
 degrees = degree_growth
-find_commuting = commuting_systems
 find_density = find_densities
 find_symmetry = linear_symmetries
 heights = height_survey

@@ -127,7 +127,7 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
     (
         "maps.floats.lyapunov.MAX_NUMBERS",
         18,
-        lambda: refused(lambda: lyapunov_exponents(LORENZ, "1/100", np.ones((2, 3)), 3)),
+        lambda: refused(lambda: lyapunov_exponents(LORENZ, np.ones((2, 3)), "1/100", 3)),
         "found 2 starts",
     ),
     (

@@ -48,7 +48,7 @@ def _commuting_lines(found: CommutingSystems) -> Iterator[str]:
     for g in found.nontrivial:
         if g.system.scaled(-1) not in told:
             told.append(g.system)
-            yield f"{g.finding.verdict}\tg and -g\t{_pasted(g)}"
+            yield f"{g.finding.verdict}\tg and -g\t{_pasted(g, found.root)}"
             yield f"\t{g.finding.evidence.summary}"
     for family in found.families:
         letters = [f"t{k + 1}" for k in range(len(family.directions))]
@@ -56,7 +56,7 @@ def _commuting_lines(found: CommutingSystems) -> Iterator[str]:
         total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
         yield f"{family.finding.verdict}\tfamily\tg = {base}{total} for all {', '.join(letters)}"
         named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
-        yield from (f"\t{name}\t{_pasted(g)}" for name, g in named)
+        yield from (f"\t{name}\t{_pasted(g, found.root)}" for name, g in named)
         yield f"\t{family.finding.evidence.summary}"
     if found.irrational:
         yield f"note\tmore solutions, not rational: {'; '.join(found.irrational)}"
@@ -72,10 +72,12 @@ def _commuting_lines(found: CommutingSystems) -> Iterator[str]:
         yield f"# undecided: there may be more; {found.undecided[0]}"
 
 
-def _pasted(g: CommutingField) -> str:
+def _pasted(g: CommutingField, root: str) -> str:
     """The system as options of any other command, and B below it where g = B f."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
+    if root:
+        text = f"{text} -p '{g.system.symbols[0]}={root}'"
     if g.B is None:
         return text
     rows = [", ".join(map(str, row)) for row in g.B.tolist()]

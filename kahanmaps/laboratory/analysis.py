@@ -44,7 +44,7 @@ from kahanmaps.laboratory.singular.singularities import (
     patterns_of,
     singularities,
 )
-from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
@@ -53,7 +53,7 @@ from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
 _MOST_SECONDS = 150.0
 _MAX_DEGREE = 200_000
-_OVER_NUMBER_FIELDS = ("degrees", "integrals", "densities", "heights")
+_OVER_NUMBER_FIELDS = ("degrees", "integrals", "densities", "heights", "commuting systems")
 _TENSORS = {3: 3, 4: 2}  # degrees of Poisson tensors by dimension; in the plane they are densities
 
 
@@ -274,8 +274,9 @@ def analyze(
             found.symmetries = linear_symmetries(system, seconds=share(0.1), progress=told("symmetries"))
 
     def commuting() -> None:
-        if system is not None and found.eps is None:
-            found.commuting = commuting_systems(system, seed=seed, seconds=share(0.1), progress=told("commuting"))
+        if (system is not None or laboratory.root is not None) and found.eps is None:
+            seconds = share(0.1)
+            found.commuting = find_commuting(system or map_, seed=seed, seconds=seconds, progress=told("commuting"))
 
     def confinement() -> None:
         values = default_eps(map_, seed) if found.eps is None else (found.eps,)
@@ -318,8 +319,7 @@ def analyze(
     if laboratory.root is not None:
         found.skipped.append(
             f"over the number field {laboratory.root.number_field}: fixed points, invariant curves, integrals in "
-            "iterates, the flow, Poisson tensors, singularities, symmetries, Hamiltonian structure, the family, "
-            "commuting systems"
+            "iterates, the flow, Poisson tensors, singularities, symmetries, Hamiltonian structure, the family"
         )
     elif system is None:
         found.skipped.append(

@@ -74,7 +74,9 @@ class Laboratory:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
-        if algebraic and not flow and isinstance(file.map, AlgebraicMap):
+        if flow and file.map.root is not None:
+            raise InputError(f"found a {file.map.root}, expected rational parameters: it is the flow that is asked for")
+        if algebraic and isinstance(file.map, AlgebraicMap):
             self.root, self.map = file.map.root, file.map.given
             if symbols or self.root.degree > MAX_DEGREE:
                 found = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"

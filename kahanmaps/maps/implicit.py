@@ -363,7 +363,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
         return (
             f"found a parameter that is a {self.root}, expected rational ones: algebraic numbers are for analyze, "
             "orbit, ensemble, lyapunov, check-commute, check-integrals, check-measure, find-integrals, find-density, "
-            "degrees, heights, cycles and portraits"
+            "find-commuting, degrees, heights, cycles, convert and portraits"
         )
 
     @property

@@ -188,7 +188,7 @@ def test_what_names_no_root_is_refused(value, words):
 
 def test_what_needs_rational_numbers_refuses_in_a_sentence():
     file = km.System(TOP, a=ROOT)
-    for function in (km.find_poisson, km.find_symmetry, km.find_commuting):
+    for function in (km.find_poisson, km.find_symmetry, km.commuting_systems):
         with pytest.raises(InputError, match="found a parameter that is a root of"):
             function(file)
     with pytest.raises(InputError, match="found a parameter that is a root of"):

@@ -97,18 +97,43 @@ def test_heights_over_a_number_field_grow_as_over_q():
     assert "of points over QQ[t]/(t^2 - 2)" in found.text
 
 
+def test_commuting_systems_over_a_number_field_are_found_and_commute():
+    def found(equations: str, a: str, **options) -> km.CommutingSystems:
+        return km.find_commuting(km.System(equations, a=a), **options)
+
+    squares = found("x' = a*x^2; y' = y^2", "root of t^2 - 2")
+    assert squares.complete
+    assert squares.dimension == 2
+    (family,) = squares.families
+    assert {tuple(g.rhs) for g in family.directions} >= {("x^2*a", "0"), ("0", "y^2*a"), ("2*x^2", "0")}
+    f = km.System("x' = a*x^2; y' = y^2", a="root of t^2 - 2")
+    for g in family.directions:
+        assert km.check_commute(f, km.System(dict(zip("xy", g.rhs, strict=True)), a="root of t^2 - 2")).holds
+    assert [g.trivial for g in found(TOP, CUBIC).solutions] == ["0", "f", "-f"]
+    # x' = a^2 x, y' = 2 y: for a^2 = 2 the matrix of f is a multiple of 1, and every linear field commutes with it.
+    assert found("x' = a^2*x; y' = 2*y", "root of t^2 - 2").dimension == 4
+    assert found("x' = a^2*x; y' = 2*y", "root of t^2 - 3").dimension == 2
+    with pytest.raises(InputError, match="found a variable t"):
+        found("t' = a*t^2", "root of t^2 - 2")
+    with pytest.raises(InputError, match="expected a quadratic vector field without eps"):
+        km.find_commuting("lyness")
+
+
 def test_analyze_says_once_what_is_not_done_over_a_number_field():
     found = km.analyze(km.System(TOP, a="root of t^2 - 2"), seconds=20)
     assert found.conclusion.sentence.startswith("Superintegrable (proved): 2 independent integrals")
     assert len(found.skipped) == 1
-    assert found.skipped[0].startswith("over the number field QQ[t]/(t^2 - 2): invariant curves")
+    assert found.skipped[0].startswith("over the number field QQ[t]/(t^2 - 2): fixed points, invariant curves")
+    assert "only 0, f and -f commute" in dict(found.sections)["commuting systems"][0].text
     assert found.to_json()["parameters"] == {}
 
 
 def test_what_is_not_sought_over_a_number_field_is_refused():
     file = km.System(TOP, a="root of t^2 - 2")
-    with pytest.raises(InputError, match="found a parameter that is a root of"):
+    with pytest.raises(InputError, match="it is the flow that is asked for"):
         km.find_integrals(file, flow=True)
+    with pytest.raises(InputError, match="found a parameter that is a root of"):
+        km.darboux_polynomials(file, 2)
     with pytest.raises(InputError, match="a degree of at most 6"):
         km.find_integrals(km.System(TOP, a="root of t^7 - 2"))
     with pytest.raises(InputError, match="expected no other symbols"):

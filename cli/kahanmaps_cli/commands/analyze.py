@@ -47,6 +47,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
       kahanmaps analyze henon_heiles -p c=-6 --seconds 30
+      kahanmaps analyze euler_top -p 'a1 = root of t^2 - 2'
       kahanmaps analyze my-system.toml --markdown > report.md
       kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'

@@ -42,6 +42,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     \b
       kahanmaps convert euler_top --to pari
       kahanmaps convert euler_top --to sympy --symbolic a1,a2,a3
+      kahanmaps convert euler_top -p 'a1 = root of t^2 - 2' --to sage
       kahanmaps convert lagrange_top --to latex -o lagrange_top.tex
       kahanmaps convert weierstrass --to julia --what map-formulas,inverse
       kahanmaps convert --vars x,y --rhs x*y --rhs=-x^2 --to toml -o my.toml

@@ -39,22 +39,24 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-commuting three_wave --shape quadratic
       kahanmaps find-commuting --vars x,y --rhs 'x^2' --rhs 'y^2 + x*y'
       kahanmaps find-commuting pair.toml --json | jq '.solutions[].B'
+      kahanmaps find-commuting "x' = a*x^2; y' = y^2" -p 'a=root of t^2 - 2'
 
     First the g with [f, g] = 0 by linear algebra; then equations from the next powers of eps, solved over Q; then every
     solution is proved, or supported at random points. Nothing is lost on the way, so the list is complete unless it
-    says otherwise. 0, f and -f always commute and are left out; --json has them, with a word in "trivial".
+    says otherwise. Over a number field it is the same for the system over Q that f is; "g = B f" is then the default in
+    every dimension. 0, f and -f always commute and are left out; --json has them, with a word in "trivial".
 
     Exit status: 0 the list is complete, 2 wrong use, 3 something remained open.
     """
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+    from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
 
     file = load_system(system, options)
     seed, error_bits = options["seed"], options["error_bits"]
     settings = Settings(seed=seed, error_bits=error_bits)
     with Progress(quiet) as progress:
-        found = commuting_systems(
-            file.system,
+        found = find_commuting(
+            file.system if file.map.root is None else file.map,
             options["shape"],
             seed=seed,
             error_bits=error_bits,

@@ -54,6 +54,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals henon_heiles --flow
       kahanmaps find-integrals henon_heiles -p c=-2..0
+      kahanmaps find-integrals euler_top -p 'a1 = root of t^2 - 2'
       kahanmaps find-integrals lorenz --parameter b=20 --flow --darboux 3
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 

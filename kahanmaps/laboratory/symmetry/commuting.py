@@ -110,6 +110,7 @@ class CommutingSystems(Printed):
     discarded: int = 0
     order: int = 2  # the highest power of eps of which equations were taken
     undecided: list[str] = field(default_factory=list)
+    root: str = ""  # the algebraic number in f, where there is one
 
     @property
     def complete(self) -> bool:
@@ -119,9 +120,10 @@ class CommutingSystems(Printed):
     @property
     def kind_text(self) -> str:
         """Which g were tried."""
+        over = f" over the number field of a {self.root}" if self.root else ""
         if self.shape == "linear":
-            return "fields g = B f (B a constant rational matrix)"
-        return "fields g of degree at most 2 with rational coefficients"
+            return f"fields g = B f (B a constant {'matrix' if over else 'rational matrix'}{over})"
+        return f"fields g of degree at most 2{over or ' with rational coefficients'}"
 
     @property
     def nontrivial(self) -> list[CommutingField]:
@@ -154,14 +156,15 @@ def commuting_systems(
     error_bits: int = DEFAULT_ERROR_BITS,
     seconds: float = DEFAULT_SECONDS,
     progress: Callable[[str], None] = lambda _: None,
+    C: fmpq_mat | None = None,
 ) -> CommutingSystems:
     """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
     `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
     where the dimension is at most 3 and a second is enough to find all of them, else those. Exact over Q; what no lemma
     proves is supported at random points, with a probability of error below 2^-error_bits. `seconds` bounds the time,
-    roughly. Raises InputError for another shape or a bound that is not positive. What is too large is
-    told in `undecided`. Source: petrera-suris-2016.
+    roughly. With a matrix C, for which C f' = f' C, only g with C g' = g' C. Raises InputError for another shape or a
+    bound that is not positive. What is too large is told in `undecided`. Source: petrera-suris-2016.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2 + 1", "y^2 - x*y"])
     >>> [(g.trivial, str(g.finding.verdict)) for g in commuting_systems(f).solutions]
@@ -181,13 +184,16 @@ def commuting_systems(
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a positive number")
     settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
-    search = _Search(system, shape, settings, time.monotonic() + seconds)
+    search = _Search(system, shape, settings, time.monotonic() + seconds, C)
     search.run()
     return search.found
 
 
 class _Search:
-    def __init__(self, f: QuadraticSystem, shape: str, settings: Settings, deadline: float) -> None:
+    def __init__(
+        self, f: QuadraticSystem, shape: str, settings: Settings, deadline: float, C: fmpq_mat | None = None
+    ) -> None:
+        self.C = C
         self.f, self.settings, self.deadline = f, settings, deadline
         self.found = CommutingSystems(f, shape)
         self.space = CommutingSpace((), (), 0)
@@ -208,7 +214,7 @@ class _Search:
             self.space = CommutingSpace((f,), (QQ.identity(f.dim),) * (found.shape == "linear"), 1)
         else:
             self.settings.progress("the fields g with [f, g] = 0")
-            self.space = commuting_space(f, found.shape, self.settings.seed)
+            self.space = commuting_space(f, found.shape, self.settings.seed, self.C)
             found.basis = list(self.space.fields)
             found.dimension = len(found.basis) if len(found.basis) == self.space.dimension else None
             self._search()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import nullspace, primitive_integers
+from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.laboratory.symmetry.commuting_equations import coefficients_of, combination, system_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -42,8 +42,10 @@ def unknowns(system: QuadraticSystem, shape: str) -> int:
     return n * len(_independent_components(system)) if shape == "linear" else n * (n + 1) * (n + 2) // 2
 
 
-def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0) -> CommutingSpace:
+def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat | None = None) -> CommutingSpace:
     """All g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not zero.
+
+    With a matrix C, for which C f' = f' C, only those g with C g' = g' C.
 
     The conditions are taken at random integer points, and the result is verified as an identity of polynomials.
     Source: petrera-suris-2016.
@@ -84,6 +86,10 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0) -> CommutingS
             size = len(solutions[0]) // n
             fields = [system_of(f.variables, [v[i * size : (i + 1) * size] for i in range(n)]) for v in solutions]
         if all(bracket_vanishes(f, g) for g in fields):
+            if C is not None:
+                combinations = nullspace(QQ, fmpq_mat([_defect(C, g, f.dim) for g in fields]).transpose())
+                fields = [system_of(f.variables, combination(fields, w, fmpq(0))) for w in combinations]
+                matrices = [combination_of(w, matrices) for w in combinations] if matrices else []
             return _with_f_first(f, fields, matrices)
         needed = len(rows) + 2 * n
 
@@ -102,6 +108,17 @@ def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
         if not total.is_zero():
             return False
     return True
+
+
+def _defect(C: fmpq_mat, g: QuadraticSystem, n: int) -> list[fmpq]:
+    """All coefficients of C g' - g' C."""
+    names, found = g.rhs[0].context().gens(), list[fmpq]()
+    for i in range(n):
+        for j in range(n):
+            terms = (C[i, k] * g.rhs[k].derivative(j) - C[k, j] * g.rhs[i].derivative(k) for k in range(n))
+            entry = sum(terms, 0 * names[0])
+            found += [fmpq(entry[tuple(int(l == k) for l in range(n))]) for k in range(n + 1)]
+    return found
 
 
 def _scalars(
