@@ -48,7 +48,7 @@ def batch_page(
     spread = f"Distribution of {', '.join(values)}"
     about = "The table above has the quantiles"
     sections = [
-        Section("status", "How far it has come", f"{wide(status_table(status))}\n{counts}"),
+        Section("status", "Progress", f"{wide(status_table(status))}\n{counts}"),
         Section("summary", "Summary", tables if done else "<p>There are no results yet.</p>"),
         Section(
             "distributions",

@@ -44,7 +44,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     solution is proved, or supported at random points. Nothing is lost on the way, so the list is complete unless it
     says otherwise. 0, f and -f always commute and are left out; --json has them, with a word in "trivial".
 
-    Exit status: 0 the list is complete, 2 wrong use, 3 something remained open.
+    Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
     """
     from kahanmaps.checks.settings import Settings
     from kahanmaps.laboratory.symmetry.commuting import commuting_systems
