@@ -207,8 +207,8 @@ def analyze(
 
     def vector_field() -> None:
         if system is not None:
-            found.fixed_points = fixed_points(system, share(0.03))
-            found.equivalent = equivalent_system(file, found.fixed_points, share(0.03))
+            found.fixed_points = fixed_points(system, share(0.1))
+            found.equivalent = equivalent_system(file, found.fixed_points, share(0.1))
 
     def hamiltonian() -> None:
         if system is not None and dim <= MAX_HAMILTONIAN_DIMENSION:
