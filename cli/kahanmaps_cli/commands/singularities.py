@@ -21,6 +21,7 @@ from kahanmaps_cli.terminal import formula, tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
+    from kahanmaps.laboratory.singular.fates import Hypersurface
     from kahanmaps.laboratory.singular.singularities import SingularityRun
 
 
