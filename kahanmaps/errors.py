@@ -1,4 +1,4 @@
-"""The errors of kahanmaps: wrong use, told in a sentence.
+"""The errors of kahanmaps: usage errors, told in a sentence.
 
 An exception here means that somebody asked for something that cannot be done. What may well happen in the
 course of an orbit or a check (a singular point, a height budget) is not an exception but a status.

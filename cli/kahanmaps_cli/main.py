@@ -1,6 +1,6 @@
 """The entry point: the lazy group of commands, and the one place where errors become messages and exit statuses.
 
-Exit statuses: 0 the claim holds or the work is done; 1 refuted, and nothing else; 2 wrong use or bad input; 3
+Exit statuses: 0 the claim holds or the work is done; 1 refuted, and nothing else; 2 usage error or bad input; 3
 undecided or stopped early; 70 an internal error; 130 interrupted.
 """
 
@@ -162,7 +162,7 @@ def cli(ctx: click.Context, show_version: bool) -> None:
     eps is the paper's epsilon throughout: the time step is 2 eps. Every command has a help of its own, examples
     first: kahanmaps COMMAND --help.
 
-    Exit status: 0 done, or the claim holds, 1 refuted, 2 wrong use, 3 undecided or stopped early, 70 an internal
+    Exit status: 0 done, or the claim holds, 1 refuted, 2 usage error, 3 undecided or stopped early, 70 an internal
     error, 130 interrupted.
     """
     if show_version:

@@ -108,7 +108,7 @@ json_option: Callable[[F], F] = click.option(
     "--json", "as_json", is_flag=True, help="One JSON object on standard output."
 )
 quiet_option: Callable[[F], F] = click.option(
-    "-q", "--quiet", is_flag=True, help="No progress and no talk on standard error."
+    "-q", "--quiet", is_flag=True, help="No progress or messages on standard error."
 )
 output_options: Callable[[F], F] = stack(json_option, quiet_option)
 

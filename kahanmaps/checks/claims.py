@@ -2,7 +2,7 @@
 
 `proved`: exact, for this system and every eps (or the eps named). `refuted`: there is a witness, a point with both
 sides. `supported`: held at random points over GF(p) with a stated error bound, or along an orbit; the evidence says
-which. `undecided`: the reason is given. The four words are never mixed.
+which. `undecided`: the reason is given. Each claim carries exactly one of these words.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 from flint import fmpq
 
@@ -12,7 +11,7 @@ from kahanmaps.display import laboratory_text as laboratory_text  # registers wh
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
-from kahanmaps.displayed import html_form, text_form
+from kahanmaps.displayed import html_form
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.finite.cycles import Census
@@ -268,26 +267,3 @@ def _code(text: str) -> str:
 
 def _text(text: str, width: int = _TEXT) -> str:
     return markup.escape(markup.shortened(text, width))
-
-
-@text_form.register
-def degrees_text(found: DegreeGrowth) -> str:
-    """The lines of the command below its heading."""
-    return found.text
-
-
-@text_form.register
-def integrals_text(found: IntegralSearch) -> str:
-    """Every formula with its verdict and what that rests on, then why there are no more."""
-    return _formulas([(one.name, one) for one in found.integrals], (found.note, found.reason))
-
-
-@text_form.register
-def densities_text(found: DensitySearch) -> str:
-    """The formula with its verdict and what that rests on, then what more there is, or why there is none."""
-    return _formulas([("phi", one) for one in found.shown], (found.further, found.note, found.reason))
-
-
-def _formulas(named: Sequence[tuple[str, Any]], notes: Sequence[str]) -> str:
-    lines = [f"{name}\t{one.verdict}\t{one.text}\n\t{one.evidence.summary}" for name, one in named]
-    return "\n".join([*lines, *(f"note\t{text}" for text in notes if text)])

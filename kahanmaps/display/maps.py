@@ -5,11 +5,11 @@ from __future__ import annotations
 from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
 from kahanmaps.display.systems import CHARACTERS, system_latex
-from kahanmaps.displayed import html_form, latex_form
+from kahanmaps.displayed import html_form, latex_form, text_form
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
-from kahanmaps.maps.normal_form.periods import OrbitPeriod
+from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits import Orbit, OrbitPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -130,3 +130,18 @@ def period_html(found: OrbitPeriod) -> str:
     sentence, *planes = found.text.split("\n")
     inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
     return markup.titled(markup.shortened(sentence, 200), inside)
+
+
+@text_form.register
+def period_text(found: OrbitPeriod) -> str:
+    """The period, that in each plane, and whether the orbit meets a pole."""
+    lines = [f"period\t{_period_word(found)}"]
+    for plane in found.planes:
+        cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]
+        lines.append("\t".join(cells).rstrip())
+    poles = {True: "the orbit meets one", False: "the orbit meets none", None: "not known whether the orbit meets one"}
+    return "\n".join([*lines, f"poles\t{poles[found.meets_pole]}", f"# {found.status}: {found.text.splitlines()[0]}"])
+
+
+def _period_word(found: OrbitPeriod | PlanePeriod) -> str:
+    return "none" if found.status == "aperiodic" else found.status if found.period is None else str(found.period)

@@ -1,9 +1,9 @@
 """Tasks in child processes on this machine: short ones in groups, each within its limits, and no child outlives us.
 
-A child is given one task after the other until it has worked for some seconds; then another one takes its place. What
-goes wrong in a child that has done other tasks before, or dies of a signal, is tried once more alone in a new child,
-and only that decides: so what is recorded does not depend on the order of tasks. What is killed from outside decides
-nothing: it is tried a few times, and then it is lost.
+A child is given one task after the other until it has worked for some seconds; then another one takes its place. A
+task that fails in a reused child, or whose child dies of a signal, is retried once in a fresh one, and only that
+decides: so what is recorded does not depend on the order of tasks. What is killed from outside decides nothing: it is
+tried a few times, and then it is lost.
 """
 
 from __future__ import annotations

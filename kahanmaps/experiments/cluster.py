@@ -42,7 +42,7 @@ class ClusterLost(KahanmapsError):
 
 
 class WorkersUnfit(ClusterLost):
-    """The workers cannot run tasks at all: not a word about any task, which is nobody's fault but the set-up's."""
+    """Raised when the set-up is wrong: the workers cannot run tasks at all, whichever these are."""
 
 
 class KeptJob(NamedTuple):

@@ -139,6 +139,9 @@ class HeightGrowth:
         """The last height over the one before; for exponential growth the factor (of `every` steps)."""
         return Fraction(self.heights[-1], self.heights[-2]) if len(self.heights) > 1 else None
 
+    def __str__(self) -> str:
+        return self.text
+
     @property
     def text(self) -> str:
         """One line for people."""

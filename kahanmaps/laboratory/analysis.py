@@ -17,7 +17,7 @@ from flint import fmpq
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import Structure, structure_of
@@ -57,7 +57,7 @@ _OVER_NUMBER_FIELDS = ("degrees", "integrals", "densities", "heights", "commutin
 _TENSORS = {3: 3, 4: 2}  # degrees of Poisson tensors by dimension; in the plane they are densities
 
 
-class Analysis(Findings, Displayed):
+class Analysis(Findings, Printed):
     """What `analyze` found, and statements about it."""
 
     @property
@@ -69,6 +69,11 @@ class Analysis(Findings, Displayed):
     def sections(self) -> list[tuple[str, list[Statement]]]:
         """The report: titles and their statements."""
         return sections(self)
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each statement, for `pandas.DataFrame(found.rows())` and the like."""
+        told = ((name, line) for name, lines in self.sections for line in lines)
+        return [{"section": name, "status": line.status, "text": line.text} for name, line in told]
 
     @property
     def final_sections(self) -> list[tuple[str, list[Statement]]]:
@@ -202,8 +207,8 @@ def analyze(
 
     def vector_field() -> None:
         if system is not None:
-            found.fixed_points = fixed_points(system, share(0.03))
-            found.equivalent = equivalent_system(file, found.fixed_points, share(0.03))
+            found.fixed_points = fixed_points(system, share(0.1))
+            found.equivalent = equivalent_system(file, found.fixed_points, share(0.1))
 
     def hamiltonian() -> None:
         if system is not None and dim <= MAX_HAMILTONIAN_DIMENSION:

@@ -1,6 +1,6 @@
 """Exit statuses: what scripts branch on.
 
-0 the claim holds (proved or supported) or the work is done; 1 refuted, and nothing else; 2 wrong use or bad input,
+0 the claim holds (proved or supported) or the work is done; 1 refuted, and nothing else; 2 usage error or bad input,
 with a message that says what was found and what is expected; 3 undecided or stopped early; 70 an internal error;
 130 interrupted. (70 and 130 are in test_main.py and test_orbit.py.) Wrong use prints nothing on standard output.
 """

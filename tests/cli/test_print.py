@@ -1,11 +1,51 @@
-"""`print` of a result shows what its command prints."""
+"""`print` of a result shows what its command prints, and `rows()` is what tables are made of."""
 
 from __future__ import annotations
+
+import pytest
 
 import kahanmaps as km
 
 
 def test_print_shows_what_the_command_prints(kahanmaps):
     assert f"{km.check_integrals('euler_top')}\n" == kahanmaps("check-integrals", "euler_top").out
-    below = kahanmaps("degrees", "euler_top", "--terms", "4").out.split("\n", 1)[1]
-    assert f"{km.degrees('euler_top', max_terms=4)}\n" == below
+    assert f"{km.analyze('nahm_tetrahedral')}\n" == kahanmaps("analyze", "nahm_tetrahedral").out
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (lambda: km.degrees("euler_top", max_terms=4), "degrees euler_top --terms 4"),
+        (lambda: km.heights("weierstrass", "1/10"), "heights weierstrass --eps 1/10"),
+        (lambda: km.find_symmetry("three_wave"), "find-symmetry three_wave"),
+        (lambda: km.find_commuting("paper_m2"), "find-commuting paper_m2"),
+        (lambda: km.darboux_polynomials("lotka_volterra", 2), "find-integrals lotka_volterra --darboux 2"),
+        (lambda: km.find_poisson("lorenz", 1), "find-poisson lorenz --degree 1"),
+        (
+            lambda: km.scan("lotka_volterra", ["a"], primes=[11, 13, 17]),
+            "scan lotka_volterra --over a --primes 11,13,17",
+        ),
+    ],
+)
+def test_print_shows_what_the_command_prints_below_its_heading(kahanmaps, result, words):
+    assert f"{result()}\n" == kahanmaps(words).out.split("\n", 1)[1]
+
+
+def test_print_shows_the_part_of_one_value_of_what_is_printed_for_several(kahanmaps):
+    out = kahanmaps("singularities weierstrass --eps 1/3").out.replace("det(I - eps f')", "denominator")
+    assert str(km.singularities("weierstrass", "1/3")).split("\n", 1)[1] in out
+    census = str(km.cycles("weierstrass", "1/7", 101))
+    assert census.split("\nlength")[0] in kahanmaps("cycles weierstrass --eps 1/7 -p 101").out
+    period = km.orbit_period(km.structure_of(km.load("paper_m2").system).form, "1/10", [1, 2, 3, 4], 101)
+    out = kahanmaps("period paper_m2 --eps 1/10 --start 1,2,3,4 --arithmetic mod:101").out
+    assert str(period).split("\t")[1].split("\n")[0] in out
+
+
+def test_rows_are_tables():
+    assert km.heights("weierstrass", "1/10").rows()[0] == {"eps": "1/10", "start": "29/16,19/7", "growth": "quadratic"}
+    assert km.cycles("weierstrass", "1/7", 101).rows()[0] == {"length": 3, "count": 1}
+    assert km.find_symmetry("lorenz").rows()[1] == {"kind": "symmetry", "action": "(x, y, z) -> (-x, -y, z)"}
+    assert km.find_commuting("lorenz").rows() == []
+    assert {row["verdict"] for row in km.find_commuting("paper_m2").rows()} == {"proved"}
+    first = km.analyze("riccati", seconds=5).rows()[0]
+    assert first == {"section": "vector field", "status": "proved", "text": "div f = 2*x + 1"}

@@ -91,7 +91,7 @@ def test_the_whole_report_is_kept_if_asked_for(name):
         "find-density": lambda: densities.find_densities(RIVALS),
         "find-poisson": lambda: find_poisson(RIVALS),
         "find-symmetry": lambda: linear_symmetries(RIVALS.system),
-        "find-commuting": lambda: commuting_systems(RIVALS.system),
+        "find-commuting": lambda: commuting_systems(RIVALS.system, "linear"),
         "analyze": lambda: analyze(RIVALS),
     }
     short, long = perform(name, RIVALS), perform(name, RIVALS, report=True)

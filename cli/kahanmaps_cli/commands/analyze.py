@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.report import Statement
 
 INTERRUPTED = 130
-_WORDS = (
-    "proved: an identity of rational functions, or a theorem; supported: true at random points; explained: follows "
-    "from singularities that were measured; measured: modulo primes or along orbits, which is evidence"
-)
 
 
 @click.command("analyze")
@@ -63,7 +59,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     proved, supported: formulas, as identities in x and eps. measured: modulo primes and along orbits, which is
     evidence. The number of integrals and the growth are separate findings.
 
-    Exit status: 0 there is a verdict, 2 wrong use, 3 undecided.
+    Exit status: 0 there is a verdict, 2 usage error, 3 undecided.
     """
     from kahanmaps.laboratory.analysis import analyze
 
@@ -104,15 +100,6 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     return 3 if found.conclusion.kind == "undecided" else 0
 
 
-def _title(found: Analysis) -> str:
-    from kahanmaps.checks.settings import eps_record, eps_words
-
-    step = eps_words(eps_record(found.eps, found.file.map))
-    values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
-    formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
-    return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"
-
-
 class _Report:
     """The report as text, each section as soon as it is final; `is_silent` keeps it back for another form."""
 
@@ -126,10 +113,9 @@ class _Report:
         if self._is_silent:
             return
         if begins:
-            tell(f"analyze: {_title(found)}")
-            for line in str(found.file.map).split("\n"):
-                tell(line)
-            tell(_WORDS)
+            from kahanmaps.display.laboratory_text import analysis_head
+
+            tell(analysis_head(found))
         self._tell(found.final_sections)
 
     def end(self) -> None:
@@ -152,9 +138,10 @@ class _Report:
 
 
 def _print_markdown(found: Analysis) -> None:
+    from kahanmaps.display.laboratory_text import analysis_title
     from kahanmaps.display.markup import code, markdown
 
-    lines = [f"# {markdown(_title(found))}", "", "```"]
+    lines = [f"# {markdown(analysis_title(found))}", "", "```"]
     lines += [*str(found.file.map).split("\n"), "```", "", f"**{markdown(found.conclusion.sentence)}**", ""]
     for name, told in found.sections:
         lines += [f"## {name}", ""]

@@ -102,7 +102,7 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
     Every result is in the database the moment it is there: whatever is killed, only tasks in flight are lost, and the
     same command continues. Ctrl-C lets the tasks in flight end, for ten seconds at most; a second one ends at once.
 
-    Exit status: 0 every task is done, whatever the verdicts, 2 wrong use, 3 some task failed or has no result, 130
+    Exit status: 0 every task is done, whatever the verdicts, 2 usage error, 3 some task failed or has no result, 130
     interrupted.
     """
     from kahanmaps_cli.batch_run import dry_run, run_batch
@@ -238,7 +238,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
       kahanmaps batch merge all.db part1.db part2.db
       kahanmaps batch merge A.db B.db
 
-    Exit status: 0 done, 2 wrong use, 3 some task has different results in two of them (those of TARGET are kept).
+    Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
     """
     from kahanmaps.errors import counted
     from kahanmaps.experiments.store import Store

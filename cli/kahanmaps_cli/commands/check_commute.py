@@ -37,7 +37,7 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p sets
     a parameter of both, or of the one that has it.
 
-    Exit status: 0 they commute (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
+    Exit status: 0 they commute (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
     from kahanmaps.checks.commute import check_commute
 

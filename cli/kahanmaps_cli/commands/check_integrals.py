@@ -36,7 +36,7 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
     members of the family the K~ of all rational associated systems. Claimed ones: the [integrals] of the file, and
     --integral.
 
-    Exit status: 0 conserved (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
+    Exit status: 0 conserved (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
     from kahanmaps.algebra.text import parse_rational_function
     from kahanmaps.checks.conserve import check_integrals

@@ -27,7 +27,7 @@ def command(system: str | None, density: str | None, **options: Any) -> int:
     Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)); otherwise the
     [density] of the file, or --density.
 
-    Exit status: 0 invariant (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
+    Exit status: 0 invariant (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
     from kahanmaps.algebra.text import parse_rational_function
     from kahanmaps.checks.preserve import check_measure

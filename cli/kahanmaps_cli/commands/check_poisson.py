@@ -32,7 +32,7 @@ def command(system: str | None, path: str | None, **options: Any) -> int:
     Both the transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are put to the test. Without --eps
     the question is asked for every eps. Without --tensor P is Pi, for Hamiltonian systems.
 
-    Exit status: 0 it is (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
+    Exit status: 0 it is (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
     from kahanmaps.checks.preserve import check_poisson
     from kahanmaps.invariants.poisson import GivenTensor

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.finite.cycle_laws import Comparison
     from kahanmaps.laboratory.finite.cycles import Census
 
-_LENGTHS_SHOWN = 12
 _STOPPED = "stopped by the clock: give more --seconds, fewer --samples or a smaller prime"
 
 
@@ -64,7 +63,7 @@ def command(system: str | None, **options: Any) -> int:
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line. Values without a map are named at the end.
 
-    Exit status: 0 done, 2 wrong use, 3 samples stopped by the clock.
+    Exit status: 0 done, 2 usage error, 3 samples stopped by the clock.
     """
     from kahanmaps.laboratory.finite.cycle_laws import compare
     from kahanmaps.laboratory.finite.cycles import cycle_census, default_eps
@@ -136,40 +135,10 @@ def _print(
     for census, found in runs:
         at = f", eps = {census.eps}" if file.map.has_eps else ""
         tell(f"\n# p = {census.prime}{at}")
-        for name, text in _lines(census):
-            tell(f"{name}\t{text}")
+        tell(str(census))
         for law, reason in found.reasons.items():
             tell(f"{law}\t{found.verdict(law)}: {reason}")
     tell(f"\n# compatible in all {len(runs)} runs with: {', '.join(common) or 'none of the laws'}")
-
-
-def _lines(census: Census) -> list[tuple[str, str]]:
-    lines = [("points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}")]
-    if census.is_undefined:
-        lines.append(("map", "singular everywhere modulo this prime"))
-    elif census.factor is None:
-        lines.append(("map", f"forms of degree {census.degree}; a common factor was not looked for"))
-    elif census.factor != "1":
-        lines.append(("map", f"forms of degree {census.degree}, a common factor divided out"))
-    lines += [("lost", str(census.lost)), ("falling", str(census.falling))]
-    lines.append(
-        ("transient", str(census.transient))
-        if census.complete
-        else ("open", f"{census.open} after {census.steps} steps")
-    )
-    lines.append(("periodic", str(census.periodic)))
-    if census.cycles:
-        lines.append(("cycles", f"{census.cycles}, longest {census.longest}, mean {census.mean:.2f}"))
-        if census.at_infinity:
-            lines.append(("at infinity", f"{sum(census.at_infinity.values())} of them"))
-        if census.symmetric is not None:
-            lines.append(("symmetric", f"{sum(census.symmetric.values())} of the others"))
-    shown = list(census.lengths.items())[-_LENGTHS_SHOWN:]
-    if shown:
-        what = "length x cycles" if census.complete else "length x points"
-        more = "... " if len(census.lengths) > len(shown) else ""
-        lines.append((what, more + " ".join(f"{length}x{n}" for length, n in shown)))
-    return lines
 
 
 def _record(

@@ -67,7 +67,7 @@ def command(system: str | None, **options: Any) -> int:
     combination of values; with --json a record a line. Values without a map are named at the end.
 
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
-    vary; 2 wrong use; 3 undecided, or stopped early.
+    vary; 2 usage error; 3 undecided, or stopped early.
     """
     eps = the_eps(options["eps"], options["time_step"], required=False)
 

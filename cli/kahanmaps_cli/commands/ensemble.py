@@ -76,7 +76,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     point. Starts in text are exact numbers, separated by commas or blanks; # starts a comment, and a first line may
     name the columns.
 
-    Exit status: 0 all orbits completed, 2 wrong use, 3 some ended early, 130 interrupted.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
     from flint import fmpq
 

@@ -46,7 +46,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     says otherwise. Over a number field it is the same for the system over Q that f is; "g = B f" is then the default in
     every dimension. 0, f and -f always commute and are left out; --json has them, with a word in "trivial".
 
-    Exit status: 0 the list is complete, 2 wrong use, 3 something remained open.
+    Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
     """
     from kahanmaps.checks.settings import Settings
     from kahanmaps.laboratory.symmetry.commuting_over import find_commuting

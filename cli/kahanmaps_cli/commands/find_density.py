@@ -30,7 +30,7 @@ def command(system: str | None, **options: Any) -> int:
     Products of powers of known polynomials are of any degree, exponents of either sign. What is found is verified as
     an identity.
 
-    Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
+    Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
     from kahanmaps.laboratory.preserve.densities import find_densities
 

@@ -66,7 +66,7 @@ def command(system: str | None, **options: Any) -> int:
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line. Values without a map are named at the end.
 
-    Exit status: 0 every integral that theorems give or orbits show has a formula, 2 wrong use, 3 some have none,
+    Exit status: 0 every integral that theorems give or orbits show has a formula, 2 usage error, 3 some have none,
     orbits were not measured, or the time was too short.
     """
     from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -138,7 +138,6 @@ def _count(found: Any) -> str:
 
 
 def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:
-    from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
 
     found = darboux_polynomials(
@@ -155,18 +154,7 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
         print_json({**heading("darboux-polynomials", found), **found.to_json(), "document": dict(file.document)})
     else:
         tell(f"Darboux polynomials: {file.name}{scope(found)}")
-        meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(found.cofactors) else ""
-        law = f"P(x~) = C P(x){meaning}; spaces spanned by products left out"
-        tell("P' = K P, irreducible; integrals left out" if found.flow else law)
-        for space in found.spaces:
-            tell(f"{'K' if found.flow else 'C'} = {space.cofactor}")
-            for P in space.polynomials:
-                text = format_polynomial(P)
-                tell(f"\t{space.verdict}\t{formula(text)}")
-        if found.reason:
-            tell(f"note\t{found.reason}")
-        elif not found.spaces:
-            tell(f"none of degree up to {found.degree}")
+        tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
     return 3 if found.reason else 0
 
 

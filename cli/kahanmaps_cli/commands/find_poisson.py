@@ -31,7 +31,7 @@ def command(system: str | None, **options: Any) -> int:
     integrals that are found; products of polynomial integrals and others are left out. Without --eps the formulas
     contain eps (the time step is 2 eps).
 
-    Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
+    Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
     from kahanmaps.algebra.text import parse_rational_function
     from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson

@@ -32,7 +32,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     dimension at most 3 all rational matrices, unless there are one-parameter groups of them. -I reverses every
     homogeneous quadratic system: this is told as obvious. A finite group is shown by generators, --json lists it.
 
-    Exit status: 0 searched as said, 2 wrong use, 3 a search was too large or the time over.
+    Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the time over.
     """
     from kahanmaps.checks.settings import Settings
     from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries

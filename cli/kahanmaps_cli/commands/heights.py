@@ -70,8 +70,8 @@ def command(system: str | None, **options: Any) -> int:
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line. Values without a map are named at the end.
 
-    Exit status: 0 all orbits that were decided agree, 2 wrong use, 3 undecided, or the orbits disagree, or the time was
-    over.
+    Exit status: 0 all orbits that were decided agree, 2 usage error, 3 undecided, or the orbits disagree, or the time
+    was over.
     """
     eps = the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
@@ -112,8 +112,6 @@ def surveyed(file: SystemFile, eps: Any, options: dict[str, Any], progress: Prog
 
 
 def _print(file: SystemFile, found: HeightSurvey) -> None:
-    from kahanmaps.algebra.text import format_number
-
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     if file.map.has_time_step:
         each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
@@ -121,11 +119,7 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
         each = ", ".join(map(str, values))
     eps = f", eps = {each}" if file.map.has_eps else ""
     tell(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
-    for orbit in found.orbits:
-        point = ",".join(format_number(entry) for entry in orbit.start)
-        eps_column = [f"eps {orbit.eps}"] if file.map.has_eps else []
-        tell("\t".join(["orbit", *eps_column, f"start {point}", orbit.growth.text]))
-    tell(f"heights\t{found.text}")
+    tell(str(found))
 
 
 def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:

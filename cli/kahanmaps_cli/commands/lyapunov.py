@@ -51,7 +51,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is checked against log |det dPhi|.
 
-    Exit status: 0 all orbits went through, 2 wrong use, 3 some ended early or the clock stopped all.
+    Exit status: 0 all orbits went through, 2 usage error, 3 some ended early or the clock stopped all.
     """
     from flint import fmpq
 

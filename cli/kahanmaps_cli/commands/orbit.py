@@ -106,7 +106,7 @@ def command(
     --integral adds a column: an expression, the name of an integral of the file, or the word known for all that
     theorems give (not in floats).
 
-    Exit status: 0 done, 2 wrong use, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
+    Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
     steps, at, every = options["steps"], options["at"], options["every"]
     if (steps is None) == (at is None):

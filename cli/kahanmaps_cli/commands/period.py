@@ -54,7 +54,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     divisor, and the rational gamma with period N; with SYSTEM and eps also these levels in each plane at a rational
     root of chi, as values of the integral h/(1 + eps^2 D).
 
-    Exit status: 0 found (or proved that there is none), 2 wrong use, also where there is no normal form, 3 undecided,
+    Exit status: 0 found (or proved that there is none), 2 usage error, also where there is no normal form, 3 undecided,
     or the orbit comes to a point where it cannot be continued.
     """
     from kahanmaps.errors import InputError
@@ -164,16 +164,7 @@ def _message(found: OrbitPeriod) -> str:
 
 def _print(file: SystemFile, eps: Any, arithmetic: str, found: OrbitPeriod) -> None:
     tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
-    tell(f"period\t{_word(found)}")
-    for plane in found.planes:
-        tell("\t".join(["plane", plane.name, f"period {_word(plane)}", str(plane.kind), plane.reason]).rstrip())
-    poles = {True: "the orbit meets one", False: "the orbit meets none", None: "not known whether the orbit meets one"}
-    tell(f"poles\t{poles[found.meets_pole]}")
-    tell(f"# {found.status}: {_message(found)}")
-
-
-def _word(found: Any) -> str:
-    return "none" if found.status == "aperiodic" else found.status if found.period is None else str(found.period)
+    tell(str(found))
 
 
 def _text(number: int | None) -> str | None:

@@ -68,7 +68,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     on from there, when the same command is given again. Parts (--shard) that several machines have kept are put
     together by `cat part1 part2 > all`; the scan with `--keep all` does the rest.
 
-    Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over: what was left out is told; 130
+    Exit status: 0 done, whatever was found; 2 usage error; 3 the time was over: what was left out is told; 130
     interrupted, with what was found up to then.
     """
     if options["shard"] is not None and options["keep"] is None:

@@ -62,7 +62,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their outcome,
     known by random points.
 
-    Exit status: 0 done, 2 wrong use, 3 undecided (stopped by the clock, or two points or two eps that differ).
+    Exit status: 0 done, 2 usage error, 3 undecided (stopped by the clock, or two points or two eps that differ).
     """
     from kahanmaps.laboratory.singular.outcomes import UNDECIDED
     from kahanmaps.laboratory.singular.singularities import default_eps, singularities, symbolic_denominator
@@ -101,14 +101,6 @@ def _why(runs: list[SingularityRun], agree: bool) -> str:
     return next(h.note for run in runs for h in run.hypersurfaces if h.note)
 
 
-def _told(found: Hypersurface) -> str:
-    if found.status == "confined":
-        return f"contracted by step {found.contracted_at}, confined after {found.confined_at} steps"
-    if found.status == "not confined":
-        return f"contracted by step {found.contracted_at}, not confined within {found.followed} steps"
-    return found.status + (f": {found.note}" if found.note else "")
-
-
 def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str) -> None:
     name = file.map.denominator_name
     tell(f"# {file.name}, dimension {file.map.dim}" + (", eps is half the time step" if file.map.has_time_step else ""))
@@ -117,19 +109,8 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
         tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
     for run in runs:
         at = f"eps = {run.eps}: " if file.map.has_eps else ""
-        tell(f"\n# {at}map of degree {run.map_degree}, {run.text}")
-        if run.word is not None:
-            tell(f"# {run.word.text}")
-        tell(f"{name}\t{formula(run.denominator, 200)}")
-        for found in run.hypersurfaces:
-            kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
-            kind += " in all" if found.polynomial == "?" else ""
-            kind += "" if found.stage is None else f", of map {found.stage + 1}"
-            tell(f"{formula(found.polynomial, 200)}\t{kind}\t{_told(found)}")
-            if found.steps:
-                ranks = " ".join(str(step.rank) for step in found.steps)
-                poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
-                tell(f"  ranks {ranks}\tpoles {poles}")
+        text = str(run).replace("# ", f"\n# {at}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
+        tell("\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n")))
     tell(f"\n# {verdict}")
 
 

@@ -70,7 +70,7 @@ def command(system: str | None, **options: Any) -> int:
     the error. Misprints stand in the table in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
     are supported only.
 
-    Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 wrong use, 3 one is undecided.
+    Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
     Misprints are expected to be refuted and do not count.
     """
     from kahanmaps.checks.settings import Settings

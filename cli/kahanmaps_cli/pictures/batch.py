@@ -48,7 +48,7 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
     median; whiskers hold nine tenths, dots are the least and the largest. Names
     are those of 'kahanmaps batch summary'. A batch that is running may be drawn.
 
-    Exit status: 0 done, 2 wrong use, or there is no task to draw.
+    Exit status: 0 done, 2 usage error, or there is no task to draw.
     """
     from kahanmaps.experiments.store import Store
 

@@ -48,7 +48,7 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
     Blue arrows are steps of f from points that g has reached, red ones steps of g from points that f has reached. All
     points are exact: "closes exactly" means that they are equal; a gap is the largest distance in all coordinates.
 
-    Exit status: 0 done, 2 wrong use, 3 some points are missing (a map has no value there, or numbers are too long).
+    Exit status: 0 done, 2 usage error, 3 some points are missing (a map has no value there, or numbers are too long).
     """
     require_output(options)
     from flint import fmpq

@@ -54,7 +54,7 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
     the recurrence they satisfy. Dots join degrees for which none was checked:
     what the legend says of their growth is then estimated.
 
-    Exit status: 0 done, 2 wrong use, 3 some system was stopped before a
+    Exit status: 0 done, 2 usage error, 3 some system was stopped before a
     recurrence was found (the picture is written).
     """
     from kahanmaps.plots.growth import draw_degrees

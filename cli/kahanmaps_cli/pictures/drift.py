@@ -55,7 +55,7 @@ def command(system: str | None, **options: Any) -> int:
     step is looked at, the largest error in each of 200 bins is drawn, and an
     error of exactly 0 lies in the grey band.
 
-    Exit status: 0 done, 2 wrong use, 3 some orbit ended early (the picture is
+    Exit status: 0 done, 2 usage error, 3 some orbit ended early (the picture is
     written).
     """
     from kahanmaps.plots.draw_drift import draw_drift

@@ -47,7 +47,7 @@ def command(system: str | None, **options: Any) -> int:
     colour is an eps, a curve an orbit, a line the growth that was fitted.
     Records hold heights at the steps 0, 1, 2, 4, 8, ... only.
 
-    Exit status: 0 done, 2 wrong use, 3 some orbit met a singular point, or the
+    Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
     time was over before all orbits were finished (the picture is written).
     """
     from kahanmaps.plots.growth import draw_heights

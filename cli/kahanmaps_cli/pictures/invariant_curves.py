@@ -52,7 +52,7 @@ def command(**options: Any) -> int:
     A pair of complex roots has one complex plane: dots without a curve, u and v in panels of their own. The system may
     be a member that does not say so. Where chi has a repeated root there are no planes.
 
-    Exit status: 0 done, 2 wrong use or no normal form, 3 an orbit met a pole (the picture shows what came before).
+    Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met a pole (the picture shows what came before).
     """
     require_output(options)
     from kahanmaps.algebra.text import format_point

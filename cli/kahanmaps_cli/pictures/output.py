@@ -72,7 +72,7 @@ picture_options: Callable[[F], F] = stack(
     click.option("--font-size", type=float, metavar="PT", help="Size of the letters in points (default 9)."),
     click.option("--dpi", type=int, metavar="N", help="Dots per inch of PNG and of clouds of points (default 300)."),
     click.option("--title", help="A title above the picture (default: none)."),
-    click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error."),
+    click.option("-q", "--quiet", is_flag=True, help="No progress or messages on standard error."),
 )
 
 

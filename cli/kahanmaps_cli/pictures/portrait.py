@@ -100,7 +100,7 @@ def command(system: str | None, **options: Any) -> int:
 
     Ctrl-C draws what has been computed so far.
 
-    Exit status: 0 done, 2 wrong use, 3 some orbits ended early, 130 interrupted.
+    Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
     require_output(options)
     style_from(options)

@@ -31,7 +31,7 @@ def command(system: str | None, **options: Any) -> int:
     as far as there is room. With --modulo P
     the plane over GF(P): all slow members that were seen.
 
-    Exit status: 0 done, 2 wrong use, 3 the time was over, 130 interrupted
+    Exit status: 0 done, 2 usage error, 3 the time was over, 130 interrupted
     (the picture is written if something was found).
     """
     from flint import fmpz

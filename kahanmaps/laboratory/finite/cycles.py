@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.symmetry.reversors import require_reversor
 from kahanmaps.maps.implicit import BirationalMap
@@ -30,7 +30,7 @@ DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3",
 
 
 @dataclass(frozen=True)
-class Census(Displayed):
+class Census(Printed):
     """What becomes of the points of P^n over GF(p) under the Kahan map at one eps (half the time step); exact counts.
 
     `lengths` is the number of cycles by length if the graph is `complete`, else the number of sampled points whose
@@ -80,6 +80,10 @@ class Census(Displayed):
     def mean(self) -> float | None:
         """The mean length of the cycles, None without cycles and for samples."""
         return self.periodic / self.cycles if self.cycles else None
+
+    def rows(self) -> list[dict[str, int]]:
+        """A row for each length: the number of cycles, or of sampled points; for pandas.DataFrame and the like."""
+        return [{"length": length, "count": count} for length, count in self.lengths.items()]
 
 
 def cycle_census(

@@ -19,7 +19,8 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.displayed import Displayed
+from kahanmaps.algebra.text import format_point
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
@@ -60,7 +61,7 @@ class SurveyedOrbit:
 
 
 @dataclass(frozen=True)
-class HeightSurvey(Displayed):
+class HeightSurvey(Printed):
     """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it.
 
     For a map that has no eps that of the orbits means nothing. `heights.height` says what heights over a field are.
@@ -100,6 +101,13 @@ class HeightSurvey(Displayed):
         at = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
         of = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
         return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}"
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each orbit, for `pandas.DataFrame(found.rows())` and the like."""
+        return [
+            {"eps": str(one.eps), "start": format_point(one.start), "growth": str(one.growth.kind)}
+            for one in self.orbits
+        ]
 
     @property
     def _eps_differ(self) -> bool:

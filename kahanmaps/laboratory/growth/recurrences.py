@@ -188,6 +188,9 @@ class Recurrence:
         shown = [("t", self.preperiod)] * bool(self.preperiod) + shown
         return " ".join(text + (f"^{k}" if k > 1 else "") for text, k in shown) or "1"
 
+    def __str__(self) -> str:
+        return self.text
+
     @property
     def text(self) -> str:
         """The recurrence as an equation, with what speaks for it."""

@@ -20,7 +20,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.displayed import Displayed, latex
+from kahanmaps.displayed import Printed, latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
@@ -60,7 +60,7 @@ class DarbouxPolynomials:
 
 
 @dataclass
-class DarbouxSearch(Displayed):
+class DarbouxSearch(Printed):
     """What `darboux_polynomials` found: spaces by the weight of their cofactor; `reason` if the search ended early."""
 
     file: SystemFile

@@ -22,7 +22,7 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.preserve.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -33,7 +33,7 @@ _GRID = 2000  # points at which a Pfaffian is shown to vanish identically
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantStructures(Displayed):
+class ConstantStructures(Printed):
     """What `constant_structures` found; every form, function and matrix is exact.
 
     forms: a basis of the skew K for which K f is a gradient (invertible or not), of coprime integers.

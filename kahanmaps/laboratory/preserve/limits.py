@@ -106,6 +106,9 @@ class FlowAndMap:
         profile = self.map_search.profile
         return max(0, len(self.others) - self.without_limit) if profile.nullities and profile.agree else 0
 
+    def __str__(self) -> str:
+        return "\n".join("\t".join(line) for line in self.lines())
+
     def lines(self, *, others: bool = True) -> list[tuple[str, str]]:
         """What is known, each sentence with how it is known; without the formulas of the others, if need be."""
         found = [("proved", one.text) for one in self.limits]

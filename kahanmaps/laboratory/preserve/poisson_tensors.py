@@ -29,7 +29,7 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
-from kahanmaps.displayed import Displayed, latex
+from kahanmaps.displayed import Printed, latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.invariants.poisson import GivenTensor
@@ -137,7 +137,7 @@ class FoundTensor:
 
 
 @dataclass(frozen=True)
-class PoissonSearch(Displayed):
+class PoissonSearch(Printed):
     """What `find_poisson` found: tensors up to `degree`, and why the search ended where it found none.
 
     They span all of these, together with products of polynomial integrals and tensors of lower degrees.
@@ -165,6 +165,10 @@ class PoissonSearch(Displayed):
         if self.pencil.holds:
             return f"they are compatible: every combination of them is a Poisson tensor ({self.pencil})"
         return "not every combination of them is a Poisson tensor"
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each tensor, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"name": one.name, "brackets": one.text, "verdict": str(one.verdict)} for one in self.tensors]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -13,7 +13,7 @@ from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import InputError, counted
@@ -104,7 +104,7 @@ def _listed(texts: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Scan(Displayed):
+class Scan(Printed):
     """What a scan found: components, the ones with the slowest growth first.
 
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
@@ -129,6 +129,11 @@ class Scan(Displayed):
     omitted: tuple[str, ...] = ()
     by: str = "degrees"
     is_part: bool = False
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each component, for `pandas.DataFrame(found.rows())` and the like."""
+        pairs = [(one, degrees) for degrees, some in self.classes for one in some]
+        return [{"where": one.text, "degrees": ", ".join(map(str, degrees))} for one, degrees in pairs]
 
     @property
     def height(self) -> int:

@@ -25,7 +25,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
@@ -81,7 +81,7 @@ class TooLong(InputError):
 
 
 @dataclass(frozen=True)
-class SingularityRun(Displayed):
+class SingularityRun(Printed):
     """The singularities of a Kahan map at one exact eps, half the time step.
 
     `denominator` is det(I - eps f'(x)) as text, "?" for a composition of which it is too large; `critical_degree` the

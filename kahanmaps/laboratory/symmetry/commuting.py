@@ -136,6 +136,10 @@ class CommutingSystems(Printed):
         found = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
         return combined([*found, *([] if self.complete else [Verdict.UNDECIDED])])
 
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each g other than 0, f and -f, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"g": ", ".join(g.rhs), "verdict": str(g.finding.verdict)} for g in self.nontrivial]
+
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""
         return {

@@ -144,6 +144,10 @@ class Symmetries(Printed):
         """All finite ones that take the map to its inverse."""
         return [t for t in (*self.signed, *self.others) if t.reversing]
 
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each finite symmetry that is known, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"kind": t.kind, "action": t.text} for t in (*self.symmetries, *self.reversing)]
+
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""
         signed = self.group_of == SIGNED

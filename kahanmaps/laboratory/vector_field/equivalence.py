@@ -84,10 +84,11 @@ def equivalent_system(
     >>> print(equivalent_system(System("x' = 3*y*z; y' = x*z; z' = -x*y")))
     equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z
     """
-    f, deadline = file.system, time.monotonic() + seconds
+    f = file.system
     if f.degree < 2 or f.dim > MAX_DIMENSION or f.digits > LONG_COEFFICIENTS or _is_of_the_catalogue(file):
         return None
     tried = list(_tried(f, fixed_points(f, seconds) if fixed is None else fixed))
+    deadline = time.monotonic() + seconds
     for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # all that is quick comes first
         for g, frame, order in tried:
             if time.monotonic() > deadline:
@@ -131,10 +132,8 @@ def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
 def _is_of_the_catalogue(file: SystemFile) -> bool:
     if file.name not in names():
         return False
-    known = load(file.name)
-    return known.parameters.keys() == file.parameters.keys() and (
-        load(file.name, file.parameters).system.rhs == file.system.rhs
-    )
+    values = file.parameters if load(file.name).parameters.keys() == file.parameters.keys() else {}
+    return bool(load(file.name, values).system.rhs == file.system.rhs)
 
 
 def _tried(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]:

@@ -50,6 +50,13 @@ class Lyapunov:
     log_volume: FloatArray
     stopped: bool
 
+    def __str__(self) -> str:
+        lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]
+        lines.append("# exponent\tper unit of time\tper step\tspread\tchange from half")
+        table = zip(self.mean, self.mean * self.unit, self.spread, self.change, strict=True)
+        lines += ["\t".join([str(k), *(f"{number:.6g}" for number in row)]) for k, row in enumerate(table, 1)]
+        return "\n".join(lines)
+
     @property
     def per_step(self) -> FloatArray:
         """The exponents for each step instead of a unit of time: 2 eps times as large."""

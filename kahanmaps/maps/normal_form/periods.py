@@ -31,7 +31,7 @@ from flint import (
 )
 
 from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
@@ -80,7 +80,7 @@ class PlanePeriod:
 
 
 @dataclass(frozen=True)
-class OrbitPeriod(Displayed):
+class OrbitPeriod(Printed):
     """The period of an orbit, continued through poles: the least common multiple over the planes.
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (a plane starts where the map has no value and cannot be
