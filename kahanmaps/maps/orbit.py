@@ -235,7 +235,8 @@ class Walk:
         return np.array(rows, dtype=dtype or np.float64)
 
     def __iter__(self) -> Iterator[OrbitPoint]:
-        return iter(self.__dict__.get("points") or self._walked())
+        # `list` asks for the length between here and the first point
+        yield from self.points if "points" in self.__dict__ else self._walked()
 
     def _walked(self) -> Iterator[OrbitPoint]:
         if self.arithmetic.kind != "float":

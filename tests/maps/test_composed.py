@@ -153,7 +153,7 @@ def test_degrees_of_a_power_are_every_other_degree_of_the_map():
 @every_word
 def test_lyapunov_exponents_are_those_of_the_formula(name):
     starts = np.array([[1.1, 0.9], [0.7, 1.2]])
-    found, expected = (lyapunov_exponents(map_, "1/50", starts, 50).exponents for map_ in (WORDS[name], out(name)))
+    found, expected = (lyapunov_exponents(map_, starts, "1/50", 50).exponents for map_ in (WORDS[name], out(name)))
     assert np.allclose(found, expected, rtol=1e-6, atol=1e-9)  # of 50 steps with products of some digits' loss
 
 
