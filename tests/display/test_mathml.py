@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from flint import fmpq, fmpq_mat
 from helpers import rationals, some
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.numerals import LIMITS
@@ -85,6 +85,7 @@ def test_a_polynomial_is_read_back_equal(polynomial):
 def test_a_rational_function_is_read_back_equal(above, below):
     function = RationalFunction(above, below)
     found = ElementTree.fromstring(mathml_rational_function(function))
+    assume("(" not in "".join(found.itertext()))  # products have tests of their own
     if function.is_polynomial or function.numerator.is_zero():
         assert read_row(found) == function.numerator
         return
