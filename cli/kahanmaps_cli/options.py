@@ -12,6 +12,7 @@ import click
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
 from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
+from kahanmaps_cli.progress import say
 
 if TYPE_CHECKING:
     from kahanmaps.algebra.polynomials import RationalFunction
@@ -239,6 +240,9 @@ def load_pair(
     if len(named) == 1:  # the first one is inline, and may have every parameter
         of_first = options["parameters"]
     of_second = [pair for pair in options["parameters"] if pair[0] in named[0]]
+    both = [name for name, _ in of_second if (name, given[name]) in of_first]
+    if both and not options.get("quiet"):
+        say(f"-p {', '.join(both)}: set in both systems")
     return load_system(reference, {**options, "parameters": of_first}), load_system(other, {"parameters": of_second})
 
 

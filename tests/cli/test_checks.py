@@ -133,6 +133,8 @@ def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanm
     same = kahanmaps("check-commute euler_top euler_top -p a1=3 --json").json
     assert same["verdict"] == "proved"
     assert same["document"]["parameters"]["a1"] == same["other_document"]["parameters"]["a1"] == "3"
+    assert kahanmaps("check-commute euler_top euler_top -p a1=3").err.startswith("-p a1: set in both systems")
+    assert "both" not in kahanmaps("check-commute euler_top euler_top -p a1=3 -q").err
     assert kahanmaps("check-commute weierstrass lotka_volterra -p b=7").status == 1
     assert kahanmaps("check-commute lotka_volterra weierstrass -p b=7").status == 1
     assert "unknown parameter 'q'" in kahanmaps("check-commute lotka_volterra weierstrass -p q=7").err
