@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import pytest
 
 import kahanmaps as km
+from kahanmaps.displayed import Printed
 
 
 def test_print_shows_what_the_command_prints(kahanmaps):
@@ -41,7 +44,19 @@ def test_print_shows_the_part_of_one_value_of_what_is_printed_for_several(kahanm
     assert str(period).split("\t")[1].split("\n")[0] in out
 
 
+def test_every_result_that_is_printed_has_rows():
+    import_module("kahanmaps.display.laboratory")
+    import_module("kahanmaps.display.maps")
+    kinds = Printed.__subclasses__()
+    assert len(kinds) >= 14
+    assert [kind.__name__ for kind in kinds if not hasattr(kind, "rows")] == []
+
+
 def test_rows_are_tables():
+    darboux, run = km.darboux_polynomials("lotka_volterra", 1), km.singularities("weierstrass", "1/3")
+    assert darboux.rows()[0] == {"cofactor": "C[x]", "polynomial": "x", "verdict": "proved"}
+    assert (run.rows()[0]["polynomial"], run.rows()[0]["confined_at"]) == ("4*x - 3", 4)
+    assert km.constant_structures("weierstrass").rows()[0]["function"] == "2*x^3 - y^2/2 - 2*x"
     assert km.heights("weierstrass", "1/10").rows()[0] == {"eps": "1/10", "start": "29/16,19/7", "growth": "quadratic"}
     assert km.cycles("weierstrass", "1/7", 101).rows()[0] == {"length": 3, "count": 1}
     assert km.find_symmetry("lorenz").rows()[1] == {"kind": "symmetry", "action": "(x, y, z) -> (-x, -y, z)"}

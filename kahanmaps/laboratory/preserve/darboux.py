@@ -74,6 +74,14 @@ class DarbouxSearch(Printed):
     reason: str = ""
     flow: bool = False  # whether they are those of the differential equation
 
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each polynomial, for `pandas.DataFrame(found.rows())` and the like."""
+        pairs = [(space, P) for space in self.spaces for P in space.polynomials]
+        return [
+            {"cofactor": one.cofactor, "polynomial": format_polynomial(P), "verdict": str(one.verdict)}
+            for one, P in pairs
+        ]
+
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         known = attributes(self, "degree", "cofactors", "spaces", "reason", "primes")

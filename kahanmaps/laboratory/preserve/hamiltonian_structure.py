@@ -20,8 +20,10 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
+from kahanmaps.algebra.plain import plain
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.preserve.affine_functions import QuotientForms, affine_integrals, quotient_by
@@ -49,6 +51,11 @@ class ConstantStructures(Printed):
     casimirs: tuple[fmpq_mpoly, ...]
     reason: str
     proved: bool
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each form K, with the function that the flow conserves."""
+        pairs = zip(self.forms, self.functions, strict=True)
+        return [{"K": str(plain(K)), "function": format_polynomial(H)} for K, H in pairs]
 
 
 def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantStructures:

@@ -101,6 +101,11 @@ class SingularityRun(Printed):
     is_dominant: bool
     word: Word | None = None
 
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each hypersurface, for `pandas.DataFrame(run.rows())` and the like."""
+        names = ("polynomial", "degree", "status", "contracted_at", "confined_at")
+        return [attributes(one, *names) for one in self.hypersurfaces]
+
     @property
     def verdict(self) -> str:
         """What all hypersurfaces together say.

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.plain import attributes
@@ -182,12 +182,7 @@ def _fitting(wanted: Sequence[Monomials], given: Sequence[Monomials]) -> Iterato
 
 
 def _matched(
-    f: QuadraticSystem,
-    g: _Known,
-    frame: fmpq_mat,
-    order: Sequence[int] | None,
-    is_scaled: bool,
-    deadline: float,
+    f: QuadraticSystem, g: _Known, frame: fmpq_mat, order: Sequence[int] | None, is_scaled: bool, deadline: float
 ) -> Equivalence | None:
     """Solve g(P x + q) = c P f(x) for P = c T F with T a permutation, with a number each if `is_scaled`, or any matrix.
 
@@ -198,34 +193,15 @@ def _matched(
     # In the order in which they are set to their defaults where there is a choice.
     scales = [f"t{i}{j}" for i, j in entries]
     unknowns = ring(["c", *(f"q{i}" for i in range(n)), *scales, *(f"a{k}" for k in g.defaults)])
-    gens = unknowns.gens()
-    defaults = [fmpq(1), *[fmpq(0)] * n]
-    defaults += [*(fmpq(int(order is not None or i == j)) for i, j in entries), *g.defaults.values()]
-    joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])
-    x, c, q = joint.gens()[:n], joint.gens()[n], joint.gens()[n + 1 : 2 * n + 1]
-    zero, T = joint.constant(0), [[joint.constant(0)] * n for _ in range(n)]
-    for (i, j), t in zip(entries, joint.gens()[2 * n + 1 :], strict=False):
-        T[i][j] = t
-    P0 = [[sum((T[i][k] * frame[k, j] for k in range(n)), zero) for j in range(n)] for i in range(n)]
-    images = [sum((P0[i][j] * c * x[j] for j in range(n)), q[i]) for i in range(n)]
-    at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
-    sides = [sum((P0[i][j] * at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
-    parameters = joint.gens()[2 * n + 1 + len(entries) :]
-    parts = [p.compose(*images, *parameters, ctx=joint) - r for p, r in zip(g.system.rhs, sides, strict=True)]
-    # The divergences go along: this follows, and is of lower degree.
-    parts.append(g.system.divergence.compose(*images, *parameters, ctx=joint) - f.divergence.compose(*x, ctx=joint) * c)
-    highest: list[fmpq_mpoly] = []
-    lower: list[fmpq_mpoly] = []
-    for k, part in enumerate(parts):
-        for size, coefficient in _coefficients(part, n, unknowns):
-            # c^size divides it
-            (highest if size == (2 if k < n else 1) else lower).append(coefficient / gens[0] ** size)
+    defaults = [fmpq(1), *[fmpq(0)] * n, *(fmpq(int(order is not None or i == j)) for i, j in entries)]
+    defaults += g.defaults.values()
+    highest, lower = _equations(f, g, frame, entries, unknowns)
     # No change of scale and no translation is tried first: then parameters are unknowns of linear equations as a rule.
-    simple = [t - value for t, value in zip(gens, defaults, strict=True)]
+    simple = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     shift, scale = simple[: n + 1], simple[n + 1 :][: len(entries)]
     always = shift if f.is_homogeneous and g.is_homogeneous else []
     for start in (always,) if is_scaled else ([*shift, *scale], [*always, *scale]):
-        solved = solve_system([*highest, *start], gens, deadline)
+        solved = solve_system([*highest, *start], unknowns.gens(), deadline)
         for component in (*solved.components, *solved.unsolved):
             equations = [p.compose(*component.values, ctx=unknowns) for p in lower]
             for point in _points([*equations, *component.equations], component.values, defaults, deadline):
@@ -235,7 +211,36 @@ def _matched(
     return None
 
 
-def _coefficients(p: fmpq_mpoly, count: int, unknowns: Any) -> list[tuple[int, fmpq_mpoly]]:
+def _equations(
+    f: QuadraticSystem, g: _Known, frame: fmpq_mat, entries: Sequence[tuple[int, int]], unknowns: fmpq_mpoly_ctx
+) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
+    """The coefficients of g(P x + q) - c P f(x), those of degree 2 in x apart, and those of the divergences with them.
+
+    That the divergences go along follows; these equations are of lower degree.
+    """
+    n = f.dim
+    joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])
+    x, c, q = joint.gens()[:n], joint.gens()[n], joint.gens()[n + 1 : 2 * n + 1]
+    zero, T = joint.constant(0), [[joint.constant(0)] * n for _ in range(n)]
+    for (i, j), t in zip(entries, joint.gens()[2 * n + 1 :], strict=False):
+        T[i][j] = t
+    P0 = [[sum((T[i][k] * frame[k, j] for k in range(n)), zero) for j in range(n)] for i in range(n)]
+    images = [sum((P0[i][j] * c * x[j] for j in range(n)), q[i]) for i in range(n)]
+    images += joint.gens()[2 * n + 1 + len(entries) :]  # the parameters
+    at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
+    sides = [sum((P0[i][j] * at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
+    parts = [p.compose(*images, ctx=joint) - side for p, side in zip(g.system.rhs, sides, strict=True)]
+    parts.append(g.system.divergence.compose(*images, ctx=joint) - f.divergence.compose(*x, ctx=joint) * c)
+    highest: list[fmpq_mpoly] = []
+    lower: list[fmpq_mpoly] = []
+    for k, part in enumerate(parts):
+        for size, coefficient in _coefficients(part, n, unknowns):
+            # c^size divides it
+            (highest if size == (2 if k < n else 1) else lower).append(coefficient / unknowns.gen(0) ** size)
+    return highest, lower
+
+
+def _coefficients(p: fmpq_mpoly, count: int, unknowns: fmpq_mpoly_ctx) -> list[tuple[int, fmpq_mpoly]]:
     """The degree in the first variables, and the coefficient in the others, of each monomial in the first ones."""
     found: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
     for monomial, value in p.terms():

@@ -93,6 +93,10 @@ class OrbitPeriod(Printed):
     meets_pole: bool | None
     planes: tuple[PlanePeriod, ...]
 
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each plane, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"plane": one.name, "status": one.status, "period": one.period} for one in self.planes]
+
     @property
     def text(self) -> str:
         """A sentence, and a line for each plane."""
