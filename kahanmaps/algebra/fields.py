@@ -109,6 +109,10 @@ class Field(ABC):
         """A random rational number, `height` bounding numerator and denominator; of residues any one."""
         return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
+    def value(self, polynomial: Any, point: Sequence[Any]) -> Any:
+        """The value of a polynomial at a point, where the field has a way of its own; None elsewhere."""
+        return None
+
     @abstractmethod
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
         """FLINT's matrix over this field from its entries, row by row."""

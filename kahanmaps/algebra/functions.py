@@ -1,9 +1,9 @@
 """The field of rational functions Q(x1, ..., xn): where an identity can be expanded, and so be proved.
 
 FLINT has no fraction field of polynomials. Elements here are quotients. By default they are never reduced by a gcd:
-sums look for a common denominator only where one divides the other, and equality is that of the cross products. That
-is right for expanding an identity of few terms once. A field that reduces cancels a gcd after every sum and product
-instead: dearer a step, but quotients of many factors stay small. Work is counted beforehand and bounded by a budget.
+sums and comparisons look for a common denominator only where one divides the other. That is right for expanding an
+identity of few terms once. A field that reduces cancels a gcd after every sum and product instead: dearer a step, but
+quotients of many factors stay small. Work is counted beforehand and bounded by a budget.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from flint.utils.flint_exceptions import DomainError
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix
+from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
+_BY_MINORS = 7  # rows: products with single entries, of which there are 2^n n/2, are cheaper than those of elimination
 
 
 class BudgetExceeded(KahanmapsError):
@@ -87,7 +89,7 @@ class FunctionField(Field):
         return bool(polynomial.is_zero() or (self.modulus is not None and (polynomial % self.modulus).is_zero()))
 
     def equal(self, left: Function, right: Function) -> bool:
-        return self.vanishes(self.times(left.above, right.below) - self.times(right.above, left.below))
+        return self.vanishes((left - right).above)
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
         """A product of polynomials, paid from the budget before it is computed. Raises BudgetExceeded."""
@@ -105,6 +107,50 @@ class FunctionField(Field):
             if not common.is_constant():
                 return Function(self, above / common, below / common)
         return Function(self, above, below)
+
+    def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function:
+        """The value of a polynomial over Q by Horner's rule, homogeneous in entries with a denominator in common."""
+        columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
+        used = [(point[k], powers) for k, powers in columns if any(powers)]
+        below: list[fmpq_mpoly] = []  # none of which divides another
+        for entry, _ in sorted(used, key=lambda one: -int(one[0].below.total_degree())):
+            if all(self.quotient(D, entry.below) is None for D in below) and not entry.below.is_constant():
+                below.append(entry.below)
+        missing = [[0] * len(polynomial) for _ in below]
+        rows = []
+        for entry, powers in used:
+            factor = entry.above / entry.below.leading_coefficient()
+            if not entry.below.is_constant():
+                quotients = ((k, self.quotient(D, entry.below)) for k, D in enumerate(below))
+                place, quotient = next((k, quotient) for k, quotient in quotients if quotient is not None)
+                factor = self.times(entry.above, quotient)
+                missing[place] = [a - e for a, e in zip(missing[place], powers, strict=True)]
+            rows.append((factor, powers))
+        tops = [-min(row) for row in missing]
+        rows += [(D, tuple(top + a for a in row)) for D, top, row in zip(below, tops, missing, strict=True)]
+        # The sum over powers of the longest factor is innermost, where the others of its products are short.
+        rows.sort(key=lambda row: len(row[0]))
+        terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
+        total = self._horner(terms, [factor for factor, _ in rows])
+        denominator = self._one
+        for D, top in zip(below, tops, strict=True):
+            for _ in range(top):
+                denominator = self.times(denominator, D)
+        return self.fraction(total, denominator)
+
+    def _horner(self, terms: dict[tuple[int, ...], fmpq], factors: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+        """The sum of coefficients times powers of the factors, by their exponents."""
+        if not factors:
+            return self.context.constant(sum(terms.values(), fmpq(0)))
+        by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
+        for (power, *others), coefficient in terms.items():
+            by_power.setdefault(power, {})[tuple(others)] = coefficient
+        total = self.context.constant(0)
+        for power in range(max(by_power, default=-1), -1, -1):
+            total = self.times(total, factors[0])
+            if power in by_power:
+                total += self._horner(by_power[power], factors[1:])
+        return total
 
     def quotient(self, large: fmpq_mpoly, small: fmpq_mpoly) -> fmpq_mpoly | None:
         """large / small where that is a polynomial, else None; paid for like a product."""
@@ -180,15 +226,15 @@ class FunctionMatrix(EntryMatrix):
         return total
 
     def det(self) -> Function:
-        """The determinant, by Bareiss' fraction-free elimination on rows cleared of denominators, block by block."""
+        """The determinant, of rows cleared of denominators, block by block."""
         total: Function = self.field.one
         for block in self._blocks():
             rows, cleared = self._part(block, block)._polynomial_rows()
-            total = total * Function(self.field, _bareiss(self.field, rows), cleared)
+            total = total * Function(self.field, _determinant(self.field, rows), cleared)
         return total
 
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
-        """The solution X of self X = right, by Cramer's rule, block by block. Raises ZeroDivisionError if singular."""
+        """The solution X of self X = right by minors, block by block. Raises ZeroDivisionError if singular."""
         columns = range(right._columns)
         solution: dict[int, list[Function]] = {}
         for block in self._blocks():
@@ -202,15 +248,13 @@ class FunctionMatrix(EntryMatrix):
         n, columns = self._rows, right._columns
         wide = [entry for mine, its in zip(self.tolist(), right.tolist(), strict=True) for entry in (*mine, *its)]
         rows, _ = FunctionMatrix(self.field, n, n + columns, wide)._polynomial_rows()
-        below = _bareiss(self.field, [row[:n] for row in rows])
-        if self.field.vanishes(below):
-            raise ZeroDivisionError("singular matrix in solve()")
-        solution = []
-        for k in range(n):
-            for j in range(n, n + columns):
-                replaced = [[*row[:k], row[j], *row[k + 1 : n]] for row in rows]
-                solution.append(Function(self.field, _bareiss(self.field, replaced), below))
-        return FunctionMatrix(self.field, n, columns, solution)
+        solution: list[list[Function]] = []
+        for j in range(n, n + columns):
+            *above, below = _minors(self.field, [[*row[:n], row[j]] for row in rows])
+            if self.field.vanishes(below):
+                raise ZeroDivisionError("singular matrix in solve()")
+            solution.append([Function(self.field, -entry, below) for entry in above])
+        return FunctionMatrix(self.field, n, columns, [entry for row in zip(*solution, strict=True) for entry in row])
 
     def _part(self, rows: Sequence[int], columns: Sequence[int]) -> FunctionMatrix:
         return FunctionMatrix(self.field, len(rows), len(columns), [self[i, j] for i in rows for j in columns])
@@ -253,8 +297,25 @@ class FunctionMatrix(EntryMatrix):
         return rows, product
 
 
-def _bareiss(field: FunctionField, matrix: list[list[fmpq_mpoly]]) -> fmpq_mpoly:
+def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
+    """The signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th is without column k."""
+    if len(rows) > _BY_MINORS:
+        columns = range(len(rows) + 1)
+        return [_bareiss(field, [[*row[:k], *row[k + 1 :]] for row in rows]) * (-1) ** k for k in columns]
+    entries = [[None if entry.is_zero() else entry for entry in row] for row in rows]
+    return [field.context.constant(0) if minor is None else minor for minor in kernel_minors(entries, field.times)]
+
+
+def _determinant(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> fmpq_mpoly:
     """The determinant of a square matrix of polynomials."""
+    if len(rows) > _BY_MINORS:
+        return _bareiss(field, rows)
+    minor = _minors(field, [[*row, field.context.constant(0)] for row in rows])[-1]
+    return -minor if len(rows) % 2 else minor
+
+
+def _bareiss(field: FunctionField, matrix: list[list[fmpq_mpoly]]) -> fmpq_mpoly:
+    """The determinant of a square matrix of polynomials by fraction-free elimination."""
     rows = [list(row) for row in matrix]
     n = len(rows)
     previous = field.context.constant(1)

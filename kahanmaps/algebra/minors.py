@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 Product = Callable[[Any, Any], Any]
@@ -24,28 +25,38 @@ def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) 
     """
     width = len(rows) + 1
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
-    for k, row in enumerate(rows[1:], start=2):
+    for row, layer in zip(rows[1:], _layers(width), strict=True):
         larger: dict[int, Any] = {}
-        for mask in range(1 << width):
-            if mask.bit_count() != k:
-                continue
+        for mask, products in layer:
             total: Any = None
-            place = 0
-            for j in range(width):
-                if not mask >> j & 1:
-                    continue
-                entry, minor = row[j], minors[mask ^ 1 << j]
+            for j, without, is_negative in products:
+                entry, minor = row[j], minors[without]
                 if entry is None or minor is None:
-                    place += 1
                     continue
                 term = times(entry, minor)
-                if (k - 1 + place) % 2:
+                if is_negative:
                     total = -term if total is None else total - term
                 else:
                     total = term if total is None else total + term
-                place += 1
             larger[mask] = total
         minors = larger
     full = (1 << width) - 1
     found = (minors[full ^ 1 << j] for j in range(width))
     return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(found)]
+
+
+@cache
+def _layers(width: int) -> list[list[tuple[int, list[tuple[int, int, bool]]]]]:
+    """For 2, 3, ... rows the sets of so many columns, as bits, with the products that make the minor on them.
+
+    A product is of the entry in a column of the last row and the minor on the set without it, with its sign.
+    """
+    layers = []
+    for k in range(2, width):
+        layer = []
+        for mask in range(1 << width):
+            if mask.bit_count() == k:
+                columns = [j for j in range(width) if mask >> j & 1]
+                layer.append((mask, [(j, mask ^ 1 << j, bool((k - 1 + at) % 2)) for at, j in enumerate(columns)]))
+        layers.append(layer)
+    return layers

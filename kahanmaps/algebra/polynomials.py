@@ -152,6 +152,9 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     """
     if all(isinstance(entry, fmpq) for entry in point):
         return _evaluate_rational(polynomial, point)
+    own = field.value(polynomial, point)
+    if own is not None:
+        return own
     powers: list[list[Any]] = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():

@@ -77,7 +77,8 @@ class Equation:
         By the forms of a map where they are explicit, else by the minors of L.
         """
         if self.explicit is None:
-            return kernel_minors(self.rows(self.monomials(X, times), zero), times)
+            minors = kernel_minors(self.rows(self.monomials(X, times), None), times)
+            return [zero if minor is None else minor for minor in minors]
         (image,) = self.explicit.rows(self.explicit.monomials(X, times), zero)
         return image
 

@@ -456,8 +456,9 @@ def _in_iterates(
     except NoPoint:
         return list(known), []
     integrals, found = _independent(laboratory, plain, progress, known), list[IntegralInIterates]()
+    too_long = set[int]()
     for ratio, origin in ratios:
-        verdict, evidence = verdict_on_ratio(laboratory, ratio)
+        verdict, evidence = verdict_on_ratio(laboratory, ratio, too_long)
         if verdict.holds:
             name = f"I{len(integrals) + len(found) + 1}"
             found.append(IntegralInIterates(name, ratio, origin, verdict, evidence))

@@ -22,6 +22,7 @@ from flint import fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
 from kahanmaps.algebra.text import format_number, format_polynomial, format_rational_function
@@ -128,14 +129,23 @@ class IntegralInIterates:
         }
 
 
-def verdict_on_ratio(laboratory: Laboratory, ratio: RatioOfIterates) -> tuple[Verdict, Evidence]:
-    """Whether I has the same value a step later, as an identity for the map of the laboratory."""
+def verdict_on_ratio(
+    laboratory: Laboratory, ratio: RatioOfIterates, too_long: set[int] | None = None
+) -> tuple[Verdict, Evidence]:
+    """Whether I has the same value a step later, as an identity for the map of the laboratory.
+
+    `too_long` collects the lengths of orbits that cannot be multiplied out; no ratio of such a length or more is tried.
+    """
     map_, eps = laboratory.map, laboratory.eps
-    n = map_.dim
+    n, hopeless = map_.dim, too_long if too_long is not None else set[int]()
 
     def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
         values = (*place[n:], step)
-        points = _orbit_about(map_.at(step, field, place[n:]), place[:n], ratio.length)
+        try:
+            points = _orbit_about(map_.at(step, field, place[n:]), place[:n], ratio.length)
+        except BudgetExceeded:
+            hopeless.add(ratio.length)
+            raise
         pairs = [ratio.sides(field, points[k:], values) for k in (0, 1)]
         (P, Q), (P_later, Q_later) = pairs
         if field.is_zero(Q) or field.is_zero(Q_later):
@@ -153,7 +163,9 @@ def verdict_on_ratio(laboratory: Laboratory, ratio: RatioOfIterates) -> tuple[Ve
         has_eps=map_.has_eps,
         subject=subject,
     )
-    return judged(identity, laboratory.seed, expands=n <= MAX_DIMENSION)
+    return judged(
+        identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in hopeless)
+    )
 
 
 def _orbit_about(over: MapOver, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
