@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_poly
 from helpers import quick
 from hypothesis import example, given
 from hypothesis import strategies as st
-from planar_helpers import SPLIT, over_members, side_by_side, structure_and_system
+from planar_helpers import over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.checks.settings import random_starts
@@ -110,7 +110,7 @@ def test_heights_in_normal_form_are_those_of_the_points_of_the_generic_orbit(nam
     expected = [height(point.x) for point in Orbit(KahanMap(system, "1/10"), start, steps)]
     found = growth(system, start, steps, structure=structure)
     assert found.heights == tuple(expected)
-    assert found.method == ("normal-form" if name in SPLIT else "generic")
+    assert found.method == "normal-form"
     assert growth(system, start, steps).heights == tuple(expected)
 
 
@@ -136,7 +136,7 @@ def test_integer_points_of_orbits_are_in_lowest_terms(name):
         ("m = 2", 2, "normal-form"),
         ("m = 2", 7, "normal-form"),
         ("m = 2", 20, "jump"),
-        ("m = 2, sqrt 2", 2, "generic"),
+        ("m = 2, sqrt 2", 2, "normal-form"),
         ("m = 2, sqrt 2", 20, "jump"),
     ],
 )
