@@ -141,7 +141,7 @@ CLAIMS: list[tuple[str, Callable[[list[Row]], float], str, float]] = [
         1,
     ),
     (
-        "a member with irreducible chi, or partly split, takes so many times as long as one whose chi splits (m = 3, N = 80)",
+        "members whose chi does not split take at most so many times as long as one whose chi does (m = 3, N = 80)",
         _most_over_fields,
         "below",
         3,

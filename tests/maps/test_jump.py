@@ -85,7 +85,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
             image = jumped(found, start, n)
             if n < len(points):
                 assert image == points[n]
-            elif len(points) <= 16:  # a pole among the first steps
+            elif len(points) <= (16 if n <= 16 else 4):  # a pole among the first steps
                 assert image is None or prime < 5
 
 
