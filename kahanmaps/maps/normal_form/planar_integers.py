@@ -31,6 +31,7 @@ class LevelBlock:
 
     block: PlanarBlock
     start: Triple
+    table: Any = None  # of tau functions, for points that are taken one after the other
 
     @property
     def is_constant(self) -> bool:

@@ -23,6 +23,7 @@ from kahanmaps.maps.normal_form.planar_block import Triple
 from kahanmaps.maps.normal_form.tau import TauStart, start_near
 
 _FIRST = 4  # below it psi_{n-2} would be zero
+_SHARED = 8  # so many points are taken from one table, which holds some ten times the digits of a point then
 
 
 def triples(block: Any) -> Iterator[Triple]:
@@ -46,10 +47,16 @@ def iterate(block: Any, n: int) -> Triple | None:
     if block.is_constant:
         at_rest: Triple = block.start
         return at_rest
-    start = _start(block)
-    if start is None or n - start.base < _FIRST:
+    table = block.table
+    if table is None or table.points_taken >= _SHARED:
+        start = _start(block)
+        if start is None:
+            return None
+        table = block.table = TauTable(start)
+    if n - table.base < _FIRST:
         return None
-    return TauTable(start).point(n - start.base)
+    found: Triple = table.point(n - table.base)
+    return found
 
 
 def _start(block: Any) -> TauStart | None:
@@ -72,6 +79,7 @@ class TauTable:
 
     def __init__(self, start: TauStart) -> None:
         self._start, self._gamma = start, start.gamma
+        self.base, self.points_taken = start.base, 0
         self._one = start.gamma * 0 + 1
         psi, chi = start.psi, start.chi
         s = {n: psi.scale(n) for n in range(1, 5)}
@@ -110,6 +118,7 @@ class TauTable:
 
     def point(self, n: int) -> Triple:
         """P_n for n >= 4, primitive."""
+        self.points_taken += 1
         before, here, after = self.psi(n - 1), self.psi(n), self.psi(n + 1)
         chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
         return self._start.point(chi, [before * after, here * after, before * here], self.r(n), self.r(n + 1))
