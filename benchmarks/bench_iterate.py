@@ -33,8 +33,8 @@ ELLIPTIC = "PARI/GP: ellmul, n T on the elliptic curves alone"
 
 def jump(work: Work, n: int) -> tuple[float, PlanesPoint]:
     """The iterate by doublings, from the start in x to primitive triples."""
-    jump = Jump(work.structure, work.eps, QQ)
-    seconds, value = timed(lambda: jump.value(work.start, n))
+    # A new one each time, since tables of values are kept for the next iterate.
+    seconds, value = timed(lambda: Jump(work.structure, work.eps, QQ).value(work.start, n))
     assert isinstance(value, PlanesPoint)
     return seconds, value
 

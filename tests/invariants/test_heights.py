@@ -161,7 +161,7 @@ CATALOGUE = {
     "nahm_tetrahedral": (Q, "3.43142", "a pencil of cubics"),
     "paper_m2": (Q, "12.0332", "a member"),
     "paper_m3": (Q, "17.4417", "a member"),
-    "paper_m3_irreducible": (Q, "22.8040", "a member, generic steps"),
+    "paper_m3_irreducible": (Q, "22.8040", "a member, over a cubic field"),
     "planar_cubic_hamiltonian": (Q, "5.41995", "a pencil of cubics"),
     "riccati": (LIN, "2.43641", "a Moebius map with multiplier (21 + 4 sqrt 5)/19"),
     "three_wave": (Q, "36.1646", "quadratic degrees"),

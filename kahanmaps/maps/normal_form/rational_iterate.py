@@ -104,7 +104,7 @@ class RationalOrbit:
         The value is None if it was not computed, or is at a pole.
         """
         step = max(1, min(self._far, n - 1))
-        target, before = n if self._planes.lazy else min(n, 2 * step), None
+        target, before = n if self._planes.lazy else _halved(n, step), None
         while True:
             try:
                 value = self._planes.point(target)
@@ -121,7 +121,14 @@ class RationalOrbit:
                     return target + beyond, None, None
             before = here
             # Four times the size is borne, but not more: heights may grow like n^2.
-            target = min(n, 2 * target if 4 * here[1] <= self._limit else target + target // 2)
+            target = _halved(n, target) if 4 * here[1] <= self._limit else min(n, target + target // 2)
+
+
+def _halved(n: int, step: int) -> int:
+    """The least of n, n/2, n/4, ..., rounded down, that is above the step: tables for n have the values of these."""
+    while n >> 1 > step:
+        n >>= 1
+    return n
 
 
 def _no_value(step: int) -> SingularStep:
