@@ -64,7 +64,7 @@ def work(m: int = 3) -> Work:
 
 
 @lru_cache
-def unsplit(chi: str) -> Work:
+def with_chi(chi: str) -> Work:
     """The same for a member with this chi, any polynomial."""
     member = draw_with_chi(parse_chi(chi), seed=SEED)
     system = member.chosen.system

@@ -181,6 +181,15 @@ def test_many_iterates_are_those_alone():
     assert all(P != Q for P, Q in pairwise(found))
 
 
+@over_fields
+def test_long_products_are_products(name):
+    algebra, rng = algebra_of(name), random.Random(name)
+    numbers = [[rng.getrandbits(9000) - 2**8999 for _ in range(algebra.degree)] for _ in range(2)]
+    first, second = (algebra.convert(fmpq_poly(entries)) for entries in numbers)
+    assert planar_algebra._bits(first) > planar_algebra._KARATSUBA
+    assert planar_algebra._times(first, second) == first * second
+
+
 def test_a_residue_map_is_a_homomorphism_and_there_is_none_without_a_root():
     block = random_block("sqrt 2", 1)
     t, residue = block.algebra.generator, block.residue_map(17)

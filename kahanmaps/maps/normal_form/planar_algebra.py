@@ -24,6 +24,7 @@ from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock,
 
 _SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
 _FLOAT = 50  # bits of a length
+_KARATSUBA = 8000  # bits from which on `_times` is faster
 
 
 class AlgebraBlock(LevelBlock):
@@ -102,7 +103,7 @@ class AlgebraBlock(LevelBlock):
             return [(entry * below).p for entry in above], below, below
         cofactor, norm = _adjugate(W)
         below = norm.p
-        above = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
+        above = [entry.p for z in (U, V) for entry in _times(z, cofactor).coefficients]
         return above, below, reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
 
     def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
@@ -250,6 +251,24 @@ def _signs(count: int) -> list[tuple[int, ...]]:
 def _parts(powers: Sequence[complex], k: int) -> list[float]:
     """The k-th power of a root, as real and imaginary part unless the root is real."""
     return [powers[k].real] if powers[1].imag == 0 else [powers[k].real, powers[k].imag]
+
+
+def _times(first: EtaleElement, second: EtaleElement) -> EtaleElement:
+    """The product of two elements of Z[t].
+
+    FLINT multiplies each coefficient by each; with a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j it is
+    one product for each pair.
+    """
+    if _bits(first) < _KARATSUBA:
+        return first * second
+    a, b = ([entry.p for entry in element.coefficients] for element in (first, second))
+    squares = [x * y for x, y in zip(a, b, strict=True)]
+    terms = [fmpz(0)] * (2 * len(a) - 1)
+    for i in range(len(a)):
+        terms[2 * i] += squares[i]
+        for j in range(i):
+            terms[i + j] += (a[i] + a[j]) * (b[i] + b[j]) - squares[i] - squares[j]
+    return EtaleElement(first.field, fmpq_poly(terms) % first.field.chi)
 
 
 def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:
