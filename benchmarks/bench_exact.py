@@ -19,7 +19,7 @@ from itertools import islice
 from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
-from work import Absent, Row, Work, gp_version, peer, require_equal, row, run_gp, say, table, timed, work
+from work import Absent, Row, Work, gp_version, peer, require_equal, row, run_gp, say, table, timed, with_chi, work
 
 from kahanmaps import QQ, KahanMap, Orbit, QuadraticSystem
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
@@ -28,6 +28,9 @@ from kahanmaps.maps.normal_form.steps import NormalSteps
 Pairs = list[tuple[fmpz, fmpz]]  # the coordinates in lowest terms, denominators positive
 Runner = Callable[[Work, int], tuple[float, Pairs]]  # time and last iterate
 GROUP, GROWTH = "Exact orbits, every iterate", "How the time of a whole orbit grows"
+FIELDS = "Exact orbits where chi does not split"
+SPLIT = {3: "(t - 1)*(t + 2)*(t - 3)", 4: "(t - 1)*(t + 2)*(t - 3)*(t + 4)"}
+UNSPLIT = ("t^3 - t - 1", "t^3 - 7*t + 3", "(t - 1)*(t^2 - 3)", "(t^2 - 2)*(t^2 + t + 1)")
 
 # kahanmaps -----------------------------------------------------------------------------------------------------------
 
@@ -365,6 +368,37 @@ def contest(work: Work, steps: int, contestants: Sequence[tuple[str, Runner]]) -
         say(f"  {what}: {name}: {times[name] / best:.3g}")
     times[base_name] = best
     return [row(GROUP, name, what, seconds, seconds / best) for name, seconds in times.items()]
+
+
+def over_fields(quick: bool = False) -> list[Row]:
+    """Members with chi of every kind, relative to one of the same dimension whose chi splits, drawn in the same way."""
+    rows, steps = [], 40 if quick else 80
+    for chi in UNSPLIT:
+        field = with_chi(chi)
+        base = with_chi(SPLIT[field.m])
+        split, whole = normal_reduced(base, steps)
+        seconds, last = normal_reduced(field, steps)
+        slow, expected = generic(field, steps)
+        require_equal(chi, last, expected)
+        split = min(split, normal_reduced(base, steps)[0])
+        digits, others = (max(len(entry.str()) for pair in found for entry in pair) for found in (last, whole))
+        what = f"m = {base.m}, N = {steps}, chi = {chi}, last iterate of up to {digits:,} digits above and below"
+        rows.append(
+            row(
+                FIELDS,
+                "kahanmaps, chi that splits: reduced rationals in x",
+                what,
+                split,
+                1.0,
+                f"up to {others:,} digits",
+            )
+        )
+        rows.append(
+            row(FIELDS, "kahanmaps, this chi, normal form: reduced rationals in x", what, seconds, seconds / split)
+        )
+        rows.append(row(FIELDS, "kahanmaps, this chi, without structure", what, slow, slow / split))
+        say(f"  {what}: {seconds / split:.3g}, without structure {slow / split:.3g}")
+    return rows
 
 
 def growth(steps: Sequence[int] = (80, 320)) -> list[Row]:

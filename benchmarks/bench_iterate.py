@@ -10,6 +10,8 @@ in every plane.
 
 from __future__ import annotations
 
+import resource
+import subprocess
 import sys
 from itertools import islice
 from typing import Any
@@ -25,13 +27,14 @@ from kahanmaps.maps.normal_form.steps import NormalSteps
 OVER_Q, MODULO, BALLS = "The n-th iterate over Q", "The n-th iterate over GF(2^61 - 1)", "The n-th iterate in balls"
 PRIME = 2**61 - 1
 JUMP, STEPPING = "kahanmaps: doublings", "kahanmaps: stepping in normal form"
+ALONE = "kahanmaps: doublings, x over one denominator"
 ELLIPTIC = "PARI/GP: ellmul, n T on the elliptic curves alone"
 
 
 def jump(work: Work, n: int) -> tuple[float, PlanesPoint]:
     """The iterate by doublings, from the start in x to primitive triples."""
-    jump = Jump(work.structure, work.eps, QQ)
-    seconds, value = timed(lambda: jump.value(work.start, n))
+    # A new one each time, since tables of values are kept for the next iterate.
+    seconds, value = timed(lambda: Jump(work.structure, work.eps, QQ).value(work.start, n))
     assert isinstance(value, PlanesPoint)
     return seconds, value
 
@@ -180,11 +183,33 @@ def in_balls(work: Work, n: int = 10**6, bits: int = 400, check: int = 80) -> li
     return [row(BALLS, JUMP, f"m = {work.m}, n = {n:,}, ball:{bits}", seconds, None, note)]
 
 
+def whole_process(n: int = 2000) -> list[Row]:
+    """A far iterate in a process of its own, from the start of Python to x over one denominator."""
+    command = [sys.executable, __file__, "--alone", str(n)]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    seconds, megabytes, digits = map(float, answer.stdout.split())
+    say(f"  {OVER_Q}, n = {n}, whole process: {seconds:.3g} s, {megabytes:.0f} MB")
+    note = f"{megabytes:.0f} MB"
+    return [row(OVER_Q, ALONE, f"m = 3, n = {n}, {digits:,.0f} digits in x, whole process", seconds, None, note)]
+
+
+def alone(n: int) -> None:
+    """What `whole_process` starts: prints seconds, megabytes and digits."""
+    value = Jump(work().structure, work().eps, QQ).value(work().start, n)
+    assert isinstance(value, PlanesPoint)
+    _, below = value.common()
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, below.bit_length() * 0.30103)
+
+
 def measure(quick: bool = False) -> list[Row]:
     """All rows."""
     steps = [80, 160] if quick else [80, 160, 320, 640]
-    return [*over_rationals(work(), steps), *modulo_a_prime(work()), *in_balls(work())]
+    far = [] if quick else whole_process()
+    return [*over_rationals(work(), steps), *far, *modulo_a_prime(work()), *in_balls(work())]
 
 
-if __name__ == "__main__":
+if __name__ == "__main__" and "--alone" in sys.argv:
+    alone(int(sys.argv[-1]))
+elif __name__ == "__main__":
     print(table(measure("--quick" in sys.argv[1:])))

@@ -20,6 +20,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps import QuadraticSystem, draw_with_eigenvalues
+from kahanmaps.family.draw import draw_with_chi, parse_chi
 from kahanmaps.family.structure import Structure, structure_of
 
 Row = dict[str, Any]  # contestant, work, seconds, ratio, note; `group` names the table
@@ -60,6 +61,16 @@ def work(m: int = 3) -> Work:
     structure = structure_of(system, member=member)
     assert isinstance(structure, Structure)
     return Work(m, system, structure, tuple(fmpq(*map(int, s.split("/"))) for s in START[: 2 * m]), EPS)
+
+
+@lru_cache
+def with_chi(chi: str) -> Work:
+    """The same for a member with this chi, any polynomial."""
+    member = draw_with_chi(parse_chi(chi), seed=SEED)
+    system = member.chosen.system
+    structure = structure_of(system, member=member)
+    assert isinstance(structure, Structure)
+    return Work(system.dim // 2, system, structure, work(system.dim // 2).start, EPS)
 
 
 def peer(module: str) -> ModuleType:

@@ -1,7 +1,7 @@
 """Which way an orbit is computed: generic, in normal form, or by jumps; chosen from what is asked for, with the reason.
 
 * generic: linear solves; for every quadratic system.
-* normal-form: plane by plane, for members of the family with distinct roots; over Q where chi splits there.
+* normal-form: plane by plane, for members of the family with distinct roots.
 * jump: each point wanted directly, by doublings; the same members, any chi.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.fields import Field
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.structure import NoStructure, Structure
 
@@ -52,9 +52,6 @@ def choose_method(
         return Method("generic", f"no normal form ({structure.reason})")
     if wish == "jump" and (at is None or arithmetic == "float"):
         raise InputError("the method jump is for --at N1,N2,... in exact, mod:P or ball arithmetic")
-    over_Q = "" if arithmetic != "exact" else _why_not_over_Q(structure)
-    if wish == "normal-form" and over_Q:
-        raise InputError(f"the method normal-form needs planes over Q, and {over_Q}: take generic, or jump with --at")
     if wish == "normal-form" and arithmetic == "mod":
         raise InputError("modulo P there are the methods generic and jump")
     if wish is not None:
@@ -62,21 +59,12 @@ def choose_method(
     if arithmetic == "float":
         return Method("normal-form", structure.text)
     if at is not None and max(at, default=0) >= JUMP_FROM[arithmetic]:
-        dense = arithmetic == "exact" and len(at) * (2 if over_Q else 10) > max(at)
+        dense = arithmetic == "exact" and len(at) * 10 > max(at)
         if not dense:
             return Method("jump", f"{structure.text}; each iterate by doublings")
     if arithmetic == "mod":
         return Method("generic", "few steps modulo P")
-    if over_Q:
-        return Method("generic", over_Q)
     return Method("normal-form", structure.text)
-
-
-def _why_not_over_Q(structure: Structure) -> str:
-    from kahanmaps.maps.normal_form.splitting import Splitting
-
-    degrees = [plane.degree for plane in Splitting(structure.form, QQ, 1, structure.T).planes]
-    return "" if max(degrees) == 1 else f"chi does not split over Q (a factor has degree {max(degrees)})"
 
 
 def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:

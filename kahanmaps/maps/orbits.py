@@ -90,7 +90,7 @@ class Orbit(Displayed):
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
     back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
     denominator (over Q). With a `structure` (family.structure.structure_of) the orbit is walked in normal form: over
-    Q plane by plane, if chi splits there; over balls every point directly, so that balls do not widen from step to
+    Q plane by plane; over balls every point directly, so that balls do not widen from step to
     step. `first` and `last` are the first points and the last one that were delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem

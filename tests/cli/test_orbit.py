@@ -437,7 +437,7 @@ def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
         (f"{MEMBER} --steps 20", "normal-form"),
         (f"{MEMBER} --steps 2", "generic"),  # looking for a structure costs more
         (f"{MEMBER} --at 30", "jump"),
-        (f"{IRREDUCIBLE} --steps 20", "generic"),
+        (f"{IRREDUCIBLE} --steps 20", "normal-form"),
         (f"{IRREDUCIBLE} --at 30", "jump"),
         (f"{MEMBER} --steps 20 --arithmetic mod:10007", "generic"),
         (f"{MEMBER} --at 100000 --arithmetic mod:10007", "jump"),

@@ -15,7 +15,6 @@ from kahanmaps.algebra.fields import CC, GF, QQ, RR
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting, rational_factors
-from kahanmaps.maps.normal_form.steps import NormalSteps, splits
 
 FIELDS = [QQ, GF(11), GF(101), GF(10007), GF(2**61 - 1), GF(2**89 - 1), RR(128)]
 over_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
@@ -88,15 +87,15 @@ def test_over_q_a_point_is_the_sum_of_its_planes(name):
         u, v = U / fmpq(1, 5), V / fmpq(1, 5)
         total = [entry + row[0] * u + row[1] * v for entry, row in zip(total, splitting.matrix(i), strict=True)]
     assert tuple(total) == x
-    assert splits(splitting)
 
 
 @over_unsplit
-def test_where_chi_does_not_split_there_are_no_integer_planes(name):
+def test_over_q_a_generator_is_integral_and_the_planes_have_the_degrees_of_the_factors(name):
     structure, _ = structure_and_system(name)
-    assert not splits(Splitting(structure.form, QQ, 1, structure.T))
-    with pytest.raises(InputError, match="does not split over Q"):
-        NormalSteps(structure, fmpq(1))
+    planes = Splitting(structure.form, QQ, 1, structure.T).planes
+    assert sum(plane.degree for plane in planes) == structure.form.m
+    for plane in planes:
+        assert plane.degree == 1 or plane.block.a.field.chi.denom() == 1
 
 
 @pytest.mark.parametrize(

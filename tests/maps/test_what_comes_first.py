@@ -18,8 +18,6 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.family.structure import Structure, structure_of
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import Jump
-from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.maps.normal_form.steps import splits
 from kahanmaps.maps.orbits import Iterates, Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -44,8 +42,7 @@ def ended(orbit) -> OrbitEnd:
 def event(system, structure, eps, start, steps, digits):
     """What comes first, with the step before it; by three ways, which have to agree."""
     kahan = KahanMap(system, eps)
-    ways = (None, structure) if splits(Splitting(structure.form, kahan.field, eps)) else (None,)
-    walks = [ended(Orbit(kahan, start, steps, structure=known, max_digits=digits)) for known in ways]
+    walks = [ended(Orbit(kahan, start, steps, structure=known, max_digits=digits)) for known in (None, structure)]
     assert walks[0] == walks[-1]
     jump = ended(Iterates(kahan, start, [steps], structure=structure, max_digits=digits))
     walk = walks[0]

@@ -79,7 +79,8 @@ class Jump:
         small = isinstance(self.field, PrimeField) and self.field.prime < 5
         if not small:
             try:
-                return translation.iterate(block, start, n, self.field.is_zero)
+                balls = isinstance(self.field, BallField)
+                return translation.iterate(block, start, n, self.field.is_zero, inexact=balls)
             except translation.NoTranslation:
                 if isinstance(self.field, BallField):
                     raise PrecisionLost("the orbit meets special positions that balls cannot decide") from None

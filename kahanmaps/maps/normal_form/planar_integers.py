@@ -12,19 +12,51 @@ For disc(h) = 0 the rule says nothing, but there numbers hardly grow, and gcds a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
+from itertools import chain, islice
+from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.maps.normal_form.planar_block import PlanarBlock
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 IntegerTriple = tuple[fmpz, fmpz, fmpz]
 
 _LOW = (fmpz(1) << 64) - 1
 
 
-class IntegerBlock:
+class LevelBlock:
+    """One plane with a start in it: what its level is, and whether that is special."""
+
+    block: PlanarBlock
+    start: Triple
+    table: Any = None  # of tau functions, for points that are taken one after the other
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether every step leads to the start: h = 0, or the start is the origin."""
+        return bool(self.block.is_zero or (self.start[0] == 0 and self.start[1] == 0))
+
+    @cached_property
+    def level(self) -> Any:
+        """h / (W (W^2 + D)), conserved; None where the first step has no value."""
+        above, below = self.block.level(self.start)
+        return None if below == 0 else (fmpq(1) * above) / below
+
+    @cached_property
+    def delta(self) -> Any:
+        """disc(h) level^2; the level cubic is singular where this is 0 or 1."""
+        assert self.level is not None
+        return self.block.discriminant * self.level * self.level
+
+    @property
+    def is_degenerate(self) -> bool:
+        """Whether the level cubic is singular (delta is 0 or 1): heights grow no faster than linearly then."""
+        return bool(self.delta == 0 or self.delta == 1)
+
+
+class IntegerBlock(LevelBlock):
     """One plane over Q for the map with time step 2 eps: `cubic` has the coefficients of h, (u, v) is the start.
 
     `start` is a primitive triple, `scale` the number with (U/W, V/W) = scale (u, v).
@@ -48,34 +80,64 @@ class IntegerBlock:
         W = U.q.lcm(V.q)
         self.start = primitive(((U * W).p, (V * W).p, W))
 
-    @property
-    def is_constant(self) -> bool:
-        """Whether every step leads to the start: h = 0, or the start is the origin."""
-        return self.block.is_zero or (self.start[0] == 0 and self.start[1] == 0)
-
-    @cached_property
-    def level(self) -> fmpq | None:
-        """h / (W (W^2 + D)), conserved; None where the first step has no value."""
-        above, below = self.block.level(self.start)
-        return None if below == 0 else fmpq(above, below)
-
-    @cached_property
-    def delta(self) -> fmpq:
-        """disc(h) level^2; the level cubic is singular where this is 0 or 1."""
-        assert self.level is not None
-        found: fmpq = self.block.discriminant * self.level * self.level
-        return found
-
-    @property
-    def is_degenerate(self) -> bool:
-        """Whether the level cubic is singular (delta is 0 or 1): heights grow no faster than linearly then."""
-        return self.delta == 0 or self.delta == 1
-
     @cached_property
     def bad(self) -> fmpz:
         """An integer with exactly the primes for which the content rule does not speak (not for disc(h) = 0)."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
+
+    @cached_property
+    def numbers(self) -> Integers:
+        """How values of tau functions are kept."""
+        return Integers(self.bad)
+
+    @property
+    def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
+        """The cubic over Q, and natural lifts of the start and its image; primitive, so that all are but for `bad`."""
+        one, points = fmpq(1), list(islice(self.triples(), 2))
+        if len(points) < 2:  # a pole
+            points.append(primitive(self.block.image(self.start)))
+        first, second = (tuple(one * entry for entry in P) for P in points)
+        return self.block, first, second  # type: ignore[return-value]
+
+    slack = 0
+
+    @property
+    def primes(self) -> list[fmpz]:
+        """Numbers with primes at which a sum of coordinates may cancel that does not elsewhere."""
+        assert self.level is not None
+        return [self.level.q]
+
+    @staticmethod
+    def bits(triple: IntegerTriple) -> tuple[int, int]:
+        """About the bit lengths of numerators and denominator of `fraction`."""
+        return int(max(triple[0].bit_length(), triple[1].bit_length())), int(triple[2].bit_length())
+
+    @staticmethod
+    def fraction(triple: IntegerTriple) -> tuple[list[fmpz], fmpz, fmpz]:
+        """Numerators of U/W and V/W, the denominator, and 1: other planes may have more to say."""
+        return [triple[0], triple[1]], triple[2], fmpz(1)
+
+    def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
+        """A number with the primes at which alpha U + beta V and W may have a common factor; None: they may at all."""
+        alpha, beta = form
+        value = self.block.h(beta, -alpha)
+        return None if value == 0 else value
+
+    @staticmethod
+    def same(P: IntegerTriple, Q: IntegerTriple) -> bool:
+        """Whether two primitive triples are one point."""
+        return P[2] in (Q[2], -Q[2]) and tuple(P) in (tuple(Q), tuple(-entry for entry in Q))
+
+    @staticmethod
+    def integral(triple: Triple) -> IntegerTriple:
+        """A rational triple as a primitive one."""
+        return primitive(_cleared([triple])[0])
+
+    @staticmethod
+    def residue_map(prime: int) -> Callable[[fmpz], int] | None:
+        """How integers are reduced modulo a prime."""
+        return lambda entry: int(entry % prime)
 
     def triples(self, previous: IntegerTriple | None = None) -> Iterator[IntegerTriple]:
         """P_0, P_1, ..., primitive, as long as there is a value; by the content rule, or by gcds where it is silent."""
@@ -102,6 +164,55 @@ class IntegerBlock:
             else:  # after a pole the previous point is at infinity
                 image = primitive(raw)
             previous, point = point, image
+
+
+class Integers:
+    """Values of tau functions over Q: integers prime to the primes of `bad`, each times a rational scale."""
+
+    def __init__(self, bad: fmpz) -> None:
+        self._bad = bad
+
+    def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
+        """A value that is integral but for `bad`, not zero: integer and scale."""
+        integer, part = bad_part(value.p, self._bad)
+        return integer, fmpq(part, value.q)
+
+    def divisor(self, value: fmpz) -> fmpz:
+        """What `difference` and `combined` take for a division by this integer."""
+        return value
+
+    def difference(self, s: fmpq, left: fmpz, t: fmpq, right: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
+        """s left - t right, over the divisor, which divides it but for bad primes: integer and scale."""
+        raw = (s.p * t.q) * left - (t.p * s.q) * right
+        if divisor is not None:
+            raw = divide_exactly([raw], divisor)[0]
+        value, part = bad_part(raw, self._bad)
+        return value, fmpq(part, s.q * t.q)
+
+    def lifts(self, points: Sequence[Triple]) -> list[IntegerTriple]:
+        """Triples of rational numbers, times one integer."""
+        return _cleared(points)
+
+    def combined(
+        self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
+    ) -> IntegerTriple:
+        """The primitive triple of the sum of scale times term times lift, which the divisor divides."""
+        below = fmpz(1)
+        for scale in scales:
+            below = below.lcm(scale.q)
+        factors = [(scale * below).p for scale in scales]
+        raw = [
+            sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
+            for i in range(3)
+        ]
+        return strip(raw, self._bad, divisor)
+
+
+def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
+    below = fmpz(1)
+    for entry in chain(*points):
+        below = below.lcm(entry.q)
+    return [((U * below).p, (V * below).p, (W * below).p) for U, V, W in points]
 
 
 def content(integers: Sequence[fmpz]) -> fmpz:
@@ -187,7 +298,7 @@ def radical(*numbers: fmpz) -> fmpz:
         if number == 0:
             raise ArithmeticError("zero has no radical: please report this")
         rest = abs(number)
-        for prime in _SMALL_PRIMES:
+        for prime in SMALL_PRIMES:
             if rest % prime == 0:
                 if product % prime != 0:
                     product = product * prime
@@ -205,4 +316,4 @@ def radical(*numbers: fmpz) -> fmpz:
     return product
 
 
-_SMALL_PRIMES = tuple(n for n in range(2, 100) if all(n % k for k in range(2, int(n**0.5) + 1)))
+SMALL_PRIMES = tuple(n for n in range(2, 100) if all(n % k for k in range(2, int(n**0.5) + 1)))

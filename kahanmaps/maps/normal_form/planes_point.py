@@ -11,18 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from flint import fmpq, fmpz
 
 from kahanmaps.maps.integer_steps import IntegerPoint
+from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
+from kahanmaps.maps.normal_form.planar_block import Triple
 from kahanmaps.maps.normal_form.planar_integers import (
     IntegerBlock,
-    IntegerTriple,
     content,
     divide_exactly,
     is_all,
     radical,
 )
+
+Block = IntegerBlock | AlgebraBlock
 
 # Powers of the fixed primes up to this one are found in one residue.
 _POWER = 3
@@ -33,24 +37,22 @@ class _Row:
     """One coordinate: sum of (alpha_i U_i + beta_i V_i) / (below W_i) over the planes of `support`, with integers."""
 
     support: tuple[int, ...]
-    forms: tuple[tuple[fmpz, fmpz], ...]
+    forms: tuple[tuple[fmpz, ...], ...]
     below: fmpz
     fixed: fmpz
     dividing: tuple[int, ...]  # the planes whose h the form divides
 
-    def over(self, scaled: dict[int, tuple[fmpz, fmpz]], product: fmpz) -> tuple[fmpz, fmpz]:
+    def over(self, scaled: dict[int, list[fmpz]], product: fmpz) -> tuple[fmpz, fmpz]:
         """Numerator and denominator, from U_i and V_i times the other W of the support, and the product of all."""
-        above = fmpz(0)
-        for i, (alpha, beta) in zip(self.support, self.forms, strict=True):
-            U, V = scaled[i]
-            above += alpha * U + beta * V
+        above = sum((_at(form, scaled[i]) for i, form in zip(self.support, self.forms, strict=True)), fmpz(0))
         return above, self.below * product
 
 
 class Assembly:
     """How points are put together from triples: for blocks and, for each, the rows of x = sum of R (u, v)."""
 
-    def __init__(self, blocks: Sequence[IntegerBlock], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
+    def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
+        self.blocks = blocks
         self.dim = len(matrices[0])
         self.rows = [
             _row(
@@ -68,25 +70,29 @@ class Assembly:
             (abs(entry) * (below // row.below) for row in self.rows for form in row.forms for entry in form),
             default=fmpz(1),
         )
-        self.excess = int(max(below.bit_length(), (2 * len(blocks) * largest).bit_length()))
+        self.excess = int(max(below.bit_length(), (self.dim * largest).bit_length()))
+        self.excess += sum(block.slack for block in blocks)
 
 
-def _row(blocks: Sequence[IntegerBlock], forms: Sequence[Sequence[fmpq]]) -> _Row:
-    support = tuple(i for i, (alpha, beta) in enumerate(forms) if alpha != 0 or beta != 0)
+def _row(blocks: Sequence[Block], forms: Sequence[Sequence[fmpq]]) -> _Row:
+    support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
     below = fmpz(1)
     for i in support:
-        below = below.lcm(forms[i][0].q).lcm(forms[i][1].q)
+        for entry in forms[i]:
+            below = below.lcm(entry.q)
     integers, factors, dividing = [], [below], []
     for i in support:
-        alpha, beta = ((entry * below).p for entry in forms[i])
-        integers.append((alpha, beta))
+        form = tuple((entry * below).p for entry in forms[i])
+        integers.append(form)
         block = blocks[i]
         if block.is_constant:
-            factors.append(block.start[2])
+            factors.append(block.fraction(block.start)[1])
             continue
-        factors += [content((alpha, beta)), fmpz(1) if block.level is None else block.level.q]
-        value = block.block.h(beta, -alpha)
-        if value == 0 or block.level is None:
+        factors.append(content(form))
+        if block.level is not None:
+            factors += block.primes
+        value = None if block.level is None else block.fixed(form)
+        if value is None:
             dividing.append(i)
         else:
             factors.append(value)
@@ -96,9 +102,7 @@ def _row(blocks: Sequence[IntegerBlock], forms: Sequence[Sequence[fmpq]]) -> _Ro
 class PlanesPoint:
     """The point of R^{2m} with these primitive triples in the planes of an assembly."""
 
-    __slots__ = ("_assembly", "_height", "triples")
-
-    def __init__(self, assembly: Assembly, triples: Sequence[IntegerTriple]) -> None:
+    def __init__(self, assembly: Assembly, triples: Sequence[Triple]) -> None:
         self._assembly = assembly
         self._height: int | None = None
         self.triples = tuple(triples)
@@ -106,8 +110,13 @@ class PlanesPoint:
     @property
     def bits(self) -> int:
         """About the bit length of the largest of the integers over one common denominator."""
-        below = sum(W.bit_length() for _, _, W in self.triples)
-        return below + max(0, *(max(U.bit_length(), V.bit_length()) - W.bit_length() for U, V, W in self.triples))
+        pairs = [block.bits(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
+        return sum(below for _, below in pairs) + max(0, *(above - below for above, below in pairs))
+
+    @cached_property
+    def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
+        """In every plane numerators of the coordinates, their denominator, and primes that may cancel."""
+        return [block.fraction(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
 
     @property
     def height(self) -> int:
@@ -135,14 +144,12 @@ class PlanesPoint:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, PlanesPoint):
             return NotImplemented
-        return all(
-            W == w * sign and U == u * sign and V == v * sign
-            for (U, V, W), (u, v, w) in zip(self.triples, other.triples, strict=True)
-            for sign in [1 if (W > 0) == (w > 0) else -1]
-        )
+        pairs = zip(self._assembly.blocks, self.triples, other.triples, strict=True)
+        return all(block.same(P, Q) for block, P, Q in pairs)
 
     def __hash__(self) -> int:
-        return hash(tuple(abs(W) for _, _, W in self.triples))
+        # Triples over an extension are not unique.
+        return hash(tuple(abs(W) for _, _, W in self.triples if isinstance(W, fmpz)))
 
     def common(self) -> tuple[list[fmpz], fmpz]:
         """Numerators of all coordinates over one denominator; what the W_i have in common is left in both."""
@@ -150,14 +157,13 @@ class PlanesPoint:
         for row in self._assembly.rows:
             below = below.lcm(row.below)
         everything = tuple(range(len(self.triples)))
-        scaled, product = _scaled(self.triples, everything)
+        scaled, product = _scaled([(above, W) for above, W, _ in self._fractions], everything)
         numerators = []
         for row in self._assembly.rows:
             factor = below // row.below
             total = fmpz(0)
-            for i, (alpha, beta) in zip(row.support, row.forms, strict=True):
-                U, V = scaled[i]
-                total += (alpha * factor) * U + (beta * factor) * V
+            for i, form in zip(row.support, row.forms, strict=True):
+                total += _at([entry * factor for entry in form], scaled[i])
             numerators.append(total)
         return numerators, below * product
 
@@ -171,24 +177,28 @@ class PlanesPoint:
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced, denominators positive."""
-        modulus = (self._assembly.fixed * _shared([W for _, _, W in self.triples])) ** _POWER
-        residues = [(U % modulus, V % modulus, W % modulus) for U, V, W in self.triples]
-        sets: dict[tuple[int, ...], tuple[dict[int, tuple[fmpz, fmpz]], fmpz]] = {}
-        small: dict[tuple[int, ...], tuple[dict[int, tuple[fmpz, fmpz]], fmpz]] = {}
-        divisors: dict[tuple[int, fmpz, fmpz], fmpz] = {}
+        planes = [(above, W) for above, W, _ in self._fractions]
+        suspects = _shared([W for _, W in planes])
+        for _, _, primes in self._fractions:
+            suspects = suspects * primes
+        modulus = (self._assembly.fixed * suspects) ** _POWER
+        residues = [([entry % modulus for entry in above], W % modulus) for above, W in planes]
+        sets: dict[tuple[int, ...], tuple[dict[int, list[fmpz]], fmpz]] = {}
+        small: dict[tuple[int, ...], tuple[dict[int, list[fmpz]], fmpz]] = {}
+        divisors: dict[tuple[int, ...], fmpz] = {}
         pairs = []
         for row in self._assembly.rows:
             if row.support not in sets:
-                sets[row.support] = _scaled(self.triples, row.support)
+                sets[row.support] = _scaled(planes, row.support)
                 small[row.support] = _scaled(residues, row.support)
             above, below = row.over(*sets[row.support])
             if above == 0:
                 pairs.append((above, fmpz(1)))
                 continue
             common = fmpz(1)
-            for i, (alpha, beta) in zip(row.support, row.forms, strict=True):
+            for i, form in zip(row.support, row.forms, strict=True):
                 if i in row.dividing:
-                    common = common * self._divisor(i, alpha, beta, divisors)
+                    common = common * self._divisor(i, form, divisors)
             if common != 1:
                 above, below = divide_exactly((above, below), common)
                 common = _common_part(above, below, modulus)
@@ -204,13 +214,14 @@ class PlanesPoint:
             pairs.append((above, below) if below > 0 else (-above, -below))
         return pairs
 
-    def _divisor(self, i: int, alpha: fmpz, beta: fmpz, known: dict[tuple[int, fmpz, fmpz], fmpz]) -> fmpz:
+    def _divisor(self, i: int, form: Sequence[fmpz], known: dict[tuple[int, ...], fmpz]) -> fmpz:
         """gcd(alpha U + beta V, W) but for fixed primes, where alpha U + beta V divides h: one gcd for all rows."""
-        common = content((alpha, beta))
-        key = (i, alpha // common, beta // common)
+        common = content(form)
+        primitive = [entry // common for entry in form]
+        key = (i, *map(int, primitive))
         if key not in known:
-            U, V, W = self.triples[i]
-            known[key] = (key[1] * U + key[2] * V).gcd(W)
+            above, below, _ = self._fractions[i]
+            known[key] = _at(primitive, above).gcd(below)
         return known[key]
 
     def rationals(self) -> tuple[fmpq, ...]:
@@ -218,20 +229,25 @@ class PlanesPoint:
         return tuple(fmpq(above, below) for above, below in self.lowest_terms())
 
 
-def _scaled(triples: Sequence[IntegerTriple], support: tuple[int, ...]) -> tuple[dict[int, tuple[fmpz, fmpz]], fmpz]:
+def _at(form: Sequence[fmpz], values: Sequence[fmpz]) -> fmpz:
+    return sum((c * value for c, value in zip(form, values, strict=True) if c != 0), fmpz(0))
+
+
+def _scaled(
+    planes: Sequence[tuple[Sequence[fmpz], fmpz]], support: tuple[int, ...]
+) -> tuple[dict[int, list[fmpz]], fmpz]:
     """U_i and V_i times the other W of the support, and the product of all."""
     # Products of all but one, from both ends.
     count = len(support)
     left, right = [fmpz(1)], [fmpz(1)]
     for i in support:
-        left.append(left[-1] * triples[i][2])
+        left.append(left[-1] * planes[i][1])
     for i in reversed(support[1:]):
-        right.append(right[-1] * triples[i][2])
+        right.append(right[-1] * planes[i][1])
     scaled = {}
     for k, i in enumerate(support):
         others = left[k] * right[count - 1 - k]
-        U, V, _ = triples[i]
-        scaled[i] = (U * others, V * others)
+        scaled[i] = [entry * others for entry in planes[i][0]]
     return scaled, left[-1]
 
 

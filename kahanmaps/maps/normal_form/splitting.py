@@ -119,7 +119,7 @@ def _planes(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list
 def _over_rationals(form: NormalForm) -> tuple[list[Plane], list[list[list[Any]]]]:
     planes, lifts = [], []
     for factor in rational_factors(form.chi):
-        degree = int(factor.degree())
+        degree, generator = int(factor.degree()), fmpq_poly([0, 1])
         if degree == 1:
             root = -factor[0]
 
@@ -130,12 +130,15 @@ def _over_rationals(form: NormalForm) -> tuple[list[Plane], list[list[list[Any]]
                 f"t = {root}", 1, PlanarBlock(*(c(root) for c in form.coefficients)), residue, lambda value: [value]
             )
         else:
-            algebra = EtaleAlgebra(factor)
+            # The generator is a multiple of t that is integral.
+            common = factor.denom()
+            over, generator = fmpq_poly([0, fmpq(1, common)]), fmpq_poly([0, common])
+            algebra = EtaleAlgebra(factor(over) * common**degree)
 
-            def residue_class(z: Sequence[fmpq], algebra: EtaleAlgebra = algebra) -> Any:
-                return algebra.convert(fmpq_poly(list(z)))
+            def residue_class(z: Sequence[fmpq], algebra: EtaleAlgebra = algebra, over: fmpq_poly = over) -> Any:
+                return algebra.convert(fmpq_poly(list(z))(over))
 
-            block = PlanarBlock(*(algebra.convert(c) for c in form.coefficients))
+            block = PlanarBlock(*(residue_class(c.coeffs()) for c in form.coefficients))
             plane = Plane(
                 f"{format_univariate(factor)} = 0", degree, block, residue_class, lambda value: value.coefficients
             )
@@ -144,8 +147,7 @@ def _over_rationals(form: NormalForm) -> tuple[list[Plane], list[list[list[Any]]
         others = form.chi // factor
         _, inverse, _ = others.xgcd(factor)
         unit = others * inverse % form.chi
-        t = fmpq_poly([0, 1])
-        lifts.append([[(unit * t**k % form.chi)[i] for i in range(form.m)] for k in range(degree)])
+        lifts.append([[(unit * generator**k % form.chi)[i] for i in range(form.m)] for k in range(degree)])
     return planes, lifts
 
 

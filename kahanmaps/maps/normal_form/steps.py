@@ -8,16 +8,16 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.errors import InputError
 from kahanmaps.family.structure import Structure
+from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
-from kahanmaps.maps.normal_form.planes_point import Assembly, PlanesPoint
+from kahanmaps.maps.normal_form.planes_point import Assembly, Block, PlanesPoint
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.maps.normal_form.tau_table import triples
 
 
 class NormalSteps:
-    """Steps of Phi(., eps) over Q for a structure whose chi splits over Q; the time step is 2 eps.
+    """Steps of Phi(., eps) over Q for a structure; the time step is 2 eps.
 
     >>> from itertools import islice
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
@@ -31,20 +31,19 @@ class NormalSteps:
 
     def __init__(self, structure: Structure, eps: fmpq) -> None:
         self.splitting = Splitting(structure.form, QQ, eps, structure.T)
-        if not splits(self.splitting):
-            raise InputError("chi does not split over Q, so there are no m planes over Q to step in")
         self._eps = eps
 
-    def blocks(self, start: Sequence[Any]) -> tuple[list[IntegerBlock], Assembly]:
+    def blocks(self, start: Sequence[Any]) -> tuple[list[Block], Assembly]:
         """The planes with the triples of the start, and the way back to x."""
-        planes = self.splitting.planes
-        blocks = []
-        for plane, (U, V, _) in zip(
-            planes, self.splitting.triples([QQ.convert(entry) for entry in start]), strict=True
-        ):
+        planes, scale = self.splitting.planes, 2 * self._eps
+        blocks: list[Block] = []
+        triples = self.splitting.triples([QQ.convert(entry) for entry in start])
+        for plane, (U, V, W) in zip(planes, triples, strict=True):
             cubic = plane.block
-            scale = 2 * self._eps
-            blocks.append(IntegerBlock([cubic.a, cubic.b, cubic.c, cubic.d], self._eps, U / scale, V / scale))
+            if plane.degree > 1:
+                blocks.append(AlgebraBlock(cubic, (U, V, W), scale))
+            else:
+                blocks.append(IntegerBlock([cubic.a, cubic.b, cubic.c, cubic.d], self._eps, U / scale, V / scale))
         return blocks, Assembly(blocks, [self.splitting.matrix(i) for i in range(len(planes))])
 
     def points(self, start: Sequence[Any]) -> Iterator[PlanesPoint]:
@@ -52,8 +51,3 @@ class NormalSteps:
         blocks, assembly = self.blocks(start)
         for found in zip(*(triples(block) for block in blocks), strict=False):
             yield PlanesPoint(assembly, found)
-
-
-def splits(splitting: Splitting) -> bool:
-    """Whether every plane is one over the field of x itself."""
-    return all(plane.degree == 1 for plane in splitting.planes)

@@ -29,12 +29,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
+from typing import Any
 
-from flint import fmpq, fmpz
-
-from kahanmaps.maps.normal_form.planar_block import determinant
-from kahanmaps.maps.normal_form.planar_integers import IntegerBlock, IntegerTriple, bad_part, primitive, strip
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, determinant
 
 _BASES = 3
 
@@ -44,112 +41,97 @@ class Window:
     """Values of psi or chi from index `first` on: integers prime to the bad primes, and their scales s_n."""
 
     first: int
-    values: list[fmpz]
-    scales: list[fmpq]
+    values: list[Any]
+    scales: list[Any]
 
-    def t(self, n: int) -> fmpq:
+    def t(self, n: int) -> Any:
         """s_{n+1} s_{n-1} / s_n^2."""
         k = n - self.first
         return self.scales[k + 1] * self.scales[k - 1] / (self.scales[k] * self.scales[k])
 
-    def __getitem__(self, n: int) -> fmpz:
+    def __getitem__(self, n: int) -> Any:
         return self.values[n - self.first]
 
-    def scale(self, n: int) -> fmpq:
+    def scale(self, n: int) -> Any:
         """s_n."""
         return self.scales[n - self.first]
 
 
 class TauStart:
-    """psi_1, ..., psi_4, chi_{-2}, ..., chi_2 and the triples P_{-1}, P_0, P_1 around a base point of an orbit.
+    """psi_1, ..., psi_4, chi_{-2}, ..., chi_2 and the natural lifts P_{-1}, P_0, P_1 around a base point of an orbit.
 
-    `neighbours` are the primitive triples P_{-3}, ..., P_3. `usable` is False where a value is zero that would have to
-    be divided by: T of small order, or three of the points on a line. Then another base point may do.
+    `lifts` are P_{-2}, ..., P_2 over the field, `numbers` says how numbers of it are split and combined. `usable` is
+    False where a value is zero that would have to be divided by: T of small order, or three of the points on a line.
+    Then another base point may do.
     """
 
-    def __init__(self, block: IntegerBlock, neighbours: Sequence[IntegerTriple], base: int) -> None:
-        self.base = base
-        self.bad = block.bad
-        self.gamma = 1 - block.delta
-        P = dict(zip(range(-3, 4), neighbours, strict=True))
-        t = {}
-        for k in range(-2, 3):
-            raw = block.block.image(P[k])
-            i = next(i for i in range(3) if P[k + 1][i] != 0)
-            t[k] = fmpq(raw[i], P[k + 1][i] * P[k - 1][2]) if P[k - 1][2] != 0 else fmpq(0)
-        self.usable = all(value != 0 for value in t.values())
-        if not self.usable:
-            return
-        scales = {0: fmpq(1), 1: fmpq(1)}
-        for k in range(0, -3, -1):
-            scales[k - 1] = t[k] * scales[k] * scales[k] / scales[k + 1]
-        for k in range(1, 3):
-            scales[k + 1] = t[k] * scales[k] * scales[k] / scales[k - 1]
-
-        def det(i: int, j: int, k: int) -> fmpq:
-            found: fmpq = determinant(P[i], P[j], P[k]) * (scales[i] * scales[j] * scales[k])
-            return found
-
-        chi = {0: 3 * det(-1, 0, 1), 1: det(-1, 0, 2), -1: det(-2, 0, 1), 2: det(-1, 1, 2), -2: det(-2, -1, 1)}
+    def __init__(self, numbers: Any, gamma: Any, lifts: Sequence[Triple], base: int) -> None:
+        self.base, self.numbers, self.gamma = base, numbers, gamma
+        P = dict(zip(range(-2, 3), lifts, strict=True))
+        chi = {
+            0: 3 * determinant(P[-1], P[0], P[1]),
+            1: determinant(P[-1], P[0], P[2]),
+            -1: determinant(P[-2], P[0], P[1]),
+            2: determinant(P[-1], P[1], P[2]),
+            -2: determinant(P[-2], P[-1], P[1]),
+        }
         self.usable = all(value != 0 for value in chi.values())
         if not self.usable:
             return
-        self.psi = _window(1, [fmpq(n) for n in (1, 2, 3, 4)], self.bad)
-        self.chi = _window(-2, [chi[n] for n in range(-2, 3)], self.bad)
-        # The three points that span all others, times what the formula multiplies them by; over a common factor.
-        self._zero = [-2 * entry for entry in P[0]]
-        self._one = P[1]
-        self._minus, self._minus_scale = P[-1], scales[-1]
-        self._divisor = abs(self.chi[0])
+        one = gamma * 0 + 1
+        self.psi = _window(1, [one * n for n in (1, 2, 3, 4)], numbers)
+        self.chi = _window(-2, [chi[n] for n in range(-2, 3)], numbers)
+        # The three points that span all others, times what the formula multiplies them by.
+        self._lifts = numbers.lifts([tuple(-2 * entry for entry in P[0]), P[1], P[-1]])
+        self._divisor = numbers.divisor(self.chi[0])
+        self._one = one
 
-    def point(self, chi: Sequence[fmpz], products: Sequence[fmpz], ratio: fmpq, next_ratio: fmpq) -> IntegerTriple:
-        """P_n, primitive, from chi at n-1, n, n+1 and products of psi.
+    def point(self, chi: Sequence[Any], products: Sequence[Any], ratio: Any, next_ratio: Any) -> Triple:
+        """P_n, primitive over Q, from chi at n-1, n, n+1 and products of psi.
 
         `products` are psi_{n-1} psi_{n+1}, psi_n psi_{n+1} and psi_{n-1} psi_n; `ratio` is (s_n/s_{n-1} of psi) over
         (that of chi), `next_ratio` the same for n + 1.
         """
-        last = self._minus_scale / next_ratio
-        common = ratio.q.lcm(last.q)
-        right, left = (ratio * common).p, (last * common).p
-        A, B, C = products[0] * chi[1], products[1] * chi[0], products[2] * chi[2]
-        raw = [
-            (common * zero) * A + (right * one) * B + (left * minus) * C
-            for zero, one, minus in zip(self._zero, self._one, self._minus, strict=True)
-        ]
-        return strip(raw, self.bad, self._divisor)
+        terms = [products[0] * chi[1], products[1] * chi[0], products[2] * chi[2]]
+        found: Triple = self.numbers.combined([self._one, ratio, 1 / next_ratio], terms, self._lifts, self._divisor)
+        return found
 
 
-def _window(first: int, values: Sequence[fmpq], bad: fmpz) -> Window:
-    integers, scales = [], []
-    for value in values:
-        integer, part = bad_part(value.p, bad)
-        integers.append(integer)
-        scales.append(fmpq(part, value.q))
-    return Window(first, integers, scales)
+def _window(first: int, values: Sequence[Any], numbers: Any) -> Window:
+    found = [numbers.split(value) for value in values]
+    return Window(first, [value for value, _ in found], [scale for _, scale in found])
 
 
-def start_near(block: IntegerBlock) -> TauStart | None:
+def start_near(block: Any) -> TauStart | None:
     """A base point P_0, P_1 or P_2 around which no value is zero; None where there is none, or a pole is near.
 
     chi_n can vanish for one n only, unless T is a torsion point; `block` must not be constant nor degenerate.
     """
-    before = _before(block, block.start)
-    around = [*before, *islice(block.triples(before[-1]), _BASES + 3)]
+    over_field, zero, one = block.lifts
+    lifts = _natural_lifts(over_field, zero, one, _BASES + 3)
     for base in range(_BASES):
-        if len(around) >= base + 7:
-            start = TauStart(block, around[base : base + 7], base)
+        if base - 3 in lifts and base + 3 in lifts:
+            around = [lifts[k] for k in range(base - 2, base + 3)]
+            start = TauStart(block.numbers, 1 - block.delta, around, base)
             if start.usable:
                 return start
     return None
 
 
-def _before(block: IntegerBlock, point: IntegerTriple) -> list[IntegerTriple]:
-    """P_{-3}, P_{-2}, P_{-1}."""
-    found: list[IntegerTriple] = []
-    for _ in range(3):
-        raw = block.block.preimage(point)
-        if raw == (0, 0, 0):
-            raw = point
-        point = primitive(raw)
-        found.insert(0, point)
-    return found
+def _natural_lifts(block: PlanarBlock, zero: Triple, one: Triple, until: int) -> dict[int, Triple]:
+    """P_{-3}, P_{-2}, ... up to a pole, from those of P_0 and P_1."""
+    P = {0: zero, 1: one}
+    for k in range(1, until):
+        if P[k - 1][2] == 0 or P[k][2] == 0:
+            break
+        P[k + 1] = _over(block.image(P[k]), P[k - 1][2])
+    for k in range(0, -3, -1):
+        if P[k + 1][2] == 0:
+            break
+        P[k - 1] = _over(block.preimage(P[k]), P[k + 1][2])
+    return {k: lift for k, lift in P.items() if k <= 0 or lift[2] != 0}
+
+
+def _over(triple: Triple, below: Any) -> Triple:
+    U, V, W = triple
+    return U / below, V / below, W / below

@@ -17,16 +17,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import islice
+from typing import Any
 
-from flint import fmpq, fmpz
-
-from kahanmaps.maps.normal_form.planar_integers import IntegerBlock, IntegerTriple, bad_part, divide_exactly
+from kahanmaps.maps.normal_form.planar_block import Triple
 from kahanmaps.maps.normal_form.tau import TauStart, start_near
 
 _FIRST = 4  # below it psi_{n-2} would be zero
+_SHARED = 8  # so many points are taken from one table, which holds some ten times the digits of a point then
 
 
-def triples(block: IntegerBlock) -> Iterator[IntegerTriple]:
+def triples(block: Any) -> Iterator[Triple]:
     """P_0, P_1, ... as `IntegerBlock.triples` gives them, up to signs, three times as fast.
 
     What the table has to remember is less than the points between n/2 and n themselves.
@@ -39,26 +39,33 @@ def triples(block: IntegerBlock) -> Iterator[IntegerTriple]:
     yield from TauTable(start).points()
 
 
-def iterate(block: IntegerBlock, n: int) -> IntegerTriple | None:
+def iterate(block: Any, n: int) -> Triple | None:
     """P_n, primitive, up to sign, for n >= 0; None where the table does not apply, so that one has to step.
 
     That is where the cubic is singular, T has small order, or n is small. Poles on the way are passed over.
     """
     if block.is_constant:
-        return block.start
-    start = _start(block)
-    if start is None or n - start.base < _FIRST:
+        at_rest: Triple = block.start
+        return at_rest
+    table = block.table
+    if table is None or table.points_taken >= _SHARED:
+        start = _start(block)
+        if start is None:
+            return None
+        table = block.table = TauTable(start)
+    if n - table.base < _FIRST:
         return None
-    return TauTable(start).point(n - start.base)
+    found: Triple = table.point(n - table.base)
+    return found
 
 
-def _start(block: IntegerBlock) -> TauStart | None:
+def _start(block: Any) -> TauStart | None:
     if block.is_constant or block.level is None or block.is_degenerate:
         return None
     return start_near(block)
 
 
-def _second_ratio(rho: Callable[[int], fmpq], n: int) -> fmpq:
+def _second_ratio(rho: Callable[[int], Any], n: int) -> Any:
     """rho_{n+1} rho_{n-1} / rho_n^2."""
     middle = rho(n)
     return rho(n + 1) * rho(n - 1) / (middle * middle)
@@ -71,8 +78,9 @@ class TauTable:
     """
 
     def __init__(self, start: TauStart) -> None:
-        self._start, self._bad = start, start.bad
-        self._gamma = (start.gamma.p, start.gamma.q)
+        self._start, self._gamma = start, start.gamma
+        self.base, self.points_taken = start.base, 0
+        self._one = start.gamma * 0 + 1
         psi, chi = start.psi, start.chi
         s = {n: psi.scale(n) for n in range(1, 5)}
         c = {n: chi.scale(n) for n in range(-1, 3)}
@@ -84,15 +92,15 @@ class TauTable:
         self._chi_t = {n: chi.t(n) for n in (0, 1)}
         self._r = {2: s[2] / s[1] * c[1] / c[2]}
         self._r_next = {1: s[2] / s[1] * c[0] / c[1]}  # (s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi)
-        self._divisors = (chi[0], chi[-1])
+        self._divisors = tuple(start.numbers.divisor(chi[n]) for n in (0, -1))
         self._divisor_scales = (c[0], c[-1])
         # Squares and products of neighbours, of psi and of chi.
-        self._psi_square: dict[int, fmpz] = {}
-        self._psi_around: dict[int, fmpz] = {}
-        self._chi_square: dict[int, fmpz] = {}
-        self._chi_around: dict[int, fmpz] = {}
+        self._psi_square: dict[int, Any] = {}
+        self._psi_around: dict[int, Any] = {}
+        self._chi_square: dict[int, Any] = {}
+        self._chi_around: dict[int, Any] = {}
 
-    def points(self) -> Iterator[IntegerTriple]:
+    def points(self) -> Iterator[Triple]:
         """P_4, P_5, ..., primitive, as long as the map has a value."""
         n, before = _FIRST, self.psi(_FIRST - 1) * self.psi(_FIRST)
         while True:
@@ -108,53 +116,48 @@ class TauTable:
             self._psi.pop(n // 2 - 6, None)
             self._chi.pop(n // 2 - 6, None)
 
-    def point(self, n: int) -> IntegerTriple:
+    def point(self, n: int) -> Triple:
         """P_n for n >= 4, primitive."""
+        self.points_taken += 1
         before, here, after = self.psi(n - 1), self.psi(n), self.psi(n + 1)
         chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
         return self._start.point(chi, [before * after, here * after, before * here], self.r(n), self.r(n + 1))
 
-    def psi(self, n: int) -> fmpz:
+    def psi(self, n: int) -> Any:
         """psi_n over its scale."""
         value = self._psi.get(n)
         if value is None:
             k = n // 2
             a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
             left = self.psi_around(a) * self.psi_square(b)
-            right = self.psi_around(b) * self.psi_square(a) if b > 1 else fmpz(0)  # psi_0 = 0
-            raw, below = self._combined(self.psi_t(a), left, self.psi_t(b) if b > 1 else fmpq(1), right, a, b)
-            value, part = bad_part(raw, self._bad)
+            right = self.psi_around(b) * self.psi_square(a) if b > 1 else left * 0  # psi_0 = 0
+            value, part = self._difference(self.psi_t(a), left, self.psi_t(b) if b > 1 else self._one, right, a, b)
             self._psi[n] = value
-            self._psi_rho[n] = fmpq(part, below if n % 2 else 2 * below)
+            self._psi_rho[n] = part if n % 2 else part / 2
         return value
 
-    def chi(self, n: int) -> fmpz:
+    def chi(self, n: int) -> Any:
         """chi_n over its scale."""
         value = self._chi.get(n)
         if value is None:
             a = n // 2
             b = n - a
             left, right = self.chi_around(a) * self.psi_square(b), self.psi_around(b) * self.chi_square(a)
-            raw, below = self._combined(self.chi_t(a), left, self.psi_t(b), right, a, b)
-            quotient = divide_exactly([raw], self._divisors[b - a])[0]
-            value, part = bad_part(quotient, self._bad)
+            value, part = self._difference(self.chi_t(a), left, self.psi_t(b), right, a, b, self._divisors[b - a])
             self._chi[n] = value
-            self._chi_rho[n] = fmpq(part, below) / self._divisor_scales[b - a]
+            self._chi_rho[n] = part / self._divisor_scales[b - a]
         return value
 
-    def _combined(self, t_a: fmpq, left: fmpz, t_b: fmpq, right: fmpz, a: int, b: int) -> tuple[fmpz, fmpz]:
-        """t_a left - t_b right, the square whose index alone is divisible by 3 times gamma; over the second number."""
-        first, second, below = t_a.p * t_b.q, t_b.p * t_a.q, t_a.q * t_b.q
+    def _difference(
+        self, t_a: Any, left: Any, t_b: Any, right: Any, a: int, b: int, divisor: Any = None
+    ) -> tuple[Any, Any]:
+        """t_a left - t_b right, the square whose index alone is divisible by 3 times gamma; value and scale."""
         if (a % 3 == 0) != (b % 3 == 0):
-            above, under = self._gamma
-            below = below * under
-            if b % 3 == 0:
-                first, second = first * above, second * under
-            else:
-                first, second = first * under, second * above
-        return first * left - second * right, below
+            t_a, t_b = (t_a * self._gamma, t_b) if b % 3 == 0 else (t_a, t_b * self._gamma)
+        found: tuple[Any, Any] = self._start.numbers.difference(t_a, left, t_b, right, divisor)
+        return found
 
-    def psi_square(self, n: int) -> fmpz:
+    def psi_square(self, n: int) -> Any:
         """psi_n^2."""
         found = self._psi_square.get(n)
         if found is None:
@@ -162,14 +165,14 @@ class TauTable:
             found = self._psi_square[n] = value * value
         return found
 
-    def psi_around(self, n: int) -> fmpz:
+    def psi_around(self, n: int) -> Any:
         """psi_{n+1} psi_{n-1}."""
         found = self._psi_around.get(n)
         if found is None:
             found = self._psi_around[n] = self.psi(n + 1) * self.psi(n - 1)
         return found
 
-    def chi_square(self, n: int) -> fmpz:
+    def chi_square(self, n: int) -> Any:
         """chi_n^2."""
         found = self._chi_square.get(n)
         if found is None:
@@ -177,14 +180,14 @@ class TauTable:
             found = self._chi_square[n] = value * value
         return found
 
-    def chi_around(self, n: int) -> fmpz:
+    def chi_around(self, n: int) -> Any:
         """chi_{n+1} chi_{n-1}."""
         found = self._chi_around.get(n)
         if found is None:
             found = self._chi_around[n] = self.chi(n + 1) * self.chi(n - 1)
         return found
 
-    def psi_t(self, n: int) -> fmpq:
+    def psi_t(self, n: int) -> Any:
         """t_n = s_{n+1} s_{n-1} / s_n^2 of psi, n >= 2."""
         found = self._psi_t.get(n)
         if found is None:
@@ -193,7 +196,7 @@ class TauTable:
             found = self._psi_t[n] = root * root * _second_ratio(self._rho_of_psi, n)
         return found
 
-    def chi_t(self, n: int) -> fmpq:
+    def chi_t(self, n: int) -> Any:
         """t_n of chi, n >= 0."""
         found = self._chi_t.get(n)
         if found is None:
@@ -202,7 +205,7 @@ class TauTable:
             found = self._chi_t[n] = root * root * _second_ratio(self._rho_of_chi, n)
         return found
 
-    def r(self, n: int) -> fmpq:
+    def r(self, n: int) -> Any:
         """(s_n / s_{n-1} of psi) / (s_n / s_{n-1} of chi), n >= 2."""
         found = self._r.get(n)
         if found is None:
@@ -216,19 +219,19 @@ class TauTable:
             self._r[n] = found
         return found
 
-    def _next(self, n: int) -> fmpq:
+    def _next(self, n: int) -> Any:
         """(s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi) = r_n t_n."""
         found = self._r_next.get(n)
         if found is None:
             found = self._r_next[n] = self.r(n) * self.psi_t(n)
         return found
 
-    def _rho_of_psi(self, n: int) -> fmpq:
+    def _rho_of_psi(self, n: int) -> Any:
         if n not in self._psi_rho:
             self.psi(n)
         return self._psi_rho[n]
 
-    def _rho_of_chi(self, n: int) -> fmpq:
+    def _rho_of_chi(self, n: int) -> Any:
         if n not in self._chi_rho:
             self.chi(n)
         return self._chi_rho[n]

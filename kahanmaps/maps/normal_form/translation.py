@@ -1,8 +1,15 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
-The formulas are those of `tau`, with natural lifts and without scales: over a finite field, or in balls, numbers do
-not grow. Where the level cubic is three lines (gamma = 0), Psi^3 is a projective map of each line: a 2 x 2 matrix to
-the power n. Where delta = 0 there is a formula for P_n: see `parabolic_ratio`.
+In balls the formulas are those of `tau`, with natural lifts and without scales: they lose the fewest bits. For exact
+elements fewer operations do. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is found by doublings and additions.
+With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y) the point is
+
+    P_n ~ chi_0 x (x - x_u) P_0 + chi_{-1} (Y - Y_u - m (x - x_u)) P_1 - chi_1 (Y - Y_u - m' (x - x_u)) P_{-1},
+
+m = (Y_u + 8 gamma)/x_u, m' = (Y_u - 8 gamma)/x_u, where u = (x_u, Y_u) is what the zero of chi is away from the base
+point (docs/mathematics.md). Where the
+level cubic is three lines (gamma = 0), Psi^3 is a projective map of each line: a 2 x 2 matrix to the power n. Where
+delta = 0 there is a formula for P_n: see `parabolic_ratio`.
 
 Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0
 before.
@@ -11,6 +18,7 @@ before.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from kahanmaps.errors import SingularStep
@@ -18,19 +26,21 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, determi
 
 # Base points that are tried until no small value vanishes that has to be divided by.
 _BASES = 12
-_SMALLEST = 24  # below this n one steps
+_STEPPED = 16  # up to this n one steps
 
 
 class NoTranslation(Exception):
     """Doubling does not apply to this orbit: it has to be stepped."""
 
 
-def iterate(block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], bool]) -> Triple:
+def iterate(
+    block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], bool], *, inexact: bool = False
+) -> Triple:
     """P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
-    `is_zero` decides whether an element is zero. Raises SingularStep where a pole is met before `n`, as far as the
-    orbit is stepped (a few points from the start); NoTranslation where the orbit is periodic with a small period or
-    meets too many special positions.
+    `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep where a
+    pole is met before `n`, as far as the orbit is stepped (a few points from the start); NoTranslation where it meets
+    too many special positions.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> F = GF(10007)
@@ -41,24 +51,24 @@ def iterate(block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], 
     >>> same_point(point, iterate(block, start, 100, F.is_zero))
     True
     """
-    points = _first_points(block, start, min(n, _BASES + 4), is_zero)
+    points = _first_points(block, [start], min(n, _STEPPED if n <= _STEPPED else 4), is_zero)
     if len(points) > n:
         return points[n]
-    period = next((k for k in range(1, len(points)) if same_point(points[k], points[0])), None)
-    if period is not None:
-        return points[n % period]
     above, below = block.level(start)
     if above == 0 or block.discriminant == 0:
         return _parabolic(block, start, n)
     level = above / below
     gamma = 1 - block.discriminant * level * level
     if is_zero(gamma):
+        points = _first_points(block, points, n % 3 + 10, is_zero)
         return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
-    for base in range(3, len(points) - 3):
-        if n - base < 8:
-            break
-        small = _small_values(block, points[base - 3 : base + 4], is_zero)
-        if small is not None:
+    for base in range(3, _BASES + 3):
+        points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
+        if not inexact:
+            found = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
+            if found is not None:
+                return found
+        elif n - base >= 8 and (small := _small_values(block, points[base - 3 : base + 4], is_zero)) is not None:
             return _doubled(small, gamma, n - base)
     raise NoTranslation
 
@@ -99,16 +109,16 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
     return u, v, rest * below
 
 
-def _first_points(block: PlanarBlock, start: Triple, count: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
-    """P_0, P_1, ...: natural lifts as soon as there are two. Raises SingularStep at a pole."""
-    points = [start]
-    for k in range(count):
-        U, V, W = block.image(points[-1])
+def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
+    """P_0, P_1, ..., P_last: natural lifts as soon as there are two. Raises SingularStep at a pole."""
+    points = list(points)
+    for k in range(len(points) - 1, last):
+        U, V, W = block.image(points[k])
         if is_zero(W):
             raise SingularStep(f"the map has no value at step {k}")
         if k:
-            below = points[-2][2]
-            U, V, W = U / below, V / below, W / below
+            inverse = 1 / points[k - 1][2]
+            U, V, W = U * inverse, V * inverse, W * inverse
         points.append((U, V, W))
     return points
 
@@ -148,6 +158,88 @@ def _power_applied(matrix: tuple[Any, Any, Any, Any], n: int) -> tuple[Any, Any]
         if n:
             a, b, c, d = a * a + b * c, b * (a + d), c * (a + d), d * d + b * c
     return x, y
+
+
+def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
+    """P_n relative to the third of five consecutive points, n > 0; None where a value vanishes that should not."""
+    P = dict(zip(range(-2, 3), points, strict=False))
+    chi = {
+        -1: determinant(P[-2], P[0], P[1]),
+        0: 3 * determinant(P[-1], P[0], P[1]),
+        1: determinant(P[-1], P[0], P[2]),
+        2: determinant(P[-1], P[1], P[2]),
+    }
+    if any(is_zero(value) for value in chi.values()):
+        return None
+    Q = _multiple_of_T(gamma, n, is_zero)
+    if Q is None:
+        return P[0]
+    x, Y = Q
+    ratio = 1 / (chi[0] * chi[2] * chi[-1])
+    x_u = -4 * chi[-1] * chi[1] * (ratio * chi[2] * chi[-1]) * (ratio * chi[2] * chi[-1])
+    eight = 8 * gamma
+    Y_u = -(chi[1] * chi[0] * chi[0] * ratio * x_u * (3 * gamma + x_u) + 3 * x_u + eight)
+    along, rise = x - x_u, Y - Y_u
+    slope = along / x_u
+    A, B = chi[0] * x * along, chi[-1] * (rise - (Y_u + eight) * slope)
+    C = -chi[1] * (rise - (Y_u - eight) * slope)
+    U, V, W = (A * p + B * q + C * r for p, q, r in zip(P[0], P[1], P[-1], strict=True))
+    return None if all(map(is_zero, (U, V, W))) else (U, V, W)
+
+
+def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[Any, Any] | None:
+    """(x, Y) of n T, n > 0; None for zero. The digits of n are odd ones from -3 to 3, with zeros between."""
+    # With x + shift for x the curve is Y^2 = x^3 + c x + ...
+    one, shift, c = gamma / gamma, 3 + gamma, -3 * (gamma - 1) * (gamma - 9)
+    table = {1: (shift, 8 * gamma), 3: (shift - 32 * one / 9, 224 * one / 27 - 8 * gamma)}
+    table |= {-k: (x, -y) for k, (x, y) in table.items()}
+    point: tuple[Any, Any] | None = None
+    for digit, zeros in _digits(n):
+        x, y = table[digit]
+        if point is None:
+            point = x, y
+        else:
+            X, Y = point
+            run, rise = x - X, y - Y
+            if not is_zero(run):
+                slope = rise / run
+                X = slope * slope - X - x
+                point = X, slope * (x - X) - y
+            else:
+                point = _times_power(x, y, c, 1) if is_zero(rise) else None
+        if point is not None:
+            point = _times_power(*point, c, zeros)
+    return None if point is None else (point[0] - shift, point[1])
+
+
+def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
+    """2^count times the point (x, y), None for zero. Sums instead of multiples: for FLINT's numbers they are faster."""
+    try:
+        for _ in range(count):
+            square = x * x
+            slope = (square + square + square + c) / (y + y)
+            X = slope * slope - x - x
+            x, y = X, slope * (x - X) - y
+    except ZeroDivisionError:
+        return None
+    return x, y
+
+
+@lru_cache(maxsize=16)
+def _digits(n: int) -> list[tuple[int, int]]:
+    """Odd digits from -3 to 3 of n > 0, from the highest on, each with the number of binary places to the next.
+
+    >>> _digits(100)
+    [(3, 3), (1, 2)]
+    """
+    found, places = [], 0
+    while n:
+        zeros = (n & -n).bit_length() - 1
+        n, places = n >> zeros, zeros
+        digit = (n + 4) % 8 - 4
+        found.append((digit, places))
+        n -= digit
+    return found[::-1]
 
 
 def _small_values(

@@ -1,0 +1,290 @@
+"""A plane over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t], and back to Q.
+
+All that holds in a plane over Q (`planar_integers`, `tau`) holds over K prime ideal by prime ideal: outside the bad
+primes natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short
+at one root of g and long at another. So a value is multiplied by a short element of the lattice of those that take its
+bad part away, with the lengths at the roots for weights: LLL finds one. Which one is free, since the product of value
+and scale is exact.
+
+A point (U : V : W) comes back to rational numbers as U W'/N and V W'/N with N = W W', the norm of W.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, lru_cache, reduce
+from itertools import product
+from typing import Any
+
+from flint import fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
+
+from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
+from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock, radical, without
+
+_SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
+_FLOAT = 50  # bits of a length
+_KARATSUBA = 8000  # bits from which on `_times` is faster
+
+
+class AlgebraBlock(LevelBlock):
+    """One plane over K with g integral: `block` is the cubic, `start` has the triple (2 eps u : 2 eps v : 1)."""
+
+    def __init__(self, block: PlanarBlock, start: Triple, scale: fmpq) -> None:
+        self.block, self.start, self.scale = block, start, scale
+        self.algebra: EtaleAlgebra = start[0].field
+
+    @cached_property
+    def bad(self) -> fmpz:
+        """An integer with all primes at which the lifts of start and image may not be primitive, and all small ones."""
+        assert self.level is not None
+        cubic, g = self.block, self.algebra.chi
+        disc = cubic.discriminant
+        numbers = [fmpz(6), g.resultant(g.derivative()).p, self.level.polynomial.denom(), *map(fmpz, SMALL_PRIMES)]
+        numbers += [e.polynomial.denom() for e in (cubic.a, cubic.b, cubic.c, cubic.d, disc, *self.start)]
+        if disc != 0:
+            numbers.append(self.algebra.norm(disc).p)
+        image = [self.algebra.norm(entry) for entry in self.lifts[2]]
+        numbers += [reduce(fmpz.gcd, [norm.p for norm in image], fmpz(0)), *(norm.q for norm in image)]
+        return radical(*numbers)
+
+    @cached_property
+    def numbers(self) -> ShortElements:
+        """How values of tau functions are kept."""
+        return ShortElements(self.algebra, self.bad)
+
+    @cached_property
+    def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
+        """The cubic, and lifts of the start and its image; their contents are in `bad`."""
+        return self.block, self.start, self.block.image(self.start)
+
+    def triples(self) -> Iterator[Triple]:
+        """P_0, P_1, ... with W = 1, as long as there is a value."""
+        U, V, W = self.start
+        one = W
+        while True:
+            yield U, V, one
+            if self.is_constant:
+                continue
+            U, V, W = self.block.image((U, V, one))
+            if W == 0:
+                return
+            U, V = U / W, V / W
+
+    @property
+    def primes(self) -> list[fmpz]:
+        """Numbers with primes at which a sum of coordinates may cancel that does not elsewhere."""
+        return [self.bad]
+
+    def bits(self, triple: Triple) -> tuple[int, int]:
+        """About the bit lengths of numerators and denominator of `fraction`."""
+        U, V, W = (_bits(entry) for entry in triple)
+        if triple[2].polynomial.degree() == 0:
+            below = int(sum(entry.polynomial.denom().bit_length() for entry in triple))
+            return max(U, V) + below, W + below
+        return (self.algebra.degree - 1) * W + max(U, V), self.algebra.degree * W
+
+    @property
+    def slack(self) -> int:
+        """By so much `bits` may be wrong."""
+        largest = max(abs(entry.p) for entry in self.algebra.chi.coeffs())
+        return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
+
+    def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
+        """Numerators of the coefficients of U/W and V/W, the denominator, and an integer whose primes may cancel.
+
+        Outside the primes of the third number there is one prime ideal of degree 1 above a prime of the denominator.
+        """
+        U, V, W = triple
+        if W.polynomial.degree() == 0:
+            above, below = [e for z in (U, V) for e in (z / W).coefficients], fmpz(1)
+            for entry in above:
+                below = below.lcm(entry.q)
+            return [(entry * below).p for entry in above], below, below
+        cofactor, norm = _adjugate(W)
+        below = norm.p
+        above = [entry.p for z in (U, V) for entry in _times(z, cofactor).coefficients]
+        return above, below, reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
+
+    def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
+        """A number with the primes at which form and denominator may cancel; None if they may at all.
+
+        The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K.
+        """
+        g, degree = self.algebra.chi, self.algebra.degree
+        dual = [self.algebra.convert(fmpq_poly([g[j] for j in range(k + 1, degree + 1)])) for k in range(degree)]
+        alpha, beta = (
+            sum((c * e for c, e in zip(half, dual, strict=True)), self.algebra.zero)
+            for half in (form[:degree], form[degree:])
+        )
+        value = self.block.h(beta, -alpha)
+        if value == 0:
+            return None
+        norm = self.algebra.norm(value)
+        return norm.p * norm.q
+
+    @staticmethod
+    def integral(triple: Triple) -> Triple:
+        """A triple over K with W = 1."""
+        U, V, W = triple
+        return triple if W == 0 else (U / W, V / W, W / W)
+
+    def residue_map(self, prime: int) -> Callable[[EtaleElement], int] | None:
+        """A homomorphism to the residues modulo a prime, None where g has no root there."""
+        g = nmod_poly([int(c.p) for c in self.algebra.chi.coeffs()], prime)
+        root = next((-factor[0] / factor[1] for factor, _ in g.factor()[1] if factor.degree() == 1), None)
+        if root is None:
+            return None
+
+        def residue(element: EtaleElement) -> int:
+            above, below = element.polynomial.numer(), element.polynomial.denom()
+            return int(nmod_poly([int(c % prime) for c in above.coeffs()], prime)(root) / int(below % prime))
+
+        return residue
+
+    @staticmethod
+    def same(P: Triple, Q: Triple) -> bool:
+        """Whether two triples are one point."""
+        return same_point(P, Q)
+
+
+class ShortElements:
+    """Values of tau functions over K: elements of Z[t] with short coefficients, each times a scale in K."""
+
+    def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
+        self._algebra, self._bad, self._power = algebra, bad, bad**3
+        found: Any = algebra.chi.complex_roots()
+        roots = [complex(float(root.real), float(root.imag)) for root, _ in found]
+        self._powers = [[root**k for k in range(algebra.degree)] for root in roots if root.imag >= 0]
+
+    def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
+        """A value, not zero: short element and scale."""
+        multiplier = self._multiplier(value)
+        return (value, self._algebra.one) if multiplier is None else (value * multiplier, 1 / multiplier)
+
+    @staticmethod
+    def divisor(value: EtaleElement) -> EtaleElement:
+        """What `difference` and `combined` take for a division by this element."""
+        return 1 / value
+
+    def difference(
+        self, s: EtaleElement, left: EtaleElement, t: EtaleElement, right: EtaleElement, inverse: Any = None
+    ) -> tuple[EtaleElement, EtaleElement]:
+        """s left - t right, times the inverse if there is one: short element and scale."""
+        if inverse is not None:
+            s, t = s * inverse, t * inverse
+        # One reduction modulo g for both products.
+        value = EtaleElement(
+            self._algebra,
+            (s.polynomial * left.polynomial - t.polynomial * right.polynomial) % self._algebra.chi,
+        )
+        return (value, self._algebra.one) if value == 0 else self.split(value)
+
+    @staticmethod
+    def lifts(points: Sequence[Triple]) -> Sequence[Triple]:
+        """The triples as they are."""
+        return points
+
+    def combined(
+        self, scales: Sequence[Any], terms: Sequence[Any], lifts: Sequence[Triple], inverse: EtaleElement
+    ) -> Triple:
+        """The sum of scale times term times lift, times the inverse, in Z[t] and without a common integer factor."""
+        g, factors = self._algebra.chi, [(scale * inverse).polynomial for scale in scales]
+        raw = []
+        for i in range(3):
+            total = fmpq_poly([0])
+            for factor, term, lift in zip(factors, terms, lifts, strict=True):
+                total += (factor * lift[i].polynomial % g) * term.polynomial
+            raw.append(total % g)
+        below = fmpz(1)
+        for entry in raw:
+            below = below.lcm(entry.denom())
+        U, V, W = (EtaleElement(self._algebra, entry if below == 1 else entry * below) for entry in raw)
+        return U, V, W
+
+    def _multiplier(self, value: EtaleElement) -> EtaleElement | None:
+        """What makes a value short; None if it is."""
+        degree, below = self._algebra.degree, value.polynomial.denom()
+        integers = [(entry * below).p for entry in value.coefficients]
+        residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
+        part = self._power.gcd(self._algebra.norm(residue).p % self._power)
+        lengths = self._lengths(integers)
+        if below == 1 and part < _SHORT and max(lengths) < _SHORT * min(lengths):
+            return None
+        # All b with b value = 0 modulo `part`.
+        rows = (residue.matrix.transpose() if part != 1 else residue.matrix).numer_denom()[0].tolist()
+        big = [[entry % part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)]
+        big += [[part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
+        lattice = fmpz_mat([row[degree:] for row in fmpz_mat(big).hnf().tolist()[degree:]])
+        scale = [2.0**60 * max(length / max(lengths), 2.0**-_FLOAT) for length in lengths]
+        table = [
+            [fmpz(int(s * x)) for powers, s in zip(self._powers, scale, strict=True) for x in _parts(powers, k)]
+            for k in range(degree)
+        ]
+        _, change = (lattice * fmpz_mat(table)).lll(True)
+        rows = (change * lattice).tolist()
+        for signs in _signs(degree):
+            row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
+            short = self._algebra.convert(fmpq_poly(row))
+            if without(self._algebra.norm(short).p, self._bad) in (1, -1):
+                return short * fmpq(below, part)
+        return None if below == 1 else self._algebra.convert(below)
+
+    def _lengths(self, integers: Sequence[fmpz]) -> list[float]:
+        """The absolute values at the roots, up to a common factor."""
+        shift = max(0, max(entry.bit_length() for entry in integers) - 2 * _FLOAT)
+        floats = [float(entry >> shift) for entry in integers]
+        smallest = max(map(abs, floats)) * 2.0**-_FLOAT
+        return [
+            max(smallest, abs(sum(c * power for c, power in zip(floats, powers, strict=True))))
+            for powers in self._powers
+        ]
+
+
+@lru_cache
+def _signs(count: int) -> list[tuple[int, ...]]:
+    """All vectors of -1, 0 and 1 but 0, up to sign, those with few entries first."""
+    found = sorted(product((0, 1, -1), repeat=count), key=lambda signs: (sum(map(abs, signs)), signs[::-1]))
+    return [signs for signs in found if next((s for s in signs if s), 0) > 0]
+
+
+def _parts(powers: Sequence[complex], k: int) -> list[float]:
+    """The k-th power of a root, as real and imaginary part unless the root is real."""
+    return [powers[k].real] if powers[1].imag == 0 else [powers[k].real, powers[k].imag]
+
+
+def _times(first: EtaleElement, second: EtaleElement) -> EtaleElement:
+    """The product of two elements of Z[t].
+
+    FLINT multiplies each coefficient by each; with a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j it is
+    one product for each pair.
+    """
+    if _bits(first) < _KARATSUBA:
+        return first * second
+    a, b = ([entry.p for entry in element.coefficients] for element in (first, second))
+    squares = [x * y for x, y in zip(a, b, strict=True)]
+    terms = [fmpz(0)] * (2 * len(a) - 1)
+    for i in range(len(a)):
+        terms[2 * i] += squares[i]
+        for j in range(i):
+            terms[i + j] += (a[i] + a[j]) * (b[i] + b[j]) - squares[i] - squares[j]
+    return EtaleElement(first.field, fmpq_poly(terms) % first.field.chi)
+
+
+def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:
+    """W' and the norm N = W W', by Faddeev and LeVerrier's recursion: traces instead of determinants."""
+    algebra, power = W.field, W
+    for k in range(1, algebra.degree):
+        cofactor = power - algebra.trace(power) / k
+        if k < algebra.degree - 1:
+            power = W * cofactor
+    # Of the last product only one coefficient is wanted.
+    norm, shifted = fmpq(0), cofactor
+    for entry in W.coefficients:
+        norm += entry * shifted.polynomial[0]
+        shifted = shifted * algebra.generator
+    return cofactor, norm
+
+
+def _bits(element: EtaleElement) -> int:
+    return max((int(abs(entry.p).bit_length()) for entry in element.polynomial.coeffs()), default=1)
