@@ -1,6 +1,6 @@
 """All benchmarks (`make bench`): runs them, prints ratios, and writes results.json here and docs/benchmarks.md.
 
-    python benchmarks/run.py [--quick] [--only exact|fields|catalogue|iterate|float|degrees] [--page]
+    python benchmarks/run.py [--quick] [--only exact|fields|catalogue|iterate|float|degrees|analysis] [--page]
 
 --quick takes less than a minute, on shorter orbits, and writes nothing; --only runs one part, and leaves what is on
 record of the others as it is; --page runs nothing and writes the page anew from the record. Peers that are absent are
@@ -21,6 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import bench_analysis
 import bench_catalogue
 import bench_degrees
 import bench_exact
@@ -31,7 +32,7 @@ from work import Absent, Row, format_ratio, gp_version, say, table
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results.json"
 PAGE = HERE.parent / "docs" / "benchmarks.md"
-PARTS = ("exact", "fields", "catalogue", "iterate", "float", "degrees")
+PARTS = ("exact", "fields", "catalogue", "iterate", "float", "degrees", "analysis")
 PACKAGES = ("python-flint", "numpy", "cypari", "gmpy2", "sympy", "scipy", "numba", "heyoka")
 FLOAT = "Float orbits"
 
@@ -71,6 +72,8 @@ def measured(part: str, quick: bool) -> list[Row]:
         return bench_iterate.measure(quick)
     if part == "degrees":
         return bench_degrees.measure(quick)
+    if part == "analysis":
+        return bench_analysis.measure(quick)
     if quick:
         say("  left out: there is no quick form of it")
         return []
@@ -250,9 +253,15 @@ GROUPS = {
         "the flow, and are what one would use instead."
     ),
     bench_degrees.GROUP: (
-        "Time relative to kahanmaps, which walks two lines with different primes and compares them; the peers walk\n"
-        "one line modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does itself up to dimension 5; in\n"
-        "dimension 6 it takes power series."
+        "Time relative to kahanmaps, which walks two lines with different primes, compares them, and explains the\n"
+        "degrees by the singularities, which is most of the time where iterates are few. The peers walk two lines\n"
+        "modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does itself up to dimension 5; in dimension 6 it\n"
+        "takes power series."
+    ),
+    bench_analysis.GROUP: (
+        "Time relative to what `analyze` does first to count integrals: how many polynomials of each degree vanish\n"
+        "along orbits modulo two primes. All of `analyze` includes degree 7, formulas, densities, proofs, degrees,\n"
+        "singularities and symmetries."
     ),
 }
 

@@ -19,7 +19,7 @@ def _scripts(monkeypatch):
     """The scripts import each other by name, as they do when they are run."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     yield
-    for name in ("work", "run", "bench_exact", "bench_catalogue", "bench_iterate", "bench_degrees"):
+    for name in ("work", "run", "bench_exact", "bench_catalogue", "bench_iterate", "bench_degrees", "bench_analysis"):
         sys.modules.pop(name, None)
 
 
@@ -91,6 +91,15 @@ def test_the_jump_the_steps_and_nmod_mat_agree():
     assert bench_iterate.jump(work.work(), 30)[1] == bench_iterate.step(work.work(), 30)[1]
     assert bench_iterate.jump_modulo(work.work(), 50)[1] == bench_iterate.step_modulo(work.work(), 50)[1]
     assert bench_iterate.in_balls(work.work(), n=100, bits=200, check=8)
+
+
+@pytest.mark.parametrize("name", ["three_wave", "euler_top"])
+def test_both_count_the_same_relations_along_orbits(name):
+    import bench_analysis
+
+    found = bench_analysis.ours(load(name), 2)
+    assert bench_analysis.by_hand(load(name), 2) == found
+    assert found[1] > 0
 
 
 def test_the_walkers_of_a_line_agree():
