@@ -108,8 +108,13 @@ class FunctionField(Field):
                 return Function(self, above / common, below / common)
         return Function(self, above, below)
 
-    def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function:
-        """The value of a polynomial over Q by Horner's rule, homogeneous in entries with a denominator in common."""
+    def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function | None:
+        """The value of a polynomial over Q by Horner's rule, homogeneous in entries with a denominator in common.
+
+        None in a field that reduces: there every term is put into lowest terms before it is added.
+        """
+        if self.reduces:
+            return None
         columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
         used = [(point[k], powers) for k, powers in columns if any(powers)]
         below: list[fmpq_mpoly] = []  # none of which divides another
@@ -250,10 +255,11 @@ class FunctionMatrix(EntryMatrix):
         rows, _ = FunctionMatrix(self.field, n, n + columns, wide)._polynomial_rows()
         solution: list[list[Function]] = []
         for j in range(n, n + columns):
-            *above, below = _minors(self.field, [[*row[:n], row[j]] for row in rows])
-            if self.field.vanishes(below):
+            *above, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
+            if self.field.vanishes(last):
                 raise ZeroDivisionError("singular matrix in solve()")
-            solution.append([Function(self.field, -entry, below) for entry in above])
+            sign = -1 if n % 2 else 1  # the denominator is the determinant itself, as elsewhere
+            solution.append([Function(self.field, entry * -sign, last * sign) for entry in above])
         return FunctionMatrix(self.field, n, columns, [entry for row in zip(*solution, strict=True) for entry in row])
 
     def _part(self, rows: Sequence[int], columns: Sequence[int]) -> FunctionMatrix:

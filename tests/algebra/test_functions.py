@@ -117,6 +117,15 @@ def test_matrices_with_zeros_agree_with_numbers(pattern):
     assert [value(one, POINT) for one in solution.entries()] == expected.entries()
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 8])
+def test_the_denominator_of_a_solution_is_the_determinant(n):
+    # With its sign: quotients by D and by -D would have no simple common denominator in what follows.
+    x, y = FIELD.variables
+    matrix = FIELD.matrix(n, n, [x if i == j else y * FIELD.convert(i - j) for i in range(n) for j in range(n)])
+    solution = matrix.solve(FIELD.column([y] * n)).entries()
+    assert {str(entry.below) for entry in solution} == {str(matrix.det().above)}
+
+
 def test_a_singular_matrix_is_refused():
     x, y = FIELD.variables
     with pytest.raises(ZeroDivisionError):
