@@ -163,6 +163,10 @@ class _Floats:
         return to_float(rational(value))
 
     @staticmethod
+    def value(polynomial: Any, point: Sequence[float]) -> None:
+        """None: there is no other way than term by term."""
+
+    @staticmethod
     def is_zero(value: float) -> bool:
         return value == 0.0
 
