@@ -79,6 +79,7 @@ class Solutions:
     unsolved: list[Component] = field(default_factory=list)
     conjugate: list[Component] = field(default_factory=list)
     irrational: list[str] = field(default_factory=list)
+    without_basis: list[Component] = field(default_factory=list)  # of the unsolved, those with too large a one
     reason: str = ""  # why something is unsolved
 
     @property
@@ -250,6 +251,7 @@ class _Solver:
         basis = groebner(equations)
         if basis is None:
             self._give_up(equations, values, "a Groebner basis would be too large")
+            self.found.without_basis.append(Component(values, tuple(equations)))
             return
         self.solve(basis, values, based=True)
 

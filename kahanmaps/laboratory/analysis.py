@@ -292,9 +292,9 @@ def analyze(
             ]
 
     parts: list[tuple[str, Callable[[], None]]] = [
-        ("the vector field", vector_field),
         ("hamiltonian structure", hamiltonian),
         ("the commuting family", family),
+        ("the vector field", vector_field),
         ("degrees", degrees),
         ("integrals", integrals),
         ("densities", densities),

@@ -75,7 +75,7 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
     >>> from kahanmaps.algebra.roots import parse_root
     >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
     >>> primitive_over(parse_root("root of t^2 - 2"), (a*x + 6*y) * (1 - a*eps), 2)
-    x*a + 6*y
+    3*y*a + x
     """
     K = root.number_field
     parts: dict[tuple[int, ...], list[EtaleElement]] = {}

@@ -105,7 +105,7 @@ def fixed_points(system: QuadraticSystem, seconds: float = 10) -> FixedPointSear
     solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), time.monotonic() + seconds)
     found, undecided = [_on(system, part, []) for part in solved.components], ""
     for part in (*solved.conjugate, *solved.unsolved):
-        basis = groebner(part.equations)
+        basis = None if part in solved.without_basis else groebner(part.equations)
         if basis is None:
             undecided = solved.reason or "a Groebner basis would be too large"
         elif not any(p.is_constant() for p in basis):
