@@ -24,9 +24,9 @@ from kahanmaps.laboratory.singular.singularities import Patterns
 
 FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (
-    "the vector field",
     "hamiltonian structure",
     "the commuting family",
+    "the vector field",
     "degrees",
     "integrals",
     "densities",
