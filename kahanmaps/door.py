@@ -16,10 +16,13 @@ from kahanmaps.errors import InputError
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
+    from kahanmaps.family.associated import AssociatedSystem, FamilyMember
     from kahanmaps.maps.implicit import BirationalMap
+    from kahanmaps.systems.hamiltonian import CubicHamiltonian
     from kahanmaps.systems.quadratic import QuadraticSystem
 
-    Given = str | Path | SystemFile | QuadraticSystem | BirationalMap
+    Member = FamilyMember | AssociatedSystem | CubicHamiltonian
+    Given = str | Path | SystemFile | QuadraticSystem | BirationalMap | Member
     P = ParamSpec("P")
     R = TypeVar("R", covariant=True)
 
@@ -70,6 +73,8 @@ def opened(function: Callable[Concatenate[Any, P], R]) -> Opened[P, R]:
         if "eps" in options and "settings" in names and "eps" not in names:
             from kahanmaps.checks.settings import Settings
 
+            if "extra" in names and others and not isinstance(others[0], Settings):
+                options["extra"], others = others[0], others[1:]
             options["settings"] = Settings(eps=options.pop("eps"))
         if "other" in names and others:
             others = (_file(others[0]), *others[1:])
