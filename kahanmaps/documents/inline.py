@@ -12,6 +12,7 @@ from kahanmaps.documents.expressions import formula_text, number, sides_of_equat
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.maps.implicit import MapOver
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -94,5 +95,7 @@ def file_of(given: Any) -> SystemFile:
         return System(given)
     if isinstance(given, str | Path):
         return load(given)
+    if isinstance(given, MapOver):
+        raise InputError(f"found {given!r}, a map at one eps, expected what it was made of, and eps=")
     kind = type(given).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.floats.doubles import FloatArray, to_float
+from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -118,7 +118,7 @@ def lyapunov_exponents(
         )
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
-    x: FloatArray = np.atleast_2d(np.array(starts, dtype=np.float64))
+    x = start_rows(starts)
     map_ = as_map(given).rounded
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
