@@ -47,16 +47,24 @@ def test_algebraic_numbers_of_sympy_are_values_of_parameters():
     for text, symbol in zip(step, (x1, y1), strict=True):
         found = sympy.sympify(text.replace("^", "**")).subs(t, (1 + sympy.sqrt(5)) / 2)
         assert sympy.simplify(found - by_hand[symbol].subs(sympy.GoldenRatio, (1 + sympy.sqrt(5)) / 2)) == 0
+    inside = km.System({x: y, y: sympy.GoldenRatio * x - x**2})
+    assert km.orbit(inside, [1, 2], "1/10", 1)[1].text == step
+    for text, number in (("sqrt(2)", sympy.sqrt(2)), ("-sqrt(2/9)", -sympy.sqrt(2) / 3), ("sqrt(-1)", sympy.I)):
+        assert km.load("euler_top", a1=text) == km.load("euler_top", a1=number)
+    with pytest.raises(InputError, match="expected an irreducible"):
+        km.load("euler_top", a1="sqrt(4)")
     assert km.load("euler_top", a1=sympy.sqrt(2)) == km.load("euler_top", a1="root of t^2 - 2 near 1.4")
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: km.System({x: y, y: sympy.sqrt(2) * x}), r"found sqrt\(2\) .* is the value of a parameter"),
+        (lambda: km.System({x: sympy.sqrt(3) * y, y: sympy.sqrt(2) * x}), r"found sqrt.* is the value of a parameter"),
+        (lambda: km.check_integrals("weierstrass", sympy.sqrt(2) * x), r"found sqrt\(2\) .* is the value"),
+        (lambda: km.System({x: y, y: sympy.pi * x}), "found pi, expected a rational or an algebraic"),
         (lambda: km.System("x' = a*x", a=sympy.pi), "found pi, expected a rational or an algebraic number"),
         (lambda: km.load("euler_top", a1=sympy.pi), "found pi, expected"),
-        (lambda: km.System("x' = a*x", a="sqrt(2)"), r"root of t\^2 - 2"),
+        (lambda: km.System("x' = a*x", a="1 + sqrt(2)"), r"root of t\^2 - 2"),
         (lambda: km.System("x' = a*x"), r"System\(..., NAME=VALUE\)"),
         (lambda: km.System(None), "found a NoneType, expected equations"),
         (lambda: km.System([y, x]), "2 right-hand sides without variables"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
@@ -64,6 +65,27 @@ def test_nothing_is_shown_at_screen_length():
         assert len(repr(value)) < 300
         assert " object at " not in repr(value)
     assert str(km.System(FISH)).splitlines() == ["inline:", "q' = p", "p' = q^2 - q"]
+
+
+def test_every_result_is_plain_data():
+    member = km.draw_with_eigenvalues([1, -2], seed=3)
+    for found in (
+        km.analyze("weierstrass", seconds=2),
+        km.check_integrals("euler_top"),
+        km.cycles(FISH, "1/7", 11),
+        km.lyapunov(FISH, [0.5, 0.25], "1/50", 20),
+        km.singularities(FISH, "1/10"),
+        km.constant_structures(FISH),
+        km.orbit_period(km.normal_form(member), "1/10", [1, 0, 1, 1], 10007),
+        km.degrees(FISH, max_terms=4),
+        km.heights(FISH, "1/5", starts=1, steps=20),
+        km.find_symmetry(FISH),
+    ):
+        data = found.to_json()
+        assert json.loads(json.dumps(data))
+        assert " object at " not in json.dumps(data)
+    assert km.cycles(FISH, "1/7", 11).to_json()["eps"] == "1/7"
+    assert km.constant_structures(FISH).to_json()["forms"] == [[["0", "1"], ["-1", "0"]]]
 
 
 def test_a_map_at_one_eps_has_orbits():

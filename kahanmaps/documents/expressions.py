@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import count
 from typing import Any
 
 from kahanmaps.algebra.fields import rational
@@ -24,17 +25,29 @@ def formula_text(value: Any) -> str:
         return str(rational(value))
     if not _is_sympy(value):
         return str(value)
-    from sympy import Float, preorder_traversal
-
-    for part in preorder_traversal(value):
-        if isinstance(part, Float):
+    for part in _irrational(value):
+        if part.is_Float:
             rational(float(part))  # refused, in the words for floats
-        if getattr(part, "is_number", False) and not part.is_Rational and part.func.__name__ not in ("Add", "Mul"):
-            raise InputError(
-                f"found {part} in {value}, expected rational numbers and names: "
-                f"an algebraic number is the value of a parameter, System(..., a={part})"
-            )
+        raise InputError(
+            f"found {part} in {value}, expected rational numbers and names: "
+            f"an algebraic number is the value of a parameter, System(..., a={part})"
+        )
     return str(value)
+
+
+def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
+    """Expressions of SymPy with a name for the one irrational number in them, if it is one, and its value."""
+    from_sympy = [side for side in sides if _is_sympy(side)]
+    found = {part for side in from_sympy for part in _irrational(side)}
+    if len(found) != 1 or any(part.is_Float for part in found):
+        return list(sides), {}
+    from sympy import Symbol
+
+    [value] = found
+    known = {str(one) for side in from_sympy for one in side.free_symbols}.union(taken)
+    name = next(name for k in count() if (name := f"r{k or ''}") not in known)
+    named = {value: Symbol(name)}
+    return [side.xreplace(named) if _is_sympy(side) else side for side in sides], {name: value}
 
 
 def number(value: Any) -> Any:
@@ -66,6 +79,17 @@ def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
             raise InputError(f"found {one}, expected a first derivative on the left: Eq(x(t).diff(t), y(t))")
     names = {one.lhs.expr: Symbol(one.lhs.expr.func.__name__) for one in equations}
     return {str(names[one.lhs.expr]): one.rhs.subs(names) for one in equations}
+
+
+def _irrational(value: Any) -> Iterator[Any]:
+    """The numbers in an expression of SymPy that are not rational, as far as sums and products do not hide them."""
+    from sympy import preorder_traversal
+
+    parts = preorder_traversal(value)
+    for part in parts:
+        if getattr(part, "is_number", False) and not (part.is_Rational or part.is_Add or part.is_Mul):
+            parts.skip()
+            yield part
 
 
 def _is_sympy(value: Any) -> bool:

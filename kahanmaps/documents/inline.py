@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.expressions import formula_text, number, sides_of_equations
+from kahanmaps.documents.expressions import formula_text, number, roots_named, sides_of_equations
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
@@ -68,6 +68,9 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
         variables, equations = list(equations), list(equations.values())
     elif not isinstance(equations, str) and variables is None and not any("=" in str(one) for one in equations):
         raise InputError(f"found {len(equations)} right-hand sides without variables, expected these too: x, y, ...")
+    if not isinstance(equations, str):
+        equations, roots = roots_named(equations, [*map(str, variables or ()), *parameters])
+        parameters |= roots
     rhs = equations if isinstance(equations, str) else [formula_text(one) for one in equations]
     if isinstance(variables, str):
         variables = variables.replace(",", " ").split()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
-from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.fields import GF, Field, rational
 from kahanmaps.algebra.text import parse_point
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import InputError
@@ -46,12 +46,12 @@ _BITS_AT_LEAST = 4096  # where no precision is enough
 
 def orbit(
     given: QuadraticSystem | BirationalMap | MapOver,
-    start: Sequence[Any],
+    start: Any,
     eps: Any = None,
     steps: int | None = None,
     *,
     at: Sequence[int] | None = None,
-    arithmetic: str | Arithmetic = "exact",
+    arithmetic: str | Arithmetic | Field | type[float] = "exact",
     method: str | None = None,
     backward: bool = False,
     every: int = 1,

@@ -127,7 +127,7 @@ def height_survey(
     given: QuadraticSystem | BirationalMap,
     eps: Any = None,
     *,
-    starts: Sequence[Sequence[Any]] | int = DEFAULT_STARTS,
+    starts: Sequence[Any] | int = DEFAULT_STARTS,
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
     seconds: float = DEFAULT_SECONDS,

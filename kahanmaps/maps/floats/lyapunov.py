@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.plain import all_fields
 from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
@@ -49,6 +50,10 @@ class Lyapunov:
     half: FloatArray
     log_volume: FloatArray
     stopped: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
     def __str__(self) -> str:
         lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]

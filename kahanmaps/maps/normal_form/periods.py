@@ -31,6 +31,7 @@ from flint import (
 )
 
 from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.structure import Structure
@@ -92,6 +93,10 @@ class OrbitPeriod(Printed):
     status: str
     meets_pole: bool | None
     planes: tuple[PlanePeriod, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
     @property
     def text(self) -> str:
