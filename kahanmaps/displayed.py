@@ -35,9 +35,20 @@ class Printed(Displayed):
         _load(self)
         return text_form(self)
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.__repr__ = Printed.__repr__  # type: ignore[method-assign]  # a dataclass would write all of its data
+
+    def __repr__(self) -> str:
+        """The first line of what `print` shows."""
+        first = str(self).partition("\n")[0].replace("\t", " ")
+        return f"<{type(self).__name__}: {shorten(first, 100)}>"
+
     def to_pandas(self) -> Any:
-        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
-        return data_frame(self.rows())  # type: ignore[attr-defined]  # every result that is printed has rows
+        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed, or has no rows."""
+        if not hasattr(self, "rows"):
+            raise InputError(f"a {type(self).__name__} is no table: print shows it")
+        return data_frame(self.rows())
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
@@ -81,7 +92,7 @@ def html_form(value: object) -> str:
 @singledispatch
 def text_form(value: object) -> str:
     """The value as `print` shows it: the files of kahanmaps.display register what a command prints."""
-    return repr(value)
+    return object.__repr__(value)
 
 
 @singledispatch

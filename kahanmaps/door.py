@@ -6,8 +6,9 @@ they work with, a `SystemFile`, a system or a map, and know nothing of this.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
+from numbers import Real
 from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
@@ -16,10 +17,13 @@ from kahanmaps.errors import InputError
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.maps.implicit import BirationalMap
+    from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+    from kahanmaps.maps.implicit import BirationalMap, MapOver
+    from kahanmaps.systems.hamiltonian import CubicHamiltonian
     from kahanmaps.systems.quadratic import QuadraticSystem
 
-    Given = str | Path | SystemFile | QuadraticSystem | BirationalMap
+    Member = FamilyMember | AssociatedSystem | CubicHamiltonian
+    Given = str | Path | SystemFile | QuadraticSystem | BirationalMap | MapOver | Member
     P = ParamSpec("P")
     R = TypeVar("R", covariant=True)
 
@@ -34,6 +38,7 @@ if TYPE_CHECKING:
         def __call__(self, given: Given, /, *others: Any, time_step: Any, **options: Any) -> R: ...
 
 
+_WHOLE = ("steps", "max_terms", "max_degree", "degree", "samples", "terms", "transient")
 _FIRST = ("file", "system", "given")  # names of first arguments that stand for a map
 
 
@@ -52,7 +57,7 @@ def opened(function: Callable[Concatenate[Any, P], R]) -> Opened[P, R]:
     wanted = str(function.__annotations__[names[0]])
     convert: Callable[[Any], Any] = _file
     if "SystemFile" not in wanted:
-        convert = _map if "BirationalMap" in wanted else _system
+        convert = _orbit_of if "MapOver" in wanted else _map if "BirationalMap" in wanted else _system
 
     @wraps(function)
     def door(*given: Any, time_step: Any = None, **options: Any) -> Any:
@@ -70,9 +75,12 @@ def opened(function: Callable[Concatenate[Any, P], R]) -> Opened[P, R]:
         if "eps" in options and "settings" in names and "eps" not in names:
             from kahanmaps.checks.settings import Settings
 
+            if "extra" in names and others and not isinstance(others[0], Settings):
+                options["extra"], others = others[0], others[1:]
             options["settings"] = Settings(eps=options.pop("eps"))
         if "other" in names and others:
             others = (_file(others[0]), *others[1:])
+        _require_numbers(dict(zip(names[1:], others, strict=False)) | options)
         return function(*map(convert, given[:1]), *others, **options)
 
     return door
@@ -89,6 +97,21 @@ def _map(given: Any) -> Any:
     from kahanmaps.systems.quadratic import QuadraticSystem
 
     return given if isinstance(given, QuadraticSystem | BirationalMap) else _file(given).map
+
+
+def _orbit_of(given: Any) -> Any:
+    from kahanmaps.maps.implicit import MapOver
+
+    return given if isinstance(given, MapOver) else _map(given)
+
+
+def _require_numbers(given: Mapping[str, Any]) -> None:
+    """Raises InputError for times that are no positive numbers and counts that are no integers."""
+    for name, value in given.items():
+        if name == "seconds" and value is not None and not (isinstance(value, Real) and float(value) > 0):
+            raise InputError(f"found {value!r} seconds, expected a positive number")
+        if name in _WHOLE and value is not None and not hasattr(value, "__index__"):
+            raise InputError(f"found {name} = {value!r}, expected an integer")
 
 
 def _system(given: Any) -> Any:

@@ -286,6 +286,8 @@ SCRIPT = """
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
+
 import kahanmaps as km
 
 top = km.load("euler_top", a1=2)
@@ -301,6 +303,11 @@ print(len(walk), walk[-1].text, [point.step for point in walk[1:3]], [point.x fo
 phi = km.map("euler_top", "1/10")
 print(phi([1, 2, 3]), (phi**-2 @ phi)([1, 2, 3]), top.at("1/10").inverse, top("1/10"))
 print(km.cycles("weierstrass", 101, eps="1/10").lengths, km.lyapunov("lorenz", [1, 2, 3], "1/100", 100).mean)
+print(km.orbit(phi @ phi, np.array([1, 2, 3]), steps=2), km.orbit(fish, [1, 0], "1/10", 5, arithmetic=km.GF(7)))
+print(km.check_integrals(fish, "p^2", eps="1/10").holds, km.check_measure(fish, "p").rows())
+print(km.check_poisson(fish, [["0", "1"], ["-1", "0"]]).to_json(), km.heights(fish, "1/5", starts=[1, 2]).to_json())
+member = km.draw_with_eigenvalues([2, -3], seed=1)
+print(km.check_commute(member.associate([1, 1]), member.associate([1, -1])).verdict, km.degrees(member).degrees)
 print(km.heights(top.map, "1/10", seconds=1).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence)
 """
 WRONG = {

@@ -75,7 +75,8 @@ def _inline_options(parameter: Callable[[F], F]) -> Callable[[F], F]:
 
 
 parameter_option: Callable[[F], F] = _parameter_option(
-    NameValue(), "Set a parameter of the system: a=2/3, or a='root of t^2 - 2' for orbit, degrees and checks."
+    NameValue(),
+    "Set a parameter of the system: a=2/3, or a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and checks.",
 )
 
 inline_options: Callable[[F], F] = _inline_options(parameter_option)

@@ -264,6 +264,10 @@ class RationalField(Field):
     """
 
     name = "QQ"
+
+    def __reduce__(self) -> str:
+        return "QQ"  # the one field that is asked for by `is`
+
     characteristic = 0
 
     @property
@@ -289,6 +293,9 @@ class RationalField(Field):
 
 class PrimeField(Field):
     """The field of p elements; elements are nmod for p < 2^63, fmpz_mod above. Made by `GF`."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return GF, (self.characteristic,)
 
     def __init__(self, prime: int) -> None:
         self.prime = prime

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from flint import fmpq_mat, fmpq_mpoly
@@ -27,9 +28,20 @@ def plain(value: Any) -> Any:
         return {name: plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
-    if isinstance(value, fmpq_mat):
+    if isinstance(value, fmpq_mat) or type(value).__module__ == "numpy":
         return plain(value.tolist())
     return format_polynomial(value) if isinstance(value, fmpq_mpoly) else str(value)
+
+
+def all_fields(value: Any) -> dict[str, Any]:
+    """All fields of a dataclass as plain data, and those of the dataclasses in it."""
+    return {one.name: _deep(getattr(value, one.name)) for one in fields(value) if one.name[0] != "_"}
+
+
+def _deep(value: Any) -> Any:
+    if is_dataclass(value) and not hasattr(value, "to_json"):
+        return all_fields(value)
+    return [_deep(entry) for entry in value] if isinstance(value, list | tuple) else plain(value)
 
 
 def attributes(value: Any, /, *names: str, **others: str) -> dict[str, Any]:

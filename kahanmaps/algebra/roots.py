@@ -23,6 +23,7 @@ from kahanmaps.errors import BadPrime, InputError, quoted
 
 MAX_DEGREE = 12
 _FORM = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
+_SQUARE_ROOT = re.compile(r"\s*(?P<sign>-?)\s*sqrt\((?P<number>[^()]*)\)\s*")
 _GUARD_BITS = 64
 
 
@@ -149,7 +150,16 @@ class Root:
 
 
 def parse_root(text: str) -> Root | None:
-    """The root that a text `root of g` or `root of g near r` names; None for other text. Raises InputError."""
+    """The root that a text `root of g`, `root of g near r` or `sqrt(2)` names; None for other text. Raises InputError.
+
+    >>> print(parse_root("-sqrt(2)"), parse_root("1/2"))
+    root of t^2 - 2 near -1.414 None
+    """
+    square = _SQUARE_ROOT.fullmatch(text)
+    if square is not None:
+        number = parse_number(square["number"])
+        side = -1 if square["sign"] else 1  # next to any number of its sign
+        return Root(fmpq_poly([-number, 0, 1]), fmpq(side) if number > 0 else None)
     found = _FORM.fullmatch(text)
     if found is None:
         return None

@@ -11,8 +11,8 @@ from flint import fmpq
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
+from kahanmaps.checks.claimed import claimed_functions, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
@@ -70,23 +70,28 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
     return found
 
 
-def check_integrals(
-    file: SystemFile, settings: Settings | None = None, extra: Mapping[str, RationalFunction] | None = None
-) -> Report:
+def check_integrals(file: SystemFile, settings: Settings | Any = None, extra: Mapping[str, Any] | Any = None) -> Report:
     """Are the known integrals, the claimed ones of the file and `extra` ones conserved: identically, on an orbit?
 
-    `extra` are rational functions of the system's variables and eps. Raises InputError where there is nothing to check.
+    `extra` are rational functions of the system's variables and eps, by name, or one, or a list; functions, text or
+    expressions of SymPy, in the place of the settings if there are none. Raises InputError where there is nothing to
+    check.
+
+    >>> from kahanmaps.documents.inline import System
+    >>> str(check_integrals(System("x' = y; y' = -x"), "x^2 + y^2").verdict)
+    'proved'
     """
-    settings = settings or Settings()
+    settings, extra = settings_and_claim(settings, extra)
+    claims = claimed_functions(file, extra)
     candidates = known_integrals(file)
-    for name, function in (extra or {}).items():
+    for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)
-    for name, function in {**file.integrals, **(extra or {})}.items():
+    for name, function in {**file.integrals, **claims}.items():
         candidates.append((ClaimedIntegral(name, function, settings.eps, file.map.root), None, ""))
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
-            "or give --integral 'NAME=EXPRESSION'"
+            "or give --integral 'NAME=EXPRESSION', in Python extra=\"EXPRESSION\""
         )
     for integral, _, _ in candidates:
         if isinstance(integral, ModifiedHamiltonian):

@@ -9,6 +9,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
+from kahanmaps.checks.claimed import claimed_function, claimed_tensor, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import Contradiction, judge
@@ -79,12 +80,18 @@ def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:
     return image
 
 
-def check_measure(file: SystemFile, settings: Settings | None = None, extra: RationalFunction | None = None) -> Report:
+def check_measure(file: SystemFile, settings: Settings | Any = None, extra: RationalFunction | Any = None) -> Report:
     """Is dx/phi invariant: for phi = det(I - eps f') of Hamiltonian systems, for the file's [density], for `extra`?
 
-    Raises InputError where no density is known or claimed.
+    `extra` is a function, text or an expression of SymPy, in the place of the settings if there are none. Raises
+    InputError where no density is known or claimed.
+
+    >>> from kahanmaps.documents.inline import System
+    >>> str(check_measure(System("x' = x*(1 - y); y' = y*(x - 2)"), "x*y").verdict)
+    'proved'
     """
-    settings = settings or Settings()
+    settings, extra = settings_and_claim(settings, extra)
+    extra = None if extra is None else claimed_function(file, extra)
     candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
     if file.hamiltonian is not None:
         proof = theorems.cubic_hamiltonian(file.hamiltonian)
@@ -98,7 +105,7 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
     if not candidates:
         raise InputError(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
-            "or give --density EXPRESSION (the measure is dx/phi)"
+            'or give --density EXPRESSION, in Python extra="EXPRESSION" (the measure is dx/phi)'
         )
     claimed = [density.subject for density, _, _ in candidates]
     orbit = run_orbit(file.map, settings, claimed, file.member is not None)
@@ -152,12 +159,14 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
     return Identity(dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, subject=tensor.subject)
 
 
-def check_poisson(file: SystemFile, settings: Settings | None = None, extra: GivenTensor | None = None) -> Report:
+def check_poisson(file: SystemFile, settings: Settings | Any = None, extra: GivenTensor | Any = None) -> Report:
     """Is `extra`, or without it Pi(x) = J - eps^2 f'(x)^2 J, a Poisson tensor that the map preserves?
 
-    Raises InputError for systems without a Hamiltonian where no tensor is given, and for a tensor of another dimension.
+    `extra` is a tensor or a matrix of formulas, in the place of the settings if there are none. Raises InputError for
+    systems without a Hamiltonian where no tensor is given, and for a tensor of another dimension.
     """
-    settings = settings or Settings()
+    settings, extra = settings_and_claim(settings, extra)
+    extra = claimed_tensor(file, extra)
     proof, source = None, ""
     tensor: PoissonTensor
     if extra is not None:
@@ -176,7 +185,7 @@ def check_poisson(file: SystemFile, settings: Settings | None = None, extra: Giv
     else:
         raise InputError(
             f"{file.name} is of kind [{file.kind}]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
-            "expected a file of kind [hamiltonian] or [family], or a tensor: --tensor FILE"
+            "expected a file of kind [hamiltonian] or [family], or a tensor: --tensor FILE, in Python its rows"
         )
     orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
     name = tensor.name

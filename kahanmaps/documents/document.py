@@ -18,6 +18,7 @@ from kahanmaps.algebra.roots import Root, parse_root
 from kahanmaps.algebra.text import format_number, parse_polynomial
 from kahanmaps.documents.composition import CompositionReader
 from kahanmaps.documents.equations import without_left_sides
+from kahanmaps.documents.expressions import number
 from kahanmaps.documents.reader import KINDS, json_like
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, quoted, show, suggestion
@@ -170,6 +171,7 @@ class DocumentReader(CompositionReader):
                 continue
             try:
                 given = self.overrides.get(name, value)
+                given = number(given)
                 root = parse_root(given) if isinstance(given, str) else given if isinstance(given, Root) else None
                 if root is not None:
                     self._read_root(name, root)
@@ -178,7 +180,9 @@ class DocumentReader(CompositionReader):
                     raise InputError(f"found {show(given)}, expected a number")
                 self.parameters[name] = rational(given)
             except InputError as error:
-                self._mistake(path, str(error))
+                written = "\nan algebraic number is written: root of t^2 - 2"
+                hint = written if isinstance(given, str) and "sqrt" in given else ""
+                self._mistake(path, f"{error}{hint}")
                 self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
                 self.unsure = True
         if self.root is not None:

@@ -21,7 +21,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
 from kahanmaps.documents.reader import KINDS
@@ -202,6 +202,17 @@ class SystemFile(Displayed):
     def to_toml(self) -> str:
         """The file as text; `parse_system` reads it back equal."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return parse_system, (self.to_toml(), self.name)
+
+    def __repr__(self) -> str:
+        values = "".join(f", {name}={value}" for name, value in self.parameters.items())
+        return f"SystemFile({self.name}: {shorten(repr(self.map), 100)}{values})"
+
+    def __str__(self) -> str:
+        """The equations, with the values of the parameters in them."""
+        return f"{self.name}:\n{self.map}"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SystemFile):

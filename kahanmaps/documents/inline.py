@@ -8,8 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.expressions import formula_text, number, roots_named, sides_of_equations
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
+from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -40,9 +44,9 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
-            of SymPy.
+            of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
         variables: for a list of right-hand sides, their names in this order.
-        parameters: the values of other names, exact numbers.
+        parameters: the values of other names, exact numbers; algebraic numbers of SymPy are, too.
 
     Returns:
         A `SystemFile`, as if read from a file.
@@ -53,13 +57,25 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     >>> System("x' = 2*x*y - a; y' = -x^2 - y^2 - x", a="1/2").system.rhs
     (2*x*y - 1/2, -x^2 - y^2 - x)
     """
+    if not isinstance(equations, str | Mapping):
+        try:
+            equations = list(equations)
+        except TypeError as error:
+            kind = type(equations).__name__
+            raise InputError(f"found a {kind}, expected equations, as text, a dictionary or a list") from error
+        equations = sides_of_equations(equations) or equations
     if isinstance(equations, Mapping):
         variables, equations = list(equations), list(equations.values())
-    rhs = equations if isinstance(equations, str) else [str(one) for one in equations]
+    elif not isinstance(equations, str) and variables is None and not any("=" in str(one) for one in equations):
+        raise InputError(f"found {len(equations)} right-hand sides without variables, expected these too: x, y, ...")
+    if not isinstance(equations, str):
+        equations, roots = roots_named(equations, [*map(str, variables or ()), *parameters])
+        parameters |= roots
+    rhs = equations if isinstance(equations, str) else [formula_text(one) for one in equations]
     if isinstance(variables, str):
         variables = variables.replace(",", " ").split()
     names = None if variables is None else ",".join(map(str, variables))
-    values = {name: str(value) for name, value in parameters.items()}
+    values = {name: formula_text(number(value)) for name, value in parameters.items()}
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
@@ -72,9 +88,17 @@ def file_of(given: Any) -> SystemFile:
         return given
     if isinstance(given, QuadraticSystem):
         return SystemFile.from_system(given)
+    if isinstance(given, FamilyMember):
+        return SystemFile.from_member(given)
+    if isinstance(given, AssociatedSystem):
+        given = given.hamiltonian
+    if isinstance(given, CubicHamiltonian):
+        return SystemFile.from_hamiltonian(given)
     if isinstance(given, str) and "=" in given:
         return System(given)
     if isinstance(given, str | Path):
         return load(given)
+    if isinstance(given, MapOver):
+        raise InputError(f"found {given!r}, a map at one eps, expected what it was made of, and eps=")
     kind = type(given).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

@@ -114,7 +114,8 @@ class PartReader:
             tail = (*self.symbols, "eps") if of_map else ()
             polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
         except UnknownName as error:
-            self._mistake(path, f"{error}\nif it is a parameter, give its value: in [parameters], or -p NAME=VALUE")
+            where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
+            self._mistake(path, f"{error}\nif it is a parameter, give its value: {where}")
             return None
         except InputError as error:
             self._mistake(path, str(error))

@@ -25,6 +25,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
+from kahanmaps.algebra.numerals import wrong_kind
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
@@ -257,6 +258,8 @@ def normal_form(member: FamilyMember) -> NormalForm:
     the 2m choices so made the one with the shortest numbers is taken. Raises HypothesisError where chi has repeated
     roots.
     """
+    if not isinstance(member, FamilyMember):
+        raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
     if not member.is_generic:
         repeated = ", ".join(f"({factor})" for factor in member.factors if factor.multiplicity > 1)
         raise HypothesisError(

@@ -47,6 +47,7 @@ from typing import Any
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.numerals import wrong_kind
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.maps.implicit import MapOver
@@ -187,6 +188,8 @@ def height(point: Sequence[Any]) -> int:
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
     """
+    if isinstance(point, str) or not hasattr(point, "__len__"):
+        raise wrong_kind(point, "the coordinates of a point", 'write a list, e.g. [3, "1/2"]')
     # In lowest terms as a whole: a prime that divides the least common denominator to its full power does so in one of
     # the fractions, whose numerator it does not divide.
     numbers = [entry.coefficients if isinstance(entry, EtaleElement) else [rational(entry)] for entry in point]

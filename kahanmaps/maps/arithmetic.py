@@ -32,6 +32,23 @@ class Arithmetic(NamedTuple):
             return cls(kind, int(number))
         raise InputError(f"found {quoted(text)}, expected exact, float, mod:P with a prime P, ball:BITS or ball:auto")
 
+    @classmethod
+    def of(cls, given: Any) -> Arithmetic:
+        """The arithmetic that a text, a field or `float` stands for. Raises InputError for anything else.
+
+        >>> str(Arithmetic.of("exact")), str(Arithmetic.of(float))
+        ('exact', 'float')
+        """
+        from kahanmaps.algebra.fields import QQ, PrimeField
+
+        if isinstance(given, Arithmetic):
+            return given
+        if isinstance(given, PrimeField):
+            return cls("mod", given.characteristic)
+        if given is QQ or given is float:
+            return cls("exact" if given is QQ else "float")
+        return cls.parse(given if isinstance(given, str) else repr(given))
+
     @property
     def field(self) -> Any:
         """The field, GF(p) for example. Raises InputError where there is none: for a P that is no prime, and floats."""

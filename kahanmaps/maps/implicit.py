@@ -81,14 +81,18 @@ class MapOver(ABC):
         """The values as a point over the map's field. Raises InputError for a wrong length or inexact numbers."""
         if isinstance(values, str):
             raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
+        if not hasattr(values, "__len__"):
+            raise InputError(f"found {values!r}, expected a sequence of {self.dim} exact numbers")
         if len(values) != self.dim:
             named = f": {', '.join(self.variables)}" if self.variables else ""
             raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{named}")
         return tuple(self.field.convert(value) for value in values)
 
-    def __call__(self, point: Sequence[Any]) -> tuple[Any, ...]:
-        """The same as `step`."""
-        return self.step(point)
+    def __call__(self, *point: Any) -> tuple[Any, ...]:
+        """The image of a point, of phi((1, 2)) and phi(1, 2) alike."""
+        if not point:
+            raise InputError("found no point, expected phi(x); the inverse map, phi.inverse, is called in the same way")
+        return self.step(point[0] if len(point) == 1 and hasattr(point[0], "__len__") else point)
 
     def __matmul__(self, other: MapOver) -> MapOver:
         """A step of `other` and then one of this, as one map. Raises InputError for another dimension or field."""
@@ -100,9 +104,23 @@ class MapOver(ABC):
 
     def __pow__(self, power: int) -> MapOver:
         """So many steps as one map, of the inverse for a negative number. Raises InputError for 0."""
+        if not isinstance(power, int):
+            raise InputError(f"found the power {power!r}, expected an integer: a map has no roots here")
         if power == 0:
             raise InputError("found the power 0, expected another number: the identity is no map here")
         return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the equations of the steps are the same, one after the other."""
+        if not isinstance(other, MapOver):
+            return NotImplemented
+        if (self.field, self.dim, self.variables) != (other.field, other.dim, other.variables):
+            return False
+        mine, theirs = ([(one.exponents, one.terms) for one in each.equations] for each in (self, other))
+        return mine == theirs
+
+    def __hash__(self) -> int:
+        return hash((self.dim, self.variables))
 
     def step(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """The image x~ of a point. Raises SingularStep where det M(x) = 0."""

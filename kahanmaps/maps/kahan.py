@@ -20,6 +20,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.numerals import wrong_kind
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
@@ -141,6 +142,9 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
         with self.field.working():
             return KahanMap(self.system, -self.eps, self.field, self.values, self._inside)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return KahanMap, (self.system, self.eps, self.field, self.values, self._inside)
+
     def __repr__(self) -> str:
         return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
 
@@ -204,4 +208,6 @@ class Kahan(BirationalMap):
 
 def as_map(given: QuadraticSystem | BirationalMap) -> BirationalMap:
     """A map as it is; a quadratic system stands for its Kahan map."""
+    if not isinstance(given, QuadraticSystem | BirationalMap):
+        raise wrong_kind(given, "a system or a map", "km.load(...).system is one, and km.load(...).map")
     return Kahan(given) if isinstance(given, QuadraticSystem) else given

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
-from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.fields import GF, Field, rational
 from kahanmaps.algebra.text import parse_point
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.arithmetic import Arithmetic
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.methods import JUMP_FROM, choose_method, why_no_reduction
 from kahanmaps.maps.orbits import (
@@ -45,13 +45,13 @@ _BITS_AT_LEAST = 4096  # where no precision is enough
 
 
 def orbit(
-    given: QuadraticSystem | BirationalMap,
-    start: Sequence[Any],
+    given: QuadraticSystem | BirationalMap | MapOver,
+    start: Any,
     eps: Any = None,
     steps: int | None = None,
     *,
     at: Sequence[int] | None = None,
-    arithmetic: str | Arithmetic = "exact",
+    arithmetic: str | Arithmetic | Field | type[float] = "exact",
     method: str | None = None,
     backward: bool = False,
     every: int = 1,
@@ -66,12 +66,13 @@ def orbit(
     """The orbit of a start, or some of its iterates: iterate over it once, then look at `end`.
 
     Args:
-        given: the map; a quadratic system stands for its Kahan map.
-        start: exact numbers, or text such as "1/2,-1/3".
+        given: the map; a quadratic system stands for its Kahan map. A map at one eps, phi @ psi for example, is
+            iterated as it is, in its own numbers.
+        start: exact numbers, or text such as "1/2,-1/3"; floats may start float orbits.
         eps: an exact number, for Kahan maps half the time step; none for a map without it.
         steps: how many steps to take, or
         at: which iterates alone are wanted.
-        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto".
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field such as GF(p).
         method: "generic", "normal-form" or "jump"; chosen by itself unless given.
         backward: step by the inverse map.
         every: float orbits deliver only multiples of it; `wanted` tells for all.
@@ -96,11 +97,17 @@ def orbit(
     """
     if (steps is None) == (at is None):
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
-    if isinstance(arithmetic, str):
-        arithmetic = Arithmetic.parse(arithmetic)
-    map_ = as_map(given)
+    require_steps(steps)
+    arithmetic = Arithmetic.of(arithmetic)
     if isinstance(start, str):
         start = parse_point(start)
+    if not hasattr(start, "__len__"):
+        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
+    if arithmetic.kind == "float":
+        start = [_exactly(x) if isinstance(x, float) else x for x in start]
+    if isinstance(given, MapOver):
+        return _walk_at_one_eps(given, start, eps, steps, arithmetic, backward, max_digits)
+    map_ = as_map(given)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
     exact_eps = fmpq(1) if eps is None else rational(eps)
@@ -117,7 +124,7 @@ def orbit(
             f"and there is no other way here: {chosen.reason}"
         )
     used = structure if chosen.name != "generic" and isinstance(structure, Structure) else None
-    interval = every if at is None else max(1, gcd(*at))
+    interval = every if at is None else max(1, math.gcd(*at))
 
     def made(numbers: Arithmetic) -> Any:
         if numbers.kind == "float":
@@ -172,6 +179,9 @@ class Walk:
         self.why = why
         self._at, self._every, self._remark = at, every, remark
         self.variables = tuple(variables)
+
+    def __repr__(self) -> str:
+        return f"Walk({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
@@ -246,6 +256,29 @@ class Walk:
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+def _exactly(value: float) -> fmpq:
+    if not math.isfinite(value):
+        raise InputError(f"found {value} in the start, expected finite numbers")
+    return fmpq(*value.as_integer_ratio())
+
+
+def _walk_at_one_eps(
+    phi: MapOver,
+    start: Sequence[Any],
+    eps: Any,
+    steps: int | None,
+    arithmetic: Arithmetic,
+    backward: bool,
+    max_digits: int | None,
+) -> Walk:
+    """The orbit of a map that has its eps and its field."""
+    if eps is not None or steps is None or arithmetic.kind != "exact":
+        raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
+    kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
+    walked = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
+    return Walk(walked, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
 
 
 def _structure(

@@ -18,7 +18,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
 from kahanmaps.maps.integer_steps import IntegerPoint
@@ -81,7 +81,14 @@ class OrbitPoint:
         return 0 if isinstance(self.value, tuple) else _digits(self.value.bits)
 
     def __repr__(self) -> str:
-        return f"OrbitPoint({self.step}: {','.join(self.text)})"
+        return f"OrbitPoint({self.step}: {','.join(shorten(text, 60) for text in self.text)})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, OrbitPoint):
+            return NotImplemented
+        return (self.step, self.field, self.x) == (other.step, other.field, other.x)
+
+    __hash__ = None  # type: ignore[assignment]  # residues have no hash
 
 
 class Orbit(Displayed):
@@ -336,6 +343,8 @@ def _digits(bits: int) -> int:
 
 
 def require_steps(steps: int | None) -> None:
-    """Raises InputError for a negative number of steps."""
+    """Raises InputError for a negative number of steps, and one that is not whole."""
+    if steps is not None and not hasattr(steps, "__index__"):
+        raise InputError(f"found {steps!r} steps, expected a whole number")
     if steps is not None and steps < 0:
         raise InputError(f"found {steps} steps, expected 0 or more (for the inverse map, step backward)")

@@ -12,6 +12,7 @@ from kahanmaps.documents.inline import file_of
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.maps.floats.doubles import start_rows
 from kahanmaps.maps.orbit import Walk
 from kahanmaps.plots.automatic_starts import automatic_starts
 from kahanmaps.plots.point_functions import point_function
@@ -48,6 +49,9 @@ class Plot:
 
     def orbit(self, found: Walk, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
+        given: Any = found
+        if not isinstance(given, Walk):
+            raise InputError(f"found a {type(given).__name__}, expected an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(found)[:, None]
         return _drawn(Trajectories(found.variables, points, np.array([point.step for point in found])), (x, y))
 
@@ -72,13 +76,15 @@ def draw_orbits(
     value = rounded.at(eps).eps
     if starts is None:
         starts = automatic_starts(rounded.system, value, axes)
-    x = np.atleast_2d(np.array(starts, dtype=np.float64))
+    x = start_rows(starts)
     return _drawn(walked(ensemble_for(rounded.map, value, x, steps), steps), axes)
 
 
 def _drawn(found: Trajectories, axes: Sequence[int]) -> Axes:
     from kahanmaps.plots.draw_portrait import draw_portrait
 
+    if not all(0 <= k < len(found.variables) for k in axes):
+        raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(found.variables)}")
     shown = [point_function(found.variables[k], found.variables) for k in axes]
     drawn: Axes = draw_portrait(portrait_of(found, shown), Style()).axes[0]
     return drawn

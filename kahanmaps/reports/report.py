@@ -69,7 +69,7 @@ def report_html(
         return analysis_page(found, title or _title(found.file), Recipe(command, found.file.to_toml()), drawn)
     if isinstance(found, Store):
         return batch_page(found, title or "A batch", Recipe(command), drawn, by, values)
-    reports = [found] if isinstance(found, Report) else list(found)
+    reports = list(found) if isinstance(found, Sequence) else [found]
     if not reports or not all(isinstance(report, Report) for report in reports):
         kinds = ", ".join(sorted({type(report).__name__ for report in reports})) or "nothing"
         raise InputError(f"found {kinds}, expected an Analysis, a Report, several of them, or a Store")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.algebra.text import format_polynomial, parse_polynomial
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,17 @@ class PolynomialField:
             return NotImplemented
         return (self.variables, self.symbols) == (other.variables, other.symbols) and self.rhs == other.rhs
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        names, texts = names_of(self.rhs[0]), [format_polynomial(polynomial) for polynomial in self.rhs]
+        return _from_text, (type(self), names, texts, self.symbols)
+
     def __hash__(self) -> int:
         # All terms would make it slow; equal fields have equal hashes all the same.
         return hash((self.variables, self.symbols, *(len(polynomial) for polynomial in self.rhs)))
+
+
+def _from_text(
+    kind: type[PolynomialField], names: tuple[str, ...], texts: Sequence[str], symbols: tuple[str, ...]
+) -> PolynomialField:
+    """What `pickle` and `copy` make again: polynomials of FLINT go by their text."""
+    return kind(tuple(parse_polynomial(text, names) for text in texts), symbols)

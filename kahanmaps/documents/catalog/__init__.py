@@ -128,6 +128,9 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
     from kahanmaps.documents.files import parse_system, read_system
 
     parameters = {**(parameters or {}), **values}
+    if not isinstance(reference, str | Path):
+        kind = type(reference).__name__
+        raise InputError(f"found a {kind}, expected the name of a system or the path of a file: km.load('lorenz')")
     if not isinstance(reference, Path):
         made = family_member(reference)
         name = reference if made is None else made[0]

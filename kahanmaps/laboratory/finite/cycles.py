@@ -16,6 +16,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.symmetry.reversors import require_reversor
@@ -80,6 +81,10 @@ class Census(Printed):
     def mean(self) -> float | None:
         """The mean length of the cycles, None without cycles and for samples."""
         return self.periodic / self.cycles if self.cycles else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
     def rows(self) -> list[dict[str, int]]:
         """A row for each length: the number of cycles, or of sampled points; for pandas.DataFrame and the like."""

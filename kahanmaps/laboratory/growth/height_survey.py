@@ -127,7 +127,7 @@ def height_survey(
     given: QuadraticSystem | BirationalMap,
     eps: Any = None,
     *,
-    starts: Sequence[Sequence[Any]] | int = DEFAULT_STARTS,
+    starts: Sequence[Any] | int = DEFAULT_STARTS,
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
     seconds: float = DEFAULT_SECONDS,
@@ -150,8 +150,10 @@ def height_survey(
     """
     if isinstance(starts, int) and not 1 <= starts <= _MOST_STARTS:
         raise InputError(f"found {starts} starts, expected 1 to {_MOST_STARTS}")
-    if not isinstance(starts, int) and not starts:
+    if not isinstance(starts, int) and len(starts) == 0:
         raise InputError("found no starts, expected at least one")
+    if not isinstance(starts, int) and not all(hasattr(start, "__len__") for start in starts):
+        starts = [starts]  # one of them
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a positive number")
     deadline = time.monotonic() + seconds

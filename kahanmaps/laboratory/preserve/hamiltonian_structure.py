@@ -14,13 +14,14 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count, product
+from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
-from kahanmaps.algebra.plain import plain
+from kahanmaps.algebra.plain import all_fields, plain
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_polynomial
@@ -56,6 +57,10 @@ class ConstantStructures(Printed):
         """A row for each form K, with the function that the flow conserves."""
         pairs = zip(self.forms, self.functions, strict=True)
         return [{"K": str(plain(K)), "function": format_polynomial(H)} for K, H in pairs]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
 
 def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantStructures:

@@ -20,6 +20,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.numerals import wrong_kind
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, primitive_part, ring
 from kahanmaps.algebra.text import format_factored, format_polynomial
@@ -193,6 +194,8 @@ def flow_and_map(
     >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines()[0])
     proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow that the map deforms: (I1/3 + 1/3)/eps^2 = L1 + ...
     """
+    if not isinstance(search, IntegralSearch):
+        raise wrong_kind(search, "what km.find_integrals found", "km.flow_and_map(km.find_integrals(...))")
     given = search.file.map
     is_kahan = isinstance(given, Kahan)
     if search.eps is not None or not (is_kahan or (isinstance(given, ImplicitMap) and given.of_field is not None)):

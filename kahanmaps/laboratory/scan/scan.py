@@ -144,8 +144,8 @@ def scan(
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
-    began = time.monotonic()
     terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
+    began = time.monotonic()  # not before: loops are compiled there, once on a machine, and that may take all the time
     jobs = jobs or processors()
     most = _PART * seconds * jobs / cost
     if kept is not None:

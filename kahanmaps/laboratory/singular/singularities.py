@@ -22,7 +22,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.plain import all_fields, attributes
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Printed
@@ -105,6 +105,10 @@ class SingularityRun(Printed):
         """A row for each hypersurface, for `pandas.DataFrame(run.rows())` and the like."""
         names = ("polynomial", "degree", "status", "contracted_at", "confined_at")
         return [attributes(one, *names) for one in self.hypersurfaces]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
     @property
     def verdict(self) -> str:

@@ -10,6 +10,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.text import parse_point
 from kahanmaps.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,23 @@ def to_floats(values: Sequence[Any]) -> FloatArray:
     array([0.33333333, 2.        ])
     """
     return np.array([to_float(rational(value)) for value in values], dtype=np.float64)
+
+
+def start_rows(starts: Any) -> FloatArray:
+    """One start or many as rows of doubles: of numbers of any kind, or of text.
+
+    >>> start_rows(["1/2", 0]), start_rows([[1, 2.5]])
+    (array([[0.5, 0. ]]), array([[1. , 2.5]]))
+    """
+    if isinstance(starts, str):
+        starts = parse_point(starts)
+    try:
+        return np.atleast_2d(np.array(starts, dtype=np.float64))
+    except (TypeError, ValueError):
+        rows = starts if all(isinstance(row, list | tuple) for row in starts) else [starts]
+    if len({len(row) for row in rows}) != 1:
+        raise InputError("found starts of different lengths, expected as many coordinates in each")
+    return np.array([[x if isinstance(x, float) else to_float(rational(x)) for x in row] for row in rows])
 
 
 def exact(value: float) -> fmpq:

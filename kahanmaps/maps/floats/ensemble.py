@@ -221,6 +221,7 @@ class FloatEnsemble:
         epsilon = rational(eps)
         if sampled < 1:
             raise InputError(f"found a sample every {sampled} steps, expected at least 1")
+        system = as_map(system)
         self._starts = _points(starts, system)
         self._stepping = Stepping(system, epsilon, backward=backward, form=form, kernel=kernel, threads=threads)
         self._lanes = self._stepping.lanes(self._starts)

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.plain import all_fields
 from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.floats.doubles import FloatArray, to_float
+from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -49,6 +50,10 @@ class Lyapunov:
     half: FloatArray
     log_volume: FloatArray
     stopped: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
     def __str__(self) -> str:
         lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]
@@ -118,7 +123,7 @@ def lyapunov_exponents(
         )
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
-    x: FloatArray = np.atleast_2d(np.array(starts, dtype=np.float64))
+    x = start_rows(starts)
     map_ = as_map(given).rounded
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():

@@ -31,6 +31,7 @@ from flint import (
 )
 
 from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.structure import Structure
@@ -96,6 +97,10 @@ class OrbitPeriod(Printed):
     def rows(self) -> list[dict[str, Any]]:
         """A row for each plane, for `pandas.DataFrame(found.rows())` and the like."""
         return [{"plane": one.name, "status": one.status, "period": one.period} for one in self.planes]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
 
     @property
     def text(self) -> str:

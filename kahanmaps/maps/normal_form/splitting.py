@@ -15,6 +15,7 @@ from flint import acb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mod_ctx, fmpz_mod_p
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
+from kahanmaps.algebra.numerals import wrong_kind
 from kahanmaps.algebra.text import format_univariate
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.family.planar import NormalForm
@@ -44,6 +45,8 @@ class Splitting:
     """
 
     def __init__(self, form: NormalForm, field: Field, eps: Any, T: fmpq_mat | None = None) -> None:
+        if not isinstance(form, NormalForm):
+            raise wrong_kind(form, "a normal form", "km.normal_form(member) is one, and km.structure_of(system).form")
         self.form, self.field = form, field
         S = form.S if T is None else T * form.S
         with field.working():

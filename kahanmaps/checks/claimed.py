@@ -1,0 +1,51 @@
+"""Claims as one writes them, formulas as text or of SymPy, as the functions and tensors that are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import count
+from typing import Any
+
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.expressions import formula_text
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.poisson import GivenTensor
+
+
+def settings_and_claim(settings: Settings | Any, extra: Any) -> tuple[Settings, Any]:
+    """The two in this order: a claim may stand in the place of the settings."""
+    if settings is None or isinstance(settings, Settings):
+        return settings or Settings(), extra
+    if extra is not None:
+        raise InputError(f"found claims as second and as third argument, expected Settings, not {settings!r}")
+    return Settings(), settings
+
+
+def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
+    """A formula in the variables of a file, its parameters and eps, as a function of the variables and eps."""
+    if isinstance(claim, RationalFunction):
+        return claim
+    return parse_rational_function(formula_text(claim), file.claim_names, file.parameters)
+
+
+def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFunction]:
+    """Formulas by name; those of a list, and a single one, are called I1, I2, ..., as far as these names are free."""
+    if claims is None:
+        return {}
+    if not isinstance(claims, Mapping):
+        free = (f"I{k}" for k in count(1) if f"I{k}" not in file.integrals)
+        claims = dict(zip(free, claims if isinstance(claims, list | tuple) else [claims], strict=False))
+    return {name: claimed_function(file, claim) for name, claim in claims.items()}
+
+
+def claimed_tensor(file: SystemFile, claim: Any) -> GivenTensor | None:
+    """A matrix of formulas as a tensor. Raises InputError for what is none, and for one that is not skew."""
+    if claim is None or isinstance(claim, GivenTensor):
+        return claim
+    rows = claim.tolist() if hasattr(claim, "tolist") else claim
+    if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) for row in rows):
+        raise InputError(f"found {claim!r}, expected a matrix of formulas: [['0', 'x*y'], ['-x*y', '0']]")
+    return GivenTensor([[claimed_function(file, entry) for entry in row] for row in rows])

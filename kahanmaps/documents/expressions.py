@@ -1,0 +1,96 @@
+"""Formulas and numbers of other Python libraries as the text of a system file; nothing of theirs is imported first."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import count
+from typing import Any
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.errors import InputError
+
+_NUMBERS = (int, float, complex)
+
+
+def formula_text(value: Any) -> str:
+    """A right-hand side or a claim as text, exactly.
+
+    Raises InexactNumber for machine floats, also inside expressions of SymPy, where 1/3*x has become one unnoticed;
+    InputError for irrational numbers there.
+
+    >>> formula_text("x*y"), formula_text(2)
+    ('x*y', '2')
+    """
+    if isinstance(value, _NUMBERS) or type(value).__module__ == "numpy":
+        return str(rational(value))
+    if not _is_sympy(value):
+        return str(value)
+    for part in _irrational(value):
+        if part.is_Float:
+            rational(float(part))  # refused, in the words for floats
+        raise InputError(
+            f"found {part} in {value}, expected rational numbers and names: "
+            f"an algebraic number is the value of a parameter, System(..., a={part})"
+        )
+    return str(value)
+
+
+def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
+    """Expressions of SymPy with a name for the one irrational number in them, if it is one, and its value."""
+    from_sympy = [side for side in sides if _is_sympy(side)]
+    found = {part for side in from_sympy for part in _irrational(side)}
+    if len(found) != 1 or any(part.is_Float for part in found):
+        return list(sides), {}
+    from sympy import Symbol
+
+    [value] = found
+    known = {str(one) for side in from_sympy for one in side.free_symbols}.union(taken)
+    name = next(name for k in count() if (name := f"r{k or ''}") not in known)
+    named = {value: Symbol(name)}
+    return [side.xreplace(named) if _is_sympy(side) else side for side in sides], {name: value}
+
+
+def number(value: Any) -> Any:
+    """An algebraic number of SymPy as the text of a root of its polynomial; all else is as it was.
+
+    Raises InputError for other irrational numbers of SymPy.
+    """
+    if not _is_sympy(value) or value.is_Rational:
+        return value
+    if not value.is_algebraic or value.is_Float:
+        raise InputError(f"found {value}, expected a rational or an algebraic number")
+    from sympy import Symbol, minimal_polynomial
+
+    near = f" near {value.evalf(20)}" if value.is_real else ""
+    return f"root of {minimal_polynomial(value, Symbol('t'))}{near}".replace("**", "^")
+
+
+def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
+    """The right-hand sides by variable of equations of SymPy, Eq(x(t).diff(t), y(t)); None for anything else.
+
+    Raises InputError for other equations of SymPy.
+    """
+    if not equations or not all(getattr(one, "is_Equality", False) for one in equations):
+        return None
+    from sympy import Derivative, Symbol
+
+    for one in equations:
+        if not isinstance(one.lhs, Derivative) or one.lhs.derivative_count != 1:
+            raise InputError(f"found {one}, expected a first derivative on the left: Eq(x(t).diff(t), y(t))")
+    names = {one.lhs.expr: Symbol(one.lhs.expr.func.__name__) for one in equations}
+    return {str(names[one.lhs.expr]): one.rhs.subs(names) for one in equations}
+
+
+def _irrational(value: Any) -> Iterator[Any]:
+    """The numbers in an expression of SymPy that are not rational, as far as sums and products do not hide them."""
+    from sympy import preorder_traversal
+
+    parts = preorder_traversal(value)
+    for part in parts:
+        if getattr(part, "is_number", False) and not (part.is_Rational or part.is_Add or part.is_Mul):
+            parts.skip()
+            yield part
+
+
+def _is_sympy(value: Any) -> bool:
+    return type(value).__module__.partition(".")[0] == "sympy"
