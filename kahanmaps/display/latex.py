@@ -162,9 +162,9 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
 
 
 def is_product(factors: Sequence[tuple[fmpq_mpoly, int]]) -> bool:
-    """Whether there are several sums above or below the line, or powers of sums."""
-    powers = [k for g, k in factors if len(g) > 1]
-    return sum(k for k in powers if k > 0) > 1 or sum(k for k in powers if k < 0) < -1
+    """Whether above or below the line a sum has other factors beside it, or is a power."""
+    sides = ([(len(g) > 1, abs(k)) for g, k in factors if sign * k > 0] for sign in (1, -1))
+    return any(any(is_sum for is_sum, _ in side) and sum(k for _, k in side) > 1 for side in sides)
 
 
 def _latex_power(polynomial: fmpq_mpoly, exponent: int) -> str:
