@@ -553,4 +553,4 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     integrable = analyze(load("weierstrass"))
     both = replace(integrable, degrees=found.degrees)
     assert both.conclusion.kind == "undecided"
-    assert "positive entropy is proved, which excludes an integral" in both.conclusion.sentence
+    assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence
