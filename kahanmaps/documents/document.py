@@ -178,7 +178,9 @@ class DocumentReader(CompositionReader):
                     raise InputError(f"found {show(given)}, expected a number")
                 self.parameters[name] = rational(given)
             except InputError as error:
-                self._mistake(path, str(error))
+                is_irrational = isinstance(given, str) and "sqrt" in given
+                hint = "\nan algebraic number is given by its equation, e.g. 'root of t^2 - 2 near 1.4'"
+                self._mistake(path, f"{error}{hint if is_irrational else ''}")
                 self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
                 self.unsure = True
         if self.root is not None:
