@@ -211,7 +211,10 @@ class _Solver:
         """Add the solutions of `equations` to what was found; `based` says that they are a Groebner basis already."""
         if self.stopped:  # told once
             return
+        given = [p for p in equations if not p.is_zero()]
         equations = equations if based else independent(equations)
+        if len(given) > len(equations):
+            given = equations
         if any(p.is_constant() for p in equations):
             return
         if not equations:
@@ -226,20 +229,14 @@ class _Solver:
             return
         for p in sorted(equations, key=degree):
             if degree(p) == 1:
-                self._substitute(p, equations, values)
+                self._substitute(p, given, values)
                 return
-        best: list[fmpq_mpoly] | None = None
-        for p in equations:
-            _, powers = p.factor()
-            factors = [factor for factor, _ in powers]
-            if len(factors) == 1 and powers[0][1] == 1:
-                continue
-            if best is None or _badness(factors) < _badness(best):
-                best = factors
+        # Factors that the equations have as they were given may be lost in combinations of them, as in x f, y g, z h.
+        best = _easiest_product(equations) or _easiest_product(given)
         if best is not None:
             for factor in sorted(best, key=lambda q: (degree(q), str(q))):
                 # The remainders: or the same product, mixed with other equations, would be branched on again.
-                self.solve([factor, *(divmod(p, factor)[1] for p in equations)], values)
+                self.solve([factor, *(divmod(p, factor)[1] for p in given)], values)
             return
         for p in equations:
             if sum(e > 0 for e in p.degrees()) == 1:  # irreducible in one variable: no rational root
@@ -295,6 +292,13 @@ class _Solver:
         if part not in self.found.unsolved:
             self.found.unsolved.append(part)
         self.found.reason = reason
+
+
+def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
+    """The factors of that one of the equations that falls apart best, None where none does."""
+    products = [p.factor()[1] for p in equations]
+    reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
+    return min(reducible, key=_badness, default=None)
 
 
 def _badness(factors: Sequence[fmpq_mpoly]) -> tuple[int, int]:

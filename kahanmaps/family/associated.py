@@ -79,12 +79,17 @@ class ConjugateAssociate:
     @cached_property
     def K_text(self) -> str:
         """The cubic K with grad K = B grad H, its coefficients polynomials in the root."""
-        terms: dict[str, EtaleElement] = {}
+        terms: dict[tuple[int, ...], EtaleElement] = {}
         for coefficient, H in zip(self.coefficients, self.chain, strict=True):
             for monomial, number in H.terms():
-                text = format_polynomial(H.context().from_dict({monomial: 1}))
-                terms[text] = terms.get(text, 0 * coefficient) + coefficient * number
-        written = (f"({format_univariate(c.polynomial, self.name)})*{text}" for text, c in terms.items() if c != 0)
+                terms[monomial] = terms.get(monomial, 0 * coefficient) + coefficient * number
+        context = self.chain[0].context()
+        ordered = context.from_dict({monomial: 1 for monomial, c in terms.items() if c != 0}).monoms()
+        written = (
+            f"({format_univariate(terms[monomial].polynomial, self.name)})*"
+            f"{format_polynomial(context.from_dict({monomial: 1}))}"
+            for monomial in ordered
+        )
         return " + ".join(written) or "0"
 
 

@@ -242,7 +242,13 @@ def analyze(
 
     def densities() -> None:
         found.densities = find_densities(
-            bare, symbols=symbols, eps=found.eps, seconds=share(0.25), seed=seed, progress=told("densities")
+            bare,
+            symbols=symbols,
+            eps=found.eps,
+            integrals=() if found.integrals is None else found.integrals.integrals,
+            seconds=share(0.25),
+            seed=seed,
+            progress=told("densities"),
         )
 
     def flow() -> None:

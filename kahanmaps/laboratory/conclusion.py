@@ -83,8 +83,8 @@ def conclude(found: Findings) -> Conclusion:
         where = "" if found.eps is not None or not found.file.map.has_eps else ", for all eps but countably many"
         return verdict(
             "not integrable",
-            f"Not integrable (proved): {bound}{where}, so that the entropy is positive and no rational function is an "
-            f"integral; {phrase}{known if growth is GrowthClass.EXPONENTIAL else ''}.",
+            f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
+            f"function is an integral; {phrase}{known if growth is GrowthClass.EXPONENTIAL else ''}.",
             _confining(found),
             PROVED,
         )

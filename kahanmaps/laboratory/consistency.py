@@ -33,7 +33,7 @@ def contradictions(found: Findings) -> list[str]:
     elif growth is GrowthClass.EXPONENTIAL and isinstance(found.structure, Structure):
         said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
     if found.degrees is not None and found.degrees.enclosure is not None and orbits_lie_on_curves(found):
-        said.append("positive entropy is proved, which excludes an integral")
+        said.append("positive algebraic entropy is proved, which excludes an integral")
     if found.pencil is not None and (impossible := found.pencil.against(growth)):
         said.append(impossible)
     if period is not None and growth in (GrowthClass.EXPONENTIAL, *_POLYNOMIAL):

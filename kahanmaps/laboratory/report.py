@@ -18,13 +18,15 @@ from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.symmetry.commuting import CommutingField
+from kahanmaps.laboratory.symmetry.commuting import CommutingFamily, CommutingField
 from kahanmaps.laboratory.symmetry.symmetries import SIGNED
 
 PROVED, SUPPORTED, EXPLAINED, MEASURED = "proved", "supported", "explained", "measured"
 UNDECIDED, NOTE = "undecided", "note"
 _SHOWN_DEGREES = 12
 _NAMES = 6  # that are listed one by one
+_POINTS = 8  # as many fixed points as three quadratic equations have
+_LONG = 300  # characters of a sentence with a formula
 
 
 @dataclass(frozen=True)
@@ -71,9 +73,10 @@ def _field_lines(found: Findings) -> list[Statement]:
         return []
     divergence = format_polynomial(found.file.system.divergence)
     lines = [Statement(PROVED, f"div f = {divergence}" + (": the flow preserves volume" if divergence == "0" else ""))]
-    lines += [Statement(PROVED, one.text) for one in search.found[:_NAMES]]
-    if len(search.found) > _NAMES:
-        lines.append(Statement(NOTE, f"and {len(search.found) - _NAMES} more sets of fixed points: --json lists them"))
+    lines += [Statement(PROVED, one.text) for one in search.found[:_POINTS]]
+    if len(search.found) > _POINTS:
+        more = counted(len(search.found) - _POINTS, "more set")
+        lines.append(Statement(NOTE, f"and {more} of fixed points: --json lists them"))
     if search.undecided:
         lines.append(Statement(UNDECIDED, f"not all fixed points were found: {search.undecided}"))
     elif not search.found:
@@ -293,6 +296,24 @@ def _enumerated(texts: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))
 
 
+def _are_opposite(family: CommutingFamily, other: CommutingFamily) -> bool:
+    """Whether the negatives of the one are the other."""
+    directions, others = ([g.system for g in one.directions] for one in (family, other))
+    return directions == others and family.base.system == other.base.system.scaled(-1)
+
+
+def _family_text(family: CommutingFamily) -> str:
+    """All g of a linear family, or how many parameters it has where that is long."""
+    base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
+    moved = [f"t{k}*({', '.join(g.rhs)})" for k, g in enumerate(family.directions, 1)]
+    which = "g and -g, g" if base else "all g"  # the negatives of these are among them
+    letters = ", ".join(f"t{k}" for k in range(1, len(moved) + 1))
+    text = f"commutes with the Kahan maps of {which} = {' + '.join([*base, *moved])}, for all {letters}"
+    if len(text) > _LONG:
+        return f"commutes with a linear family of {counted(len(moved), 'parameter')}, which find-commuting writes out"
+    return text
+
+
 def _coordinates(found: Findings, T: fmpq_mat | None) -> str:
     """In which coordinates the system is a member of the family, x = centre + T y; empty where these are its own."""
     centre = f"({', '.join(map(format_number, found.centre))})" if found.centre and any(found.centre) else ""
@@ -318,12 +339,9 @@ def _commuting_lines(found: Findings) -> list[Statement]:
             told.append(one)
             text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(one.rhs)})"
             lines.append(Statement(str(one.finding.verdict), text))
-    for family in search.families:
-        lines.append(
-            Statement(
-                str(family.finding.verdict), f"commutes with a linear family of {len(family.directions)} parameters"
-            )
-        )
+    for k, family in enumerate(search.families):
+        if not any(_are_opposite(family, other) for other in search.families[:k]):
+            lines.append(Statement(str(family.finding.verdict), _family_text(family)))
     lines += [Statement(NOTE, text) for text in search.irrational]
     lines += [Statement(UNDECIDED, text) for text in search.undecided]
     if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):

@@ -106,7 +106,10 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, l
     f, g = map(_in_formula, squares.pair.names)
     beyond = outside(every, tuple(map(tuple, window)))
     said = f"\n{beyond} of {len(every)} points outside" if beyond else ""
-    title = plain(wrapped(caption, style.font_size / letter, style.font_size)) if caption else f"$f = {f}$,  $g = {g}$"
+    equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
+    title = (
+        plain(wrapped(equations, style.font_size / letter, style.font_size)) if caption else f"$f = {f}$,  $g = {g}$"
+    )
     axes.set_title(f"{title}\n{squares.verdict}{said}")
     _draw_lattices(axes, one, other)
     gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]

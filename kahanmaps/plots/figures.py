@@ -135,10 +135,30 @@ def legend_columns(labels: Sequence[str], style: Style, most: int = 4) -> int:
     >>> legend_columns(["RK4", "implicit midpoint"], Style(width=8.6)), legend_columns(["x" * 50] * 2, Style(width=8.6))
     (2, 1)
     """
-    letters = max((len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label)) for label in labels), default=0)
-    width = (letters * _LETTER + _HANDLE) * max(3.0, style.font_size - 1)
-    room = style.width / CENTIMETRES_PER_INCH * 72
-    return max(1, min(most, len(labels), int(room / width)))
+    width = max(map(_letters, labels), default=0) * _LETTER + _HANDLE
+    return max(1, min(most, len(labels), int(_room(style) / width)))
+
+
+def shortened_name(name: str, rest: str, style: Style) -> str:
+    """A name, cut to what a legend of the width of the style has room for together with the rest of its label.
+
+    >>> shortened_name("f", ": linear growth", Style())
+    'f'
+    >>> shortened_name("x' = x*y - 2, y' = -x*y + 1", ": linear growth", Style(width=7))
+    "x' = x*y - 2, y' ..."
+    """
+    letters = max(8, int((_room(style) - _HANDLE) / _LETTER) - _letters(rest))
+    return name if len(name) <= letters else name[: letters - 3] + "..."
+
+
+def _letters(label: str) -> int:
+    """How many letters a label has, about, without what only says how formulas are set."""
+    return len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label))
+
+
+def _room(style: Style) -> float:
+    """The width of a picture in heights of a letter of its legend."""
+    return style.width / CENTIMETRES_PER_INCH * 72 / max(3.0, style.font_size - 1)
 
 
 def legend_above(

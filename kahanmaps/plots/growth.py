@@ -13,7 +13,15 @@ from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
-from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, plain
+from kahanmaps.plots.figures import (
+    drawing,
+    label_number,
+    legend_above,
+    legend_height,
+    new_figure,
+    plain,
+    shortened_name,
+)
 from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 from kahanmaps.plots.zero_band import log_scale_with_zero
@@ -51,7 +59,8 @@ def draw_degrees(
     style = style or Style()
     is_log = any(one.looks_exponential or one.growth is GrowthClass.EXPONENTIAL for one in growths.values())
     scale = _scale(scale, "log" if is_log else "linear")
-    labels = [_degree_label(name, growth) for name, growth in growths.items()]
+    rests = [_degree_label(growth) for growth in growths.values()]
+    labels = [plain(shortened_name(name, rest, style)) + rest for name, rest in zip(growths, rests, strict=True)]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, most=1))
         axes = figure.subplots()
@@ -164,11 +173,11 @@ def _between(growth: DegreeGrowth, first: int) -> tuple[Any, Any]:
     return steps, np.array([float(d) if d else np.nan for d in growth.degrees[first:]])
 
 
-def _degree_label(name: str, growth: DegreeGrowth) -> str:
-    """A line of the legend: the name, what d_n is, the dynamical degree and what is estimated."""
-    name = plain(name)
+def _degree_label(growth: DegreeGrowth) -> str:
+    """A line of the legend behind the name: what d_n is, the dynamical degree and what is estimated."""
+    name = ""
     if growth.eps is not None:
-        name += rf", $\varepsilon = {label_number(growth.eps)}$"
+        name = rf", $\varepsilon = {label_number(growth.eps)}$"
     rate = growth.dynamical_degree
     if growth.growth is GrowthClass.ZERO:
         return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"

@@ -47,7 +47,8 @@ class Pictures:
             _rasterise(figure)
             svg = svg_text(figure, name, _STYLE, alt)
         except KahanmapsError as error:
-            return f'<p class="soft">{markup.escape(caption)}: not drawn, for {markup.escape(error)}</p>'
+            what = markup.escape(caption.removesuffix("."))
+            return f'<p class="soft">{what}: not drawn, for {markup.escape(error)}</p>'
         words = "<br/>".join(map(markup.escape, (caption, *remarks)))
         return f'<figure id="{name}">\n{svg}\n<figcaption>{words}</figcaption>\n</figure>'
 

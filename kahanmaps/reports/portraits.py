@@ -46,12 +46,14 @@ def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
     axes = file.variables[:2] if file.dim > 1 else ("step", file.variables[0])
 
     def drawing(style: Style) -> Figure:
-        starts = automatic_starts(file.system, at) if file.is_quadratic else starts_in_box(_MANY, file.dim, 2.0, 0)
-        found = walked(ensemble_for(file.map, at, starts, _STEPS), _STEPS)
+        rounded = file.rounded
+        is_field = rounded.is_quadratic
+        starts = automatic_starts(rounded.system, at) if is_field else starts_in_box(_MANY, file.dim, 2.0, 0)
+        found = walked(ensemble_for(rounded.map, at, starts, _STEPS), _STEPS)
         functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
         shown = portrait_of(found, functions)
-        if file.is_quadratic:
-            shown = replace(shown, flow=plane_flow(file.system, range(file.dim), shown.window))
+        if is_field:
+            shown = replace(shown, flow=plane_flow(rounded.system, range(file.dim), shown.window))
         remarks.extend(
             f"{count} of {counted(found.orbits, 'orbit')} ended early: {r}." for r, count in found.ended.items()
         )

@@ -48,6 +48,15 @@ def test_linear_families_points_and_points_inside_families():
     assert solve(x * y, x).components == [Component((RING.constant(0), y, z))]
 
 
+def test_products_are_branched_on_though_combinations_of_them_are_none():
+    equations = [x * (2 - 3 * y - z), y * (5 * x - 7 + z), z * (x - y)]
+    assert not any(len(p.factor()[1]) > 1 for p in independent(equations))
+    found = solve(*equations)
+    assert found.complete
+    wanted = [(fmpq(5, 2), fmpq(5, 2), fmpq(-11, 2)), (fmpq(7, 5), fmpq(2, 3), 0), (0, 0, z)]
+    assert [component.values for component in found.components] == wanted
+
+
 def test_solutions_outside_the_rationals_are_told():
     found = solve(x**2 - 2, y, z)
     assert (found.components, found.irrational, found.complete) == ([], ["x^2 - 2"], True)

@@ -121,6 +121,7 @@ def test_polynomials_are_written_as_people_write_them(text, latex):
         ("-x/(1 - y)", r"\frac{x}{y - 1}"),
         ("x/(1 - eps^2*y)", r"-\frac{x}{\varepsilon^2 y - 1}"),
         ("x/(eps*y - eps^2*x)", r"-\frac{x}{\varepsilon \left(\varepsilon x - y\right)}"),
+        ("x^2*y + x*y^2 - x*y", r"x y \left(x + y - 1\right)"),
         ("(x/3 - 1/2)/y", r"\frac{2 x - 3}{6 y}"),
     ],
 )

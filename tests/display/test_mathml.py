@@ -61,7 +61,10 @@ def read_factor(child):
     if child.tag == "mrow":  # the monomial of a product, or a factor in brackets
         return read_row(child[1] if child[0].text == "(" else child)
     if child.tag == "mfrac":
-        return RING.constant(fmpq(int(child[0].text), int(child[1].text)))
+        above, below = map(read_factor, child)
+        return above / below
+    if child.tag == "mrow":
+        return read_row(child[1]) if child[0].text == "(" else read_row(child)
     assert child.tag in ("msup", "msubsup")
     *base, exponent = child
     assert int(exponent.text) > 1

@@ -226,3 +226,10 @@ def test_the_bound_is_one_for_all_conjugates():
     sizes = [abs(complex(z)) for z, _ in root.polynomial.complex_roots()]
     assert all(bound.scale * size <= 2**bound.above.bits for size in sizes)
     assert root.number_field == EtaleAlgebra(root.polynomial)
+
+
+@pytest.mark.parametrize(("value", "is_hinted"), [("sqrt(2)", True), ("2,5", False)])
+def test_a_square_root_in_words_is_told_how_to_be_given(value, is_hinted):
+    with pytest.raises(InputError) as refused:
+        km.System("x' = a*x", a=value)
+    assert ("'root of t^2 - 2 near 1.4'" in str(refused.value)) is is_hinted

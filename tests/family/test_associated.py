@@ -7,6 +7,7 @@ at which an irreducible chi splits; and the neighbours that do not commute. Sour
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -16,7 +17,7 @@ from helpers import random_point
 import kahanmaps as km
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import gradient, linear_combinations
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.text import format_polynomial, parse_polynomial
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
 from kahanmaps.family.cubics import cubic_space
@@ -266,6 +267,14 @@ def test_associated_systems_over_a_number_field_commute_with_the_member_and_othe
         wrong = replace(found[0], coefficients=(found[0].coefficients[0] + 1, *found[0].coefficients[1:]))
         wrong_file = km.SystemFile.from_conjugate(wrong)
         assert km.check_commute(km.SystemFile.from_member(member), wrong_file).verdict is km.Verdict.REFUTED
+
+
+def test_the_terms_of_a_conjugate_K_stand_in_the_order_of_other_cubics():
+    file = km.load("paper_m3_irreducible")
+    (one,) = file.member.conjugate_associates()
+    monomials = re.findall(r"\)\*([^ ]+)", one.K_text)
+    assert len(monomials) == 56
+    assert format_polynomial(parse_polynomial(" + ".join(monomials), file.variables)) == " + ".join(monomials)
 
 
 def test_the_root_has_a_name_that_no_variable_has():

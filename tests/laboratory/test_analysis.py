@@ -14,6 +14,7 @@ from search_helpers import random_system, system
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
+from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis as module
 from kahanmaps.laboratory import report
@@ -21,6 +22,8 @@ from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.singular.singularities import Patterns
+from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
+from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
 FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (
@@ -490,6 +493,34 @@ def test_commuting_systems_are_sought_for_every_eps_only():
     assert analyze(load("riccati"), eps="1/3").commuting is None
 
 
+def test_linear_families_of_commuting_systems_are_written_out(monkeypatch):
+    found = Analysis(System("S' = -2*S*I; I' = 2*S*I - I; R' = I"), None, 1.0, 0, ())
+    found.commuting = find_commuting(found.file.system)
+    moved = (
+        "t1*(0, 0, S + I + R) + t2*(0, 0, S^2 + 2*S*I + I^2 + 2*S*R + 2*I*R + R^2) + t3*(0, 0, 1), for all t1, t2, t3"
+    )
+
+    def told():
+        return [line.text for line in dict(report.sections(found))["commuting systems"]]
+
+    assert told() == [
+        f"commutes with the Kahan maps of all g = {moved}",
+        f"commutes with the Kahan maps of g and -g, g = (2*S*I, -2*S*I + I, S + R) + {moved}",
+    ]
+    monkeypatch.setattr(report, "_LONG", 10)
+    assert told() == ["commutes with a linear family of 3 parameters, which find-commuting writes out"] * 2
+
+
+@pytest.mark.parametrize(("points", "more"), [(8, []), (9, ["and 1 more set of fixed points: --json lists them"])])
+def test_as_many_fixed_points_are_told_as_three_quadratic_equations_have(points, more):
+    found = Analysis(System("x' = x^2 - 1; y' = y^2 - 1; z' = z^2 - 1"), None, 1.0, 0, ())
+    search = fixed_points(found.file.system)
+    found.fixed_points = replace(search, found=(*search.found, search.found[0])[:points])
+    lines = [line.text for line in dict(report.sections(found))["vector field"]]
+    assert sum(line.startswith("fixed point ") for line in lines) == 8
+    assert [line for line in lines if "more" in line] == more
+
+
 @pytest.mark.parametrize(
     ("name", "sense", "ground"),
     [
@@ -522,4 +553,4 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     integrable = analyze(load("weierstrass"))
     both = replace(integrable, degrees=found.degrees)
     assert both.conclusion.kind == "undecided"
-    assert "positive entropy is proved, which excludes an integral" in both.conclusion.sentence
+    assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence

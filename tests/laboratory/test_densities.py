@@ -18,6 +18,7 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.inline import System
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -271,6 +272,14 @@ def test_a_density_without_a_closed_form_is_told():
         [],
         "there is a density of degree 3 modulo primes, but no closed form: too long",
     )
+
+
+def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched():
+    tops = System("x' = 2*y*z; y' = -x*z; z' = -x*y; u' = v*w; v' = -3*u*w; w' = 2*u*v")
+    found = find_densities(tops)
+    assert [(one.degree(6), one.verdict) for one in found.densities] == [(8, Verdict.PROVED)]
+    assert found.degree == 8
+    assert find_densities(tops, integrals=()).densities == ()
 
 
 def test_a_proved_density_comes_before_supported_ones_of_less_degree():

@@ -12,6 +12,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_rational_function, parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.inline import System
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
@@ -205,6 +206,13 @@ def test_products_of_darboux_polynomials_of_a_flow_are_found_by_their_exponents(
     assert (one.text, str(one.verdict)) == ("x*y^3*(x + 2*y)^3", "proved")
     # div f is a multiple of the cofactor of no product of the lines with whole exponents, but of degree 3
     assert find_densities(THREE_LINES, flow=True, max_degree=2).densities == ()
+
+
+def test_members_of_the_pencil_of_an_integral_are_not_told_as_darboux_polynomials():
+    may_leonard = System("x' = x - x*(x + y/2 + 3/2*z); y' = y - y*(3/2*x + y + z/2); z' = z - z*(x/2 + 3/2*y + z)")
+    found = flow_and_map(find_integrals(may_leonard))
+    assert [one.name for one in found.others] == ["F1"]  # (x + y + z)^3/(x*y*z), up to a number
+    assert found.polynomials == ()
 
 
 def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():

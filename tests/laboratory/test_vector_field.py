@@ -182,3 +182,8 @@ def test_a_near_miss_is_no_equivalence():
 
 def test_a_system_of_the_catalogue_is_not_compared():
     assert equivalent_system(load("euler_top", a1=7)) is None
+
+
+def test_a_change_of_time_is_told_as_a_change_of_eps():
+    found = equivalent_system(System("x' = 20*(y - x); y' = 2*x*(28 - z) - 2*y; z' = 2*x*y - 16/3*z"))
+    assert found.text.endswith(", with 2*eps in place of eps")

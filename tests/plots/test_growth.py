@@ -59,6 +59,16 @@ def test_the_legend_says_formula_and_dynamical_degree():
     assert labels(figure) == [r"top: $d_n = 2n^{2} + 1$, $\lambda = 1$", r"lv: $\lambda = 2$"]
 
 
+def test_a_long_name_leaves_room_for_what_is_said_of_it():
+    equations = "x' = -x^2 - x*y/2 - 3/2*x*z + x, y' = -3/2*x*y - y^2 - y*z/2 + y, z' = -x*z/2 - 3/2*y*z - z^2 + z"
+    figure = draw_degrees({equations: growth(POWERS)})
+    [label] = labels(figure)
+    assert label.startswith("x' = -x^2 - x*y/2")
+    assert label.endswith(r"...: $\lambda = 2$")
+    figure.canvas.draw()
+    assert figure.legends[0].get_window_extent().x1 <= figure.bbox.x1
+
+
 def test_an_eps_is_told_with_what_the_time_step_is():
     figure = draw_degrees({"lv": replace(growth(POWERS), eps=TENTH), "top": growth(SQUARES)})
     assert labels(figure)[0] == r"lv, $\varepsilon = 1/10$: $\lambda = 2$"

@@ -10,6 +10,7 @@ from flint import fmpq
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.maps.kahan import KahanMap
@@ -189,6 +190,15 @@ def test_how_much_a_gap_is_magnified_is_a_number_and_no_computer_notation():
         "0.52",
         r"1.3\cdot10^{6}",
     ]
+
+
+def test_a_title_does_not_break_an_equation_at_its_sign():
+    f, g = System("S' = -2*S*I; I' = 2*S*I - I"), System("S' = I; I' = 1")
+    found = squares(pair_of_systems(f, g, "1/10"), [1, 2], "1/10")
+    figure = draw_squares([found], STYLE, captions=[f"{f.labelled('f')}, {g.labelled('g')}"])
+    first, second, *_ = figure.axes[0].get_title().splitlines()
+    assert not first.endswith("=")
+    assert "1)" in second
 
 
 def test_a_square_has_four_arrows_and_named_corners():

@@ -128,6 +128,15 @@ def test_a_portrait_says_which_orbits_ended_and_what_lies_outside():
     assert "outside" not in harmonic
 
 
+def test_a_system_with_an_algebraic_parameter_is_drawn_around_its_fixed_points():
+    field = "x' = x*(a - y); y' = y*(x - 1)"
+    html = portrait_figure(km.System(field, a="root of t^2 - 2 near 1.4"), None, Pictures())
+    assert "separatrix" in html
+    assert "outside" not in html
+    which = portrait_figure(km.System(field, a="root of t^2 - 2"), None, Pictures())
+    assert "machine numbers: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
+
+
 def test_names_and_titles_are_text(volterra):
     file = km.SystemFile.from_system(volterra.file.system, EVIL)
     page = require_sound(

@@ -27,8 +27,8 @@ def command(system: str | None, **options: Any) -> int:
 
     phi times any integral is a density again: the shortest is shown, --json has all that were found.
 
-    Products of powers of known polynomials are of any degree, exponents of either sign. What is found is verified as
-    an identity.
+    Products of powers of known polynomials are of any degree, exponents of either sign; where nothing else is found,
+    integrals are sought and their factors taken too. What is found is verified as an identity.
 
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """

@@ -36,7 +36,7 @@ from kahanmaps.laboratory.preserve.cofactors import (
 )
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, constant_structures
-from kahanmaps.laboratory.preserve.integrals import closing_note, toml_comment
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, closing_note, find_integrals, toml_comment
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 
 _MAX_UNKNOWNS = 1000
@@ -143,6 +143,7 @@ def find_densities(
     eps: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
+    integrals: Sequence[FoundIntegral] | None = None,
     seconds: float = 30.0,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -155,6 +156,8 @@ def find_densities(
         eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
         flow: ask for those of the differential equation instead, div(f/phi) = 0.
         max_degree: of phi; by default as the number of unknowns allows, at most 12.
+        integrals: those that are known: where nothing else is found phi may be a product of powers of their factors.
+            By default they are then sought.
         seconds: the time that the search may take, about.
         seed: of everything random.
         progress: is told what is being tried.
@@ -191,6 +194,15 @@ def find_densities(
             densities, tried, reason = _search(laboratory, product, max_degree, deadline, progress)
             if densities and all(one.verdict is not Verdict.PROVED for one in densities):
                 densities = [*_product_of_variables(laboratory, max_degree), *densities]
+            if not densities and turning is None and not flow and time.monotonic() < deadline:
+                if integrals is None:
+                    left = deadline - time.monotonic()
+                    found = find_integrals(file, symbols=symbols, eps=eps, seconds=left, seed=seed, progress=progress)
+                    integrals = found.integrals
+                progress("densities that are products of factors of integrals")
+                product, turning = _products(laboratory, max_degree, integrals)
+                if product is not None:
+                    densities, tried = [product], product.degree(dim)
     return DensitySearch(
         file,
         laboratory.free_symbols,
@@ -249,10 +261,13 @@ def _product_of_variables(laboratory: Laboratory, max_degree: int | None) -> lis
     return [] if proof is None else [FoundDensity(phi, Verdict.PROVED, proof)]
 
 
-def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDensity | None, FoundDensity | None]:
+def _products(
+    laboratory: Laboratory, max_degree: int | None, integrals: Sequence[FoundIntegral] = ()
+) -> tuple[FoundDensity | None, FoundDensity | None]:
     """A density that is a product of powers of known polynomials, or one that changes its sign, as far as there are."""
+    parts = [part for one in integrals for part in (one.function.numerator, one.function.denominator)]
     try:
-        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), parts)).density
     except NoPoint:
         return None, None
     phi = None if found is None else found.function

@@ -12,6 +12,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from math import prod
 from typing import Any
 
@@ -393,8 +394,11 @@ def _polynomials(
     n = laboratory.map.dim
     found = {str(P): P for P in sought if degree_in(P, n) > 1}
     for function in functions:
-        for part in (function.numerator, function.denominator):
-            for factor, _ in part.factor()[1]:
+        for part, other in permutations((function.numerator, function.denominator)):
+            # An irreducible P of the degree of Q is any member of the pencil P - c Q.
+            factors = part.factor()[1]
+            is_any = [k for _, k in factors] == [1] and degree_in(part, n) == degree_in(other, n)
+            for factor, _ in [] if is_any else factors:
                 P = primitive_part(factor)[1]
                 K = darboux_cofactor(laboratory.field, P) if degree_in(P, n) > 1 else None
                 if K is not None and not K.is_zero():

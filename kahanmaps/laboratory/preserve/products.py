@@ -93,19 +93,21 @@ class Products:
     in_time: tuple[Product, ...]
 
 
-def candidates(laboratory: Laboratory, cofactors: Sequence[Cofactor]) -> list[fmpq_mpoly]:
+def candidates(
+    laboratory: Laboratory, cofactors: Sequence[Cofactor], more: Sequence[fmpq_mpoly] = ()
+) -> list[fmpq_mpoly]:
     """Irreducible polynomials over Q in (variables, symbols, eps) that integrals and densities may be products of.
 
     They are the variables, the polynomials of the cofactors (affine Darboux functions of a system, and factors of
-    Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long; for a flow
-    its Darboux polynomials.
+    Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long, and of `more`;
+    for a flow its Darboux polynomials.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials().functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     known = [one.polynomial for one in cofactors if one.polynomial is not None]
     found: dict[str, fmpq_mpoly] = {}
-    for P in (*context.gens()[:n], *known, *_jacobians(laboratory)):
+    for P in (*context.gens()[:n], *known, *_jacobians(laboratory), *more):
         if laboratory.eps is not None:
             at: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
             P = P.subs(at)
