@@ -107,6 +107,7 @@ from kahanmaps.maps.bilinear import bilinear_map as bilinear_map
 from kahanmaps.maps.composed import composed_map as composed_map
 from kahanmaps.maps.explicit import explicit_map as explicit_map
 from kahanmaps.maps.floats.ensemble import FloatEnsemble as FloatEnsemble
+from kahanmaps.maps.floats.ensemble import ensemble as _ensemble
 from kahanmaps.maps.floats.fast import FloatOrbit as FloatOrbit
 from kahanmaps.maps.floats.fast import to_floats as to_floats
 from kahanmaps.maps.floats.lyapunov import Lyapunov as Lyapunov
@@ -164,6 +165,7 @@ equivalent_system = opened(_equivalent_system)
 fixed_points = opened(_fixed_points)
 convert = opened(_convert)
 lyapunov_exponents = opened(_lyapunov_exponents)
+ensemble = opened(_ensemble)
 orbit = opened(_orbit)
 map = opened(_map_at)
 portrait = opened(_draw_orbits)

@@ -106,8 +106,10 @@ def test_maps_are_called_and_composed():
     assert (phi @ psi)(x) == phi(psi(x)) != psi(phi(x)) == (psi @ phi)(x)
     assert (phi**3)(x) == phi(phi(phi(x)))
     assert (phi**-2)((phi**2)(x)) == x == (phi**-1 @ phi)(x)
-    with pytest.raises(InputError, match="power 0"):
-        phi**0
+    identity = phi**0
+    assert identity(x) == identity.inverse(x) == x != phi(x)
+    assert (phi @ identity)(x) == phi(x)
+    assert identity.determinant(x) == 1
     with pytest.raises(InputError, match="one dimension"):
         phi @ km.KahanMap(km.load("weierstrass").system, "1/10")
     with pytest.raises(TypeError):
@@ -116,6 +118,8 @@ def test_maps_are_called_and_composed():
 
 # What a user of Python writes without having read much, one expression a line.
 EXPRESSIONS = """
+km.ensemble("henon_heiles", np.full((5, 4), 0.1), "1/20", 50).x
+km.ensemble("euler_top", [[1, 2, 3]], time_step="1/5", steps=3, kernel="numpy").x
 km.degrees("euler_top", max_terms=4)
 km.degrees("euler_top", "1/10", max_terms=4)
 km.degrees("euler_top", eps="1/10", max_terms=4)

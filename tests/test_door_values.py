@@ -146,7 +146,6 @@ def test_starts_are_one_or_many_of_any_kind_of_number():
         ("km.flow_and_map(FISH)", "km.find_integrals"),
         ('km.FloatEnsemble(FISH, "1/20", [[1, 2]])', "expected a system or a map"),
         ("km.height(5)", "expected the coordinates"),
-        ('km.darboux_polynomials("weierstrass", 1).to_pandas()', "is no table"),
     ],
 )
 def test_wrong_arguments_are_told_in_a_sentence(expression, words):

@@ -103,12 +103,18 @@ class MapOver(ABC):
         return ComposedMapOver([other, self], self.eps, self.variables)
 
     def __pow__(self, power: int) -> MapOver:
-        """So many steps as one map, of the inverse for a negative number. Raises InputError for 0."""
+        """So many steps as one map, of the inverse for a negative number, the identity for 0."""
         if not isinstance(power, int):
             raise InputError(f"found the power {power!r}, expected an integer: a map has no roots here")
         if power == 0:
-            raise InputError("found the power 0, expected another number: the identity is no map here")
+            return self._at_rest()
         return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
+
+    def _at_rest(self) -> EquationMap:
+        n, one = self.dim, self.field.one
+        units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
+        rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # 1 x~ - x
+        return EquationMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, variables=self.variables)
 
     def __eq__(self, other: object) -> bool:
         """Whether the equations of the steps are the same, one after the other."""

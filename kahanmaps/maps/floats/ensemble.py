@@ -373,6 +373,24 @@ class Watched:
         return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
 
 
+def ensemble(
+    given: QuadraticSystem | BirationalMap, /, starts: Any, eps: Any, steps: int = 0, **options: Any
+) -> FloatEnsemble:
+    """The float orbits of many starts after `steps` steps; the arguments are those of `FloatEnsemble`.
+
+    Raises InputError for a number of steps that is negative, and what `FloatEnsemble` refuses.
+
+    >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
+    >>> ensemble(top, [[1, 0, 0], [0, "1/2", 0]], "1/10", 100, kernel="numpy").x.tolist()
+    [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
+    """
+    require_steps(steps)
+    found = FloatEnsemble(given, eps, starts, **options)
+    if steps:
+        found.advance(steps)
+    return found
+
+
 def block_drifts(stepping: Stepping, lanes: Lanes) -> Iterator[Drift]:
     """The drift of every block integral h/(1 + eps^2 D), up to now."""
     if stepping.blocks is None:
