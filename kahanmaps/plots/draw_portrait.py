@@ -141,7 +141,7 @@ def _draw_orbits(axes: Any, shown: FloatArray, lines: bool, colours: list[str], 
             few = len(orbit) <= _FEW and not below
             mark = {"markersize": 3.0, "marker": MARKS[k % len(MARKS)]} if few else {}
             points(axes, *orbit.T, **mark, **how, of=count)
-        if not below and shown.shape[1] > 1 and (lines or len(orbit) > _FEW):
+        if not below and (lines or len(orbit) > _FEW):
             start = {"marker": MARKS[k % len(MARKS)], "markersize": 4.0, "markeredgecolor": "white"}
             axes.plot(*orbit[:1].T, linestyle="none", markeredgewidth=0.5, **start, **{**how, "zorder": 3})
 

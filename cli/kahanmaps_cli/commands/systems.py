@@ -150,7 +150,7 @@ def _latex(file: Any) -> str:
 
 
 def _show(file: Any) -> None:
-    from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.algebra.text import format_factored, format_polynomial
 
     facts = _equations(file)
     tell(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
@@ -160,10 +160,10 @@ def _show(file: Any) -> None:
         tell(formula(line))
     if file.hamiltonian is not None:
         tell(f"H = {formula(format_polynomial(file.hamiltonian.H))}")
-    for name, text in facts["integrals"].items():
-        tell(f"integral {name} = {formula(text)}")
-    if facts["density"]:
-        tell(f"density phi = {formula(facts['density'])}  (dx/phi is invariant)")
+    for name, integral in file.integrals.items():
+        tell(f"integral {name} = {formula(format_factored(integral))}")
+    if file.density is not None:
+        tell(f"density phi = {formula(format_factored(file.density))}  (dx/phi is invariant)")
     known = _known_lines(file)
     if known:
         tell("for generic parameters and eps:" if file.parameters else "for generic eps:")
