@@ -118,6 +118,7 @@ from kahanmaps.maps.kahan import Kahan as Kahan
 from kahanmaps.maps.kahan import KahanMap as KahanMap
 from kahanmaps.maps.normal_form.iterate import Jump as Jump
 from kahanmaps.maps.normal_form.periods import orbit_period as orbit_period
+from kahanmaps.maps.normal_form.periods import period as _period
 from kahanmaps.maps.normal_form.periods import period_over_rationals as period_over_rationals
 from kahanmaps.maps.normal_form.steps import NormalSteps as NormalSteps
 from kahanmaps.maps.orbit import orbit as _orbit
@@ -167,6 +168,7 @@ convert = opened(_convert)
 lyapunov_exponents = opened(_lyapunov_exponents)
 ensemble = opened(_ensemble)
 orbit = opened(_orbit)
+period = opened(_period)
 map = opened(_map_at)
 portrait = opened(_draw_orbits)
 

@@ -106,6 +106,7 @@ def test_maps_are_called_and_composed():
     assert (phi @ psi)(x) == phi(psi(x)) != psi(phi(x)) == (psi @ phi)(x)
     assert (phi**3)(x) == phi(phi(phi(x)))
     assert (phi**-2)((phi**2)(x)) == x == (phi**-1 @ phi)(x)
+    assert phi.inverse()(phi(x)) == phi.inverse(phi(x)) == x
     identity = phi**0
     assert identity(x) == identity.inverse(x) == x != phi(x)
     assert (phi @ identity)(x) == phi(x)
@@ -118,6 +119,8 @@ def test_maps_are_called_and_composed():
 
 # What a user of Python writes without having read much, one expression a line.
 EXPRESSIONS = """
+km.period("x' = 2*x*y; y' = -x^2 - y^2", [1, 2], "1/10").status
+km.period("paper_m2", [1, 2, 0, 1], time_step="1/5", prime=10007).period
 km.ensemble("henon_heiles", np.full((5, 4), 0.1), "1/20", 50).x
 km.ensemble("euler_top", [[1, 2, 3]], time_step="1/5", steps=3, kernel="numpy").x
 km.degrees("euler_top", max_terms=4)

@@ -123,7 +123,6 @@ def test_starts_are_one_or_many_of_any_kind_of_number():
 @pytest.mark.parametrize(
     ("expression", "words"),
     [
-        ("phi()", "found no point"),
         ("phi(None)", "expected 2: q, p"),
         ("phi ** 0.5", "expected an integer"),
         ("km.load(None)", "found a NoneType, expected the name"),
@@ -145,6 +144,7 @@ def test_starts_are_one_or_many_of_any_kind_of_number():
         ('km.period_over_rationals(FISH, "1/10", [1, 0])', "expected a normal form"),
         ("km.flow_and_map(FISH)", "km.find_integrals"),
         ('km.FloatEnsemble(FISH, "1/20", [[1, 2]])', "expected a system or a map"),
+        ('km.period("lorenz", [1, 2, 3], "1/10")', "found no normal form"),
         ("km.height(5)", "expected the coordinates"),
     ],
 )

@@ -88,10 +88,10 @@ class MapOver(ABC):
             raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{named}")
         return tuple(self.field.convert(value) for value in values)
 
-    def __call__(self, *point: Any) -> tuple[Any, ...]:
-        """The image of a point, of phi((1, 2)) and phi(1, 2) alike."""
+    def __call__(self, *point: Any) -> Any:
+        """The image of a point, of phi((1, 2)) and phi(1, 2) alike; phi() is phi, for who writes phi.inverse()."""
         if not point:
-            raise InputError("found no point, expected phi(x); the inverse map, phi.inverse, is called in the same way")
+            return self
         return self.step(point[0] if len(point) == 1 and hasattr(point[0], "__len__") else point)
 
     def __matmul__(self, other: MapOver) -> MapOver:

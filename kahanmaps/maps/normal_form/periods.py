@@ -33,11 +33,13 @@ from flint import (
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.plain import all_fields
 from kahanmaps.displayed import Printed
+from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.splitting import Plane, Splitting
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
 _WALK = 1 << 16  # steps taken where no theorem helps
@@ -343,6 +345,20 @@ def period_of(structure: Structure, eps: Any, start: Sequence[Any], prime: int |
     if prime is None:
         return period_over_rationals(structure.form, eps, point)
     return orbit_period(structure.form, eps, point, prime)
+
+
+def period(system: QuadraticSystem, start: Sequence[Any], eps: Any, prime: int | None = None) -> OrbitPeriod:
+    """The period of an orbit of the Kahan map of a system that has a normal form: see `period_of`.
+
+    Raises InputError where it has none, with the reason.
+
+    >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
+    'aperiodic'
+    """
+    structure = structure_of(system)
+    if isinstance(structure, NoStructure):
+        raise InputError(f"found no normal form ({structure.reason}), expected a system that has one")
+    return period_of(structure, eps, start, prime)
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:
