@@ -120,15 +120,13 @@ def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Map
     from kahanmaps.experiments.run import Batch
 
     with closing(_executor(store, progress, options)) as executor:
-        batch = Batch(jobs, executor)
-
-        def interrupt() -> None:
-            batch.interrupt()
-            if executor.in_flight:
-                progress.say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
-
-        with interruptible(interrupt):
+        batch, is_told = Batch(jobs, executor), False
+        with interruptible(batch.interrupt):
             for records in batch:
+                if batch.was_interrupted and not is_told:  # not in the handler, which may find a line half written
+                    is_told = True
+                    if executor.in_flight:
+                        progress.say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
                 if records:
                     store.add(records)
                 progress.tell(records, executor.in_flight)
