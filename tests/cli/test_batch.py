@@ -351,6 +351,7 @@ def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_
     def pressed(interrupt: Callable[[], None]) -> Iterator[None]:
         with monkeypatch.context() as patched:
             patched.setattr("kahanmaps_cli.progress.click.echo", lambda *_, **__: told.append("in the handler"))
+            patched.setattr("kahanmaps.experiments.children.LocalChildren.in_flight", 2)
             interrupt()
         yield
 
