@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from kahanmaps.errors import InputError
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.numbers import json_float, json_number, short_float
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.planar import NormalForm
-    from kahanmaps.family.structure import NoStructure, Structure
 
 FAILURES_SHOWN = 20
 _WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded
@@ -26,16 +19,14 @@ _PIECE = 0.1  # seconds between looks at Ctrl-C
 Told = Callable[[int], None]
 
 
-def structure_for(file: SystemFile, wish: str | None) -> Structure | NoStructure:
+def structure_for(file: lib.SystemFile, wish: str | None) -> lib.Structure | lib.NoStructure:
     """The normal form that steps are made in, or why there is none."""
-    from kahanmaps.family.structure import NoStructure
-
     if wish == "generic":
-        return NoStructure("generic, as asked for")
+        return lib.NoStructure("generic, as asked for")
     structure = file.structure
-    if not isinstance(structure, NoStructure) and structure.T is not None:
-        structure = NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
-    if isinstance(structure, NoStructure) and wish == "normal-form":
+    if not isinstance(structure, lib.NoStructure) and structure.T is not None:
+        structure = lib.NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
+    if isinstance(structure, lib.NoStructure) and wish == "normal-form":
         raise InputError(f"the method normal-form needs a normal form, and there is none: {structure.reason}")
     return structure
 
@@ -61,24 +52,22 @@ class FloatRun(_Walk):
 
     def __init__(
         self,
-        file: SystemFile,
+        file: lib.SystemFile,
         eps: Any,
-        starts: NDArray[Any],
-        form: NormalForm | None,
-        integrals: Mapping[str, RationalFunction],
+        starts: lib.NDArray[Any],
+        form: lib.NormalForm | None,
+        integrals: Mapping[str, lib.RationalFunction],
         steps: int,
         options: dict[str, Any],
     ) -> None:
-        from kahanmaps.maps.floats.fast import FloatEnsemble, float_function, to_float
+        value = lib.to_float(eps)  # backward too: the inverse conserves what the map conserves
 
-        value = to_float(eps)  # backward too: the inverse conserves what the map conserves
-
-        def of_point(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
-            found = float_function(function)
+        def of_point(function: lib.RationalFunction) -> Callable[[Sequence[float]], float | None]:
+            found = lib.float_function(function)
             return lambda x: found([*x, value])
 
         self.asked = len(integrals)
-        self.ensemble = FloatEnsemble(
+        self.ensemble = lib.FloatEnsemble(
             file.map,
             eps,
             starts,
@@ -123,9 +112,7 @@ class FloatRun(_Walk):
 
     def _first_and_last(self, steps: int, look: int, output: str, progress: Told) -> None:
         """Look at integrals more often than points are kept."""
-        from kahanmaps.maps.floats.stream import NpyFile
-
-        with NpyFile(output, self.shape) as file:
+        with lib.NpyFile(output, self.shape) as file:
             file.append(self.ensemble.x[None])
             for _ in self.ensemble.records(steps, look, progress=progress):
                 pass
@@ -188,20 +175,18 @@ class ModularRun(_Walk):
 
     def __init__(
         self,
-        file: SystemFile,
+        file: lib.SystemFile,
         eps: Any,
-        starts: NDArray[Any],
-        form: NormalForm | None,
-        integrals: Mapping[str, RationalFunction],
+        starts: lib.NDArray[Any],
+        form: lib.NormalForm | None,
+        integrals: Mapping[str, lib.RationalFunction],
         steps: int,
         options: dict[str, Any],
     ) -> None:
-        from kahanmaps.maps.residues.ensemble import ModularEnsemble
-
         self.file = file
         self.eps = eps
         self.backward: bool = options["backward"]
-        self.ensemble = ModularEnsemble(
+        self.ensemble = lib.ModularEnsemble(
             file.map,
             eps,
             starts,
@@ -223,13 +208,11 @@ class ModularRun(_Walk):
         return len(self.ensemble), self.ensemble.system.dim
 
     def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
-        from kahanmaps.maps.floats.stream import NpyFile
-
         if output is None:
             self._advance(steps, told)
             return
         every = every or max(1, steps)
-        with NpyFile(output, self.shape, "<i8") as file:
+        with lib.NpyFile(output, self.shape, "<i8") as file:
             file.append(self.ensemble.x[None])
             while self.reached + every <= steps and self._advance(self.reached + every, told):
                 file.append(self.ensemble.x[None])
@@ -250,10 +233,8 @@ class ModularRun(_Walk):
         return self.reached >= stop
 
     def _values(self) -> dict[str, list[Any]]:
-        from kahanmaps.invariants.integrals import ClaimedIntegral
-
         field = self.ensemble.field
-        claims = {name: ClaimedIntegral(name, function) for name, function in self._integrals.items()}
+        claims = {name: lib.ClaimedIntegral(name, function) for name, function in self._integrals.items()}
         points = self.ensemble.x.tolist() if claims else []
         return {
             name: [claim.value(field, self.eps, [field.convert(entry) for entry in x]) for x in points]
@@ -266,10 +247,8 @@ class ModularRun(_Walk):
         return {"completed": len(self.ensemble) - singular, "singular": singular}
 
     def failures(self) -> Iterator[dict[str, Any]]:
-        from kahanmaps.maps.implicit import det_of
-
         over = self.file.map.at(self.eps, self.ensemble.field)
-        det = det_of(over.denominator_name(self.backward))
+        det = lib.det_of(over.denominator_name(self.backward))
         for orbit in (self.ensemble.singular_at >= 0).nonzero()[0].tolist():
             at = int(self.ensemble.singular_at[orbit])
             message = f"{det} = 0 at step {at}: the map has no value there"

@@ -212,7 +212,7 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: where a class is being made, in an import, Python raises RuntimeError for it."""
+    """Whether Ctrl-C is behind an error: Python makes RuntimeError of it where a class is being made, in an import."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps.errors import InputError, quoted
+from kahanmaps_cli import library as lib
 
 if TYPE_CHECKING:
     OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
@@ -44,21 +45,15 @@ class Kind(OptionType):
 
 
 def _read_number(text: str) -> Any:
-    from kahanmaps.algebra.text import parse_number
-
-    return parse_number(text)
+    return lib.parse_number(text)
 
 
 def _read_point(text: str) -> Any:
-    from kahanmaps.algebra.text import parse_point
-
-    return parse_point(text)
+    return lib.parse_point(text)
 
 
 def _read_arithmetic(text: str) -> Any:
-    from kahanmaps.maps.arithmetic import Arithmetic
-
-    return Arithmetic.parse(text)
+    return lib.Arithmetic.parse(text)
 
 
 def _read_whole(text: str, least: int) -> int:
@@ -74,8 +69,7 @@ def _read_short_integer(text: str) -> int:
     text = text.strip()
     if len(text) > _MOST_DIGITS:
         raise InputError(f"found {quoted(text)}, expected an integer of at most {_MOST_DIGITS} digits")
-    number: int = click.INT.convert(_spelt_out(text), None, None)
-    return number
+    return int(click.INT(_spelt_out(text)))
 
 
 def _read_seconds(text: str) -> float:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Event
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
 from kahanmaps.errors import quoted
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     eps_options,
     is_inline,
@@ -21,9 +22,6 @@ from kahanmaps_cli.options import (
 )
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.signals import interruptible
-
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.scan.result import Scan
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -62,12 +60,8 @@ def names_of(options: dict[str, Any]) -> list[str]:
     return names
 
 
-def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
+def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Scan:
     """The scan that a command line asks for."""
-    from kahanmaps.laboratory.scan.kept import Kept
-    from kahanmaps.laboratory.scan.scan import scan
-    from kahanmaps.laboratory.scan.sweep import TimeOver
-
     names = names_of(options)
     if is_inline(options, system):
         given = {"eps", *(name for name, _ in options["parameters"])}
@@ -79,11 +73,11 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
 
     def told(sentence: str) -> None:
         if interrupted.is_set():
-            raise TimeOver
+            raise lib.TimeOver
         progress(sentence)
 
     with Progress(quiet) as progress, interruptible(interrupted.set):
-        return scan(
+        return lib.scan(
             file,
             names,
             eps=the_eps(options["eps"], options["time_step"], required=False),
@@ -94,12 +88,12 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
             seconds=options["seconds"],
             seed=options["seed"],
             jobs=options["jobs"],
-            kept=None if options.get("keep") is None else Kept(options["keep"], *(options["shard"] or ())),
+            kept=None if options.get("keep") is None else lib.Kept(options["keep"], *(options["shard"] or ())),
             progress=told,
         )
 
 
-def ending(found: Scan, quiet: bool) -> int:
+def ending(found: lib.Scan, quiet: bool) -> int:
     """The exit status, and a word where it is not 0."""
     if found.ended in ("complete", "part"):
         return 0

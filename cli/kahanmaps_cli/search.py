@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     eps_options,
     output_options,
@@ -52,24 +53,20 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 def scope(found: Any) -> str:
     """For which eps and which symbols the formulas hold, to follow the name of the map."""
-    from kahanmaps.checks.settings import eps_record, eps_words
-
     if getattr(found, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
-    step = eps_words(eps_record(found.eps, found.file.map))
+    step = lib.eps_words(lib.eps_record(found.eps, found.file.map))
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 
 def heading(name: str, found: Any) -> dict[str, Any]:
     """What is needed to redo a search, as plain data."""
-    from kahanmaps.checks.settings import eps_record
-
     return {
         **envelope(name),
         "system": found.file.name,
         "parameters": {key: str(value) for key, value in found.file.parameters.items()},
         "symbols": list(found.symbols),
-        **eps_record(found.eps, found.file.map),
+        **lib.eps_record(found.eps, found.file.map),
         "arithmetic": "exact formulas, from residues modulo primes",
         "seed": found.seed,
     }

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
@@ -17,9 +18,6 @@ from kahanmaps_cli.params import Shard
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo
-
-if TYPE_CHECKING:
-    from kahanmaps.experiments.store import Store
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -155,13 +153,12 @@ def show(key: str, db: str, as_json: bool) -> None:
 
     KEY: the first digits of its key, four or more; batch run --dry-run and batch export have the keys.
     """
-    from kahanmaps.errors import InputError
     from kahanmaps_cli.batch_show import found_data, print_found
 
     with _open(db) as store:
         found = store.find(key)
         if not found:
-            raise InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
+            raise lib.InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
         data = [found_data(store, one) for one in found]
     if as_json:
         for one in data:
@@ -240,10 +237,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
     Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
     """
-    from kahanmaps.errors import counted
-    from kahanmaps.experiments.store import Store
-
-    with Store.open(target, create=True) as store:
+    with lib.Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]
     conflicts = sum(found.conflicts for _, found in merged)
     if as_json:
@@ -256,7 +250,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     if conflicts and not quiet:
         keys = [key for _, found in merged for key in found.conflicting]
         say(
-            f"{counted(conflicts, 'task')} with different results in two databases, those of {target} were kept: "
+            f"{lib.counted(conflicts, 'task')} with different results in two databases, those of {target} were kept: "
             f"{', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''} (batch show KEY --db FILE)"
         )
     return 3 if conflicts else 0
@@ -277,7 +271,5 @@ def tasks(name: str | None, as_json: bool) -> None:
     print_tasks(name, as_json)
 
 
-def _open(db: str) -> Store:
-    from kahanmaps.experiments.store import Store
-
-    return Store.open(db, readonly=True)
+def _open(db: str) -> lib.Store:
+    return lib.Store.open(db, readonly=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     eps_options,
     output_options,
@@ -19,10 +20,6 @@ from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 _SHOWN = 8  # degrees in a line of a table
 
@@ -71,7 +68,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     eps = the_eps(options["eps"], options["time_step"], required=False)
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
+    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         found = measured(file, eps, options, progress)
         more = ", ..." if len(found.degrees) > _SHOWN else ""
         line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
@@ -83,11 +80,11 @@ def command(system: str | None, **options: Any) -> int:
     return table(system, options, cell)
 
 
-def measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]) -> DegreeGrowth:
+def measured(
+    file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
+) -> lib.DegreeGrowth:
     """The degrees that the options ask for."""
-    from kahanmaps.laboratory.growth.degrees import degree_growth
-
-    return degree_growth(
+    return lib.degree_growth(
         file.map,
         eps,
         seconds=options["seconds"],
@@ -99,14 +96,14 @@ def measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Call
     )
 
 
-def is_done(found: DegreeGrowth, terms: int | None) -> bool:
+def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
     """Whether nothing was left open that was asked for: `terms` degrees, or (None) a recurrence."""
     if found.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and found.recurrence is not None
 
 
-def _print(file: SystemFile, found: DegreeGrowth) -> None:
+def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 63 bits"
     at = "generic eps" if eps is None else f"eps = {eps}"
     if eps is not None and file.map.has_time_step:
@@ -116,7 +113,7 @@ def _print(file: SystemFile, found: DegreeGrowth) -> None:
     tell(found.text)
 
 
-def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
+def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth) -> dict[str, Any]:
     time_step = "generic" if found.eps is None else str(2 * found.eps)
     return record_of(
         "degrees",

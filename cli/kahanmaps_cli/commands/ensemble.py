@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.errors import counted, quoted
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import (
@@ -27,10 +28,6 @@ from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
-
-if TYPE_CHECKING:
-    from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.documents.files import SystemFile
 
 _MAX_STEPS = 10**13  # years
 _MAX_BITS = 61
@@ -78,18 +75,15 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
-    from flint import fmpq
-
-    from kahanmaps.algebra.fields import GF, QQ
-    from kahanmaps.family.structure import NoStructure
-
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
     file = load_system(system, options)
     integrals = _integrals(options["integrals"], file)
     eps = eps_of(file, options)
-    number = fmpq(1) if eps is None else eps
-    file.map.at(number, GF(prime) if kind == "mod" else QQ)  # the demands on eps and the prime, in the words of orbit
+    number = lib.fmpq(1) if eps is None else eps
+    file.map.at(
+        number, lib.GF(prime) if kind == "mod" else lib.QQ
+    )  # the demands on eps and the prime, in the words of orbit
     if options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, prime if kind == "mod" else None)
     else:
@@ -97,11 +91,11 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         seed = options["seed"] or 0
         starts = drawn(options["count"], file.dim, box, seed, prime if kind == "mod" else None)
     structure = structure_for(file, options["method"])
-    form = None if isinstance(structure, NoStructure) else structure.form
+    form = None if isinstance(structure, lib.NoStructure) else structure.form
     made = ModularRun if kind == "mod" else FloatRun
     run: Run = made(file, number, starts, form, integrals, options["steps"], options)
     if verbose and not quiet:
-        why = structure.reason if isinstance(structure, NoStructure) else structure.text
+        why = structure.reason if isinstance(structure, lib.NoStructure) else structure.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
     steps, output = options["steps"], options["output"]
     try:
@@ -150,8 +144,8 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _integrals(requests: tuple[tuple[str, str], ...], file: SystemFile) -> dict[str, RationalFunction]:
-    found: dict[str, RationalFunction] = {}
+def _integrals(requests: tuple[tuple[str, str], ...], file: lib.SystemFile) -> dict[str, lib.RationalFunction]:
+    found: dict[str, lib.RationalFunction] = {}
     for k, request in enumerate(requests, start=1):
         name, function = asked_integral(file, *request, f"I{k}")
         if name in found:
@@ -165,13 +159,11 @@ def _arithmetic(options: dict[str, Any]) -> str:
     return f"mod:{number}" if kind == "mod" else str(kind)
 
 
-def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
+def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
     """Tab-separated lines, aligned on a terminal."""
-    from kahanmaps.checks.settings import eps_record, eps_words
-
     backward = ", backward" if options["backward"] else ""
     arithmetic = _arithmetic(options)
-    tell(f"# {file.name}{eps_words(eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
+    tell(f"# {file.name}{lib.eps_words(lib.eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()
@@ -188,18 +180,15 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
         tell(f"{name}\t{text}", 15)
 
 
-def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import eps_record
-
+def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
     steps, output = options["steps"], options["output"]
     drawn_at_random = options["starts"] is None
     box = None
     if drawn_at_random and options["arithmetic"][0] == "float":
-        box = "1" if options["box"] is None else format_number(options["box"])
+        box = "1" if options["box"] is None else lib.format_number(options["box"])
     every = options["every"] or max(1, steps)
     more = {
-        **eps_record(eps, file.map),
+        **lib.eps_record(eps, file.map),
         "variables": list(file.variables),
         "method": run.method,
         "kernel": run.kernel,

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     error_bits_option,
     load_system,
@@ -48,14 +49,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
     """
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
-
     file = load_system(system, options)
     seed, error_bits = options["seed"], options["error_bits"]
-    settings = Settings(seed=seed, error_bits=error_bits)
+    settings = lib.Settings(seed=seed, error_bits=error_bits)
     with Progress(quiet) as progress:
-        found = find_commuting(
+        found = lib.find_commuting(
             file.system if file.map.root is None else file.map,
             options["shape"],
             seed=seed,

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
@@ -32,15 +33,13 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
-    from kahanmaps.laboratory.preserve.densities import find_densities
-
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow goes without --toml, which is about the map")
-        found = find_densities(
+        found = lib.find_densities(
             file,
             symbols=symbols,
             eps=eps,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     Renamed,
     eps_options,
@@ -20,10 +21,6 @@ from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 
 
 @click.command("heights")
@@ -76,11 +73,9 @@ def command(system: str | None, **options: Any) -> int:
     eps = the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
-        from kahanmaps.invariants.heights import Growth
-
+    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         found = surveyed(file, eps, options, progress)
-        undecided = f"undecided: {found.text}" if found.kind is Growth.UNDECIDED else ""
+        undecided = f"undecided: {found.text}" if found.kind is lib.Growth.UNDECIDED else ""
         if not found.is_whole:
             undecided = "stopped early: the time was over before all orbits were finished"
         return Cell(found.text, lambda: _record(file, options, found), lambda: _print(file, found), undecided)
@@ -94,14 +89,12 @@ def require_heights(options: dict[str, Any]) -> None:
         raise click.UsageError("give --start X or --random N, not both")
 
 
-def surveyed(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> HeightSurvey:
+def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> lib.HeightSurvey:
     """The orbits that the options ask for."""
-    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
-
-    return height_survey(
+    return lib.height_survey(
         file.map,
         eps,
-        starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
+        starts=options["given"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
         steps=options["steps"],
         max_digits=options["max_digits"],
         seconds=options["seconds"],
@@ -111,7 +104,7 @@ def surveyed(file: SystemFile, eps: Any, options: dict[str, Any], progress: Prog
     )
 
 
-def _print(file: SystemFile, found: HeightSurvey) -> None:
+def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     if file.map.has_time_step:
         each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
@@ -122,7 +115,7 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
     tell(str(found))
 
 
-def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
+def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey) -> dict[str, Any]:
     values = [str(value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits)]
     steps = [str(2 * value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits) if file.map.has_time_step]
     asked = {name: options[name] for name in ("seed", "steps", "max_digits", "seconds")}

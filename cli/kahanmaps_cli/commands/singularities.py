@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     eps_options,
     load_system,
@@ -18,11 +19,6 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import formula, tell
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.singular.outcomes import Hypersurface
-    from kahanmaps.laboratory.singular.singularities import SingularityRun
 
 
 @click.command("singularities")
@@ -64,14 +60,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 done, 2 usage error, 3 undecided (stopped by the clock, or two points or two eps that differ).
     """
-    from kahanmaps.laboratory.singular.outcomes import UNDECIDED
-    from kahanmaps.laboratory.singular.singularities import default_eps, singularities, symbolic_denominator
+    from kahanmaps.laboratory.singular.singularities import default_eps
 
     eps = the_eps(options["eps"], options["time_step"], required=False)
     file = load_system(system, options)
     with Progress(quiet) as progress:
         runs = [
-            singularities(
+            lib.singularities(
                 file.map,
                 value,
                 steps=options["steps"],
@@ -82,18 +77,18 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))
         ]
     agree = len({run.shape for run in runs}) == 1
-    verdict = runs[0].verdict if agree else UNDECIDED
-    symbolic = symbolic_denominator(file.map) if eps is None else None
+    verdict = runs[0].verdict if agree else lib.UNDECIDED
+    symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
         print_json(_record(file, options, runs, symbolic, verdict))
     else:
         _print(file, runs, symbolic, runs[0].text if agree else verdict)
-    if verdict == UNDECIDED and not quiet:
+    if verdict == lib.UNDECIDED and not quiet:
         say(f"undecided: {_why(runs, agree)}")
-    return 3 if verdict == UNDECIDED else 0
+    return 3 if verdict == lib.UNDECIDED else 0
 
 
-def _why(runs: list[SingularityRun], agree: bool) -> str:
+def _why(runs: list[lib.SingularityRun], agree: bool) -> str:
     if any(run.stopped for run in runs):
         return "stopped by the clock: give more --seconds"
     if not agree:
@@ -101,7 +96,9 @@ def _why(runs: list[SingularityRun], agree: bool) -> str:
     return next(h.note for run in runs for h in run.hypersurfaces if h.note)
 
 
-def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str) -> None:
+def _print(
+    file: lib.SystemFile, runs: list[lib.SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str
+) -> None:
     name = file.map.denominator_name
     tell(f"# {file.name}, dimension {file.map.dim}" + (", eps is half the time step" if file.map.has_time_step else ""))
     if symbolic is not None:
@@ -115,30 +112,27 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
 
 
 def _record(
-    file: SystemFile,
+    file: lib.SystemFile,
     options: dict[str, Any],
-    runs: list[SingularityRun],
+    runs: list[lib.SingularityRun],
     symbolic: list[tuple[str, int]] | None,
     verdict: str,
 ) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes
-    from kahanmaps.laboratory.singular.singularities import steps_by_default
-
     return record_of(
         "singularities",
         file,
         "exact; series modulo primes",
         seed=options["seed"],
-        steps=options["steps"] or steps_by_default(file.map.dim),
+        steps=options["steps"] or lib.steps_by_default(file.map.dim),
         seconds=options["seconds"],
         verdict=verdict,
         symbolic_denominator=symbolic,
         runs=[
             {
-                **attributes(
+                **lib.attributes(
                     run, "verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text"
                 ),
-                **attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
+                **lib.attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
                 "eps": str(run.eps),
                 "time_step": str(2 * run.eps),
                 "maps_a_step": None if run.word is None else run.word.length,
@@ -149,15 +143,13 @@ def _record(
     )
 
 
-def _hypersurface(found: Hypersurface) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes
-
+def _hypersurface(found: lib.Hypersurface) -> dict[str, Any]:
     steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
     return {
-        **attributes(
+        **lib.attributes(
             found, "polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at"
         ),
-        **attributes(found, "followed", "settled_at", "note", "stage"),
+        **lib.attributes(found, "followed", "settled_at", "note", "stage"),
         **{name: [getattr(step, of) for step in found.steps] for name, of in steps.items()},
         "primes": [str(prime) for prime in found.primes],
     }

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.options import (
     eps_options,
@@ -73,11 +74,6 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
     Misprints are expected to be refuted and do not count.
     """
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.paper.survivors import survivors
-    from kahanmaps.paper.verifier import VerifyOptions
-    from kahanmaps.paper.verify import verify, verify_universal
-
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
     drawn = {name: options[name] for name in DRAWN}
@@ -93,13 +89,13 @@ def command(system: str | None, **options: Any) -> int:
     if system is None and options["parameters"]:
         raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
     with Progress(options["quiet"]) as progress:
-        settings = Settings(
+        settings = lib.Settings(
             eps=the_eps(options["eps"], options["time_step"], required=False),
             seed=options["seed"],
             error_bits=options["error_bits"],
             progress=progress,
         )
-        what = VerifyOptions(
+        what = lib.VerifyOptions(
             options["sections"] or None,
             options["order"],
             options["ball_bits"],
@@ -107,13 +103,13 @@ def command(system: str | None, **options: Any) -> int:
             options["beyond"],
         )
         if options["beyond"] and not options["controls"]:
-            report = survivors(3 if drawn["m"] is None else drawn["m"], settings)
+            report = lib.survivors(3 if drawn["m"] is None else drawn["m"], settings)
         elif options["universal"] or options["beyond"]:
-            report = verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
+            report = lib.verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
             if system is not None:
                 file = load_system(system, {"parameters": options["parameters"]})
             else:
                 file = drawn_file(options)
-            report = verify(file, settings, what)
+            report = lib.verify(file, settings, what)
     return print_verification(report, options["as_json"], options["as_markdown"], options["verbose"], options["quiet"])
