@@ -9,15 +9,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.options import (
-    eps_options,
-    load_system,
-    output_options,
-    seconds_option,
-    seed_option,
-    symbolic_option,
-    system_options,
-)
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import symbols_and_eps
@@ -27,13 +19,13 @@ INTERRUPTED = 130
 
 
 @click.command("analyze")
-@system_options
-@eps_options
-@symbolic_option
-@seconds_option(None, "Time for everything (default: 16 to 150 by dimension).")
-@seed_option
+@opt.system_options
+@opt.eps_options
+@opt.symbolic_option
+@opt.seconds_option(None, "Time for everything (default: 16 to 150 by dimension).")
+@opt.seed_option
 @click.option("--markdown", is_flag=True, help="The report in Markdown.")
-@output_options
+@opt.output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
     """What the map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
 
@@ -61,7 +53,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     report = _Report(as_json or markdown)
     is_interrupted = False
     with Progress(quiet) as progress:

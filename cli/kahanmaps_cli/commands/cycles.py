@@ -8,14 +8,8 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.numbers import read_matrix
-from kahanmaps_cli.options import (
-    output_options,
-    seconds_option,
-    seed_option,
-    several_eps_options,
-    system_or_prime_options,
-)
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
@@ -25,15 +19,15 @@ _STOPPED = "stopped by the clock: give more --seconds, fewer --samples or a smal
 
 
 @click.command("cycles")
-@system_or_prime_options
+@opt.system_or_prime_options
 @click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="The prime; repeatable.")
-@several_eps_options
+@opt.several_eps_options
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of making the whole graph.")
 @click.option("--steps", type=int, metavar="N", help="... for at most N steps (default 8 (p + 1 + 2 sqrt p)).")
 @click.option("--reversor", metavar="ROWS", help="A matrix R with f(R x) = -R f(x): '1,0;0,-1'.")
-@seconds_option(60.0, "Time for the samples of one run.")
-@seed_option
-@output_options
+@opt.seconds_option(60.0, "Time for the samples of one run.")
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """The orbits of the map of SYSTEM on projective space over a finite field, and how long its cycles are.
 

@@ -8,14 +8,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.options import (
-    eps_options,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
@@ -25,9 +18,9 @@ _SHOWN = 8  # degrees in a line of a table
 
 
 @click.command("degrees")
-@system_options
-@eps_options
-@seconds_option(10.0, "Stop after about so many seconds.")
+@opt.system_options
+@opt.eps_options
+@opt.seconds_option(10.0, "Stop after about so many seconds.")
 @click.option(
     "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
 )
@@ -37,8 +30,8 @@ _SHOWN = 8  # degrees in a line of a table
 @click.option(
     "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."
 )
-@seed_option
-@output_options
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
 
@@ -66,7 +59,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
     vary; 2 usage error; 3 undecided, or stopped early.
     """
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 
     def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         found = measured(file, eps, options, progress)

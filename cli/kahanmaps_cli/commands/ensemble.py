@@ -9,19 +9,9 @@ import click
 
 from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
-from kahanmaps_cli.options import (
-    asked_integral,
-    backward_option,
-    eps_of,
-    eps_options,
-    integral_option,
-    load_system,
-    output_options,
-    random_starts_options,
-    system_options,
-)
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, Whole
 from kahanmaps_cli.progress import Progress, say
@@ -34,11 +24,11 @@ _MAX_BITS = 61
 
 
 @click.command("ensemble")
-@system_options
-@random_starts_options
-@eps_options
+@opt.system_options
+@opt.random_starts_options
+@opt.eps_options
 @click.option("--steps", type=int, metavar="N", required=True, help="How many steps to take.")
-@backward_option
+@opt.backward_option
 @click.option(
     "--arithmetic",
     type=Arithmetic(),
@@ -49,12 +39,12 @@ _MAX_BITS = 61
 )
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
-@integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
+@opt.integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
 @click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
 @click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
-@output_options
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """Many orbits of the map of SYSTEM at once: how many go through, and how well integrals are kept.
 
@@ -77,9 +67,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     """
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     integrals = _integrals(options["integrals"], file)
-    eps = eps_of(file, options)
+    eps = opt.eps_of(file, options)
     number = lib.fmpq(1) if eps is None else eps
     file.map.at(
         number, lib.GF(prime) if kind == "mod" else lib.QQ
@@ -147,7 +137,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
 def _integrals(requests: tuple[tuple[str, str], ...], file: lib.SystemFile) -> dict[str, lib.RationalFunction]:
     found: dict[str, lib.RationalFunction] = {}
     for k, request in enumerate(requests, start=1):
-        name, function = asked_integral(file, *request, f"I{k}")
+        name, function = opt.asked_integral(file, *request, f"I{k}")
         if name in found:
             raise click.UsageError(f"found two integrals of the name {name}: write --integral NAME=EXPR")
         found[name] = function

@@ -10,18 +10,10 @@ import click
 
 from kahanmaps.errors import quoted
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.numbers import read_matrix
-from kahanmaps_cli.options import (
-    json_option,
-    load_system,
-    parameter_option,
-    quiet_option,
-    seed_option,
-    system_argument,
-    system_options,
-)
 from kahanmaps_cli.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
@@ -44,10 +36,10 @@ def command() -> None:
 @command.command("new")
 @draw_options
 @click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
-@seed_option
+@opt.seed_option
 @click.option("--name", help="The name in the file.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
-@quiet_option
+@opt.quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
     """Draw a member at random and write it as a system file.
 
@@ -71,9 +63,9 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
 
 @command.command("show")
-@system_options
+@opt.system_options
 @click.option("--normal-form", is_flag=True, help="Also the system as one planar cubic h(X, Y) over K = Q[t]/chi.")
-@json_option
+@opt.json_option
 def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
 
@@ -86,7 +78,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
     A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
     """
-    file, member, hidden = _member_or_hidden(load_system(system, options))
+    file, member, hidden = _member_or_hidden(opt.load_system(system, options))
     data: dict[str, Any] = {
         **envelope("family show"),
         "system": file.name,
@@ -129,10 +121,10 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
 
 
 @command.command("space")
-@system_argument
-@parameter_option
+@opt.system_argument
+@opt.parameter_option
 @click.option("--matrix", metavar="ROWS", help="A itself instead of a file: '1,0;0,1'.")
-@json_option
+@opt.json_option
 def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: str | None, as_json: bool) -> None:
     """The space of cubics H with A Hess(H) = Hess(H) A^T: its dimension, 4m for generic A, and a basis.
 
@@ -172,10 +164,10 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
 
 
 @command.command("associated")
-@system_argument
-@parameter_option
+@opt.system_argument
+@opt.parameter_option
 @click.option("--write-to", type=OutputFolder(), metavar="DIR", help="Write each as a system file to DIR.")
-@json_option
+@opt.json_option
 def associated(
     system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
 ) -> None:
@@ -252,10 +244,10 @@ def associated(
 
 
 @command.command("tensor")
-@system_options
+@opt.system_options
 @click.option("--algebra", metavar="CHI", required=True, help="K = Q[t]/(chi), chi a polynomial in t: 't^2-2'.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
-@quiet_option
+@opt.quiet_option
 def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
     """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.
 
@@ -270,7 +262,7 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
     integrals and the density that its map over Q inherits.
     """
     output = None if output == "-" else output
-    over_algebra, chi = load_system(system, options), lib.parse_chi(algebra)
+    over_algebra, chi = opt.load_system(system, options), lib.parse_chi(algebra)
     file = lib.tensor_file(over_algebra, chi)
     _write(file, output)
     if not quiet:
@@ -317,7 +309,7 @@ def _with_signs(member: lib.FamilyMember, signs: str | None) -> lib.FamilyMember
 
 
 def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
-    file = load_system(reference, {"parameters": parameters})
+    file = opt.load_system(reference, {"parameters": parameters})
     if file.member is None:
         raise lib.InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member

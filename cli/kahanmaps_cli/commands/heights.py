@@ -7,15 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.options import (
-    Renamed,
-    eps_options,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
@@ -24,13 +16,13 @@ from kahanmaps_cli.value_rows import Cell, table
 
 
 @click.command("heights")
-@system_options
-@eps_options
+@opt.system_options
+@opt.eps_options
 @click.option(
     "--random",
     "--starts",
     "count",
-    cls=Renamed,
+    cls=opt.Renamed,
     type=Whole(1),
     metavar="N",
     help="N starts drawn at random (default 3).",
@@ -47,9 +39,9 @@ from kahanmaps_cli.value_rows import Cell, table
 @click.option(
     "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
-@seconds_option(30.0, "Stop after about so many seconds.")
-@seed_option
-@output_options
+@opt.seconds_option(30.0, "Stop after about so many seconds.")
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """How fast the heights of exact orbits of the map of SYSTEM grow, from several starts.
 
@@ -70,7 +62,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 all orbits that were decided agree, 2 usage error, 3 undecided, or the orbits disagree, or the time
     was over.
     """
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
     def cell(file: lib.SystemFile, progress: Progress) -> Cell:

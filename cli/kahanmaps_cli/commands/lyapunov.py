@@ -8,16 +8,8 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
-from kahanmaps_cli.options import (
-    eps_of,
-    eps_options,
-    load_system,
-    output_options,
-    random_starts_options,
-    seconds_option,
-    system_options,
-)
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import on_terminal, print_table, tell
@@ -27,13 +19,13 @@ _DEFAULT_STARTS = 16
 
 
 @click.command("lyapunov")
-@system_options
-@random_starts_options
-@eps_options
+@opt.system_options
+@opt.random_starts_options
+@opt.eps_options
 @click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="How many steps to count.")
 @click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
-@seconds_option(60.0, "Time for all steps.")
-@output_options
+@opt.seconds_option(60.0, "Time for all steps.")
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Lyapunov exponents of float orbits of the map of SYSTEM, by the exact tangent map.
 
@@ -53,8 +45,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
     _require_sense(options, steps, transient)
-    file = load_system(system, options)
-    eps = eps_of(file, options)
+    file = opt.load_system(system, options)
+    eps = opt.eps_of(file, options)
     if options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, None)
     else:

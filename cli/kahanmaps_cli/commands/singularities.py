@@ -7,32 +7,24 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.options import (
-    eps_options,
-    load_system,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import formula, tell
 
 
 @click.command("singularities")
-@system_options
-@eps_options
+@opt.system_options
+@opt.eps_options
 @click.option(
     "--steps",
     type=int,
     metavar="N",
     help="Steps to follow each hypersurface for (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
 )
-@seconds_option(60.0, "Time for each eps.")
-@seed_option
-@output_options
+@opt.seconds_option(60.0, "Time for each eps.")
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Are the singularities of the map of SYSTEM confined, and after how many steps?
 
@@ -62,8 +54,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     from kahanmaps.laboratory.singular.singularities import default_eps
 
-    eps = the_eps(options["eps"], options["time_step"], required=False)
-    file = load_system(system, options)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    file = opt.load_system(system, options)
     with Progress(quiet) as progress:
         runs = [
             lib.singularities(

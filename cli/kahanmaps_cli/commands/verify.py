@@ -7,26 +7,17 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.options import (
-    eps_options,
-    evidence_options,
-    load_system,
-    output_options,
-    parameter_option,
-    system_argument,
-    the_eps,
-    verbose_option,
-)
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.verify_table import print_verification
 
 
 @click.command("verify")
-@system_argument
-@parameter_option
+@opt.system_argument
+@opt.parameter_option
 @draw_options
-@eps_options
+@opt.eps_options
 @click.option("--universal", is_flag=True, help="Not one member: everything at random over GF(p), for every member.")
 @click.option(
     "--beyond", is_flag=True, help="A table of what survives for other H, J, steps and A, with counterexamples."
@@ -49,10 +40,10 @@ from kahanmaps_cli.verify_table import print_verification
     help="Order in eps^2 of the series of the integrals.",
 )
 @click.option("--balls", "ball_bits", type=int, metavar="BITS", help="Also over complex balls, all roots enclosed.")
-@evidence_options
+@opt.evidence_options
 @click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown.")
-@verbose_option
-@output_options
+@opt.verbose_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """Every statement of the paper of Petrera and Suris, put to the test for a member of its family.
 
@@ -90,7 +81,7 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = lib.Settings(
-            eps=the_eps(options["eps"], options["time_step"], required=False),
+            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
             seed=options["seed"],
             error_bits=options["error_bits"],
             progress=progress,
@@ -108,7 +99,7 @@ def command(system: str | None, **options: Any) -> int:
             report = lib.verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
             if system is not None:
-                file = load_system(system, {"parameters": options["parameters"]})
+                file = opt.load_system(system, {"parameters": options["parameters"]})
             else:
                 file = drawn_file(options)
             report = lib.verify(file, settings, what)
