@@ -191,6 +191,11 @@ check_options: Callable[[F], F] = stack(
 )
 
 
+def given(options: Mapping[str, Any], *names: str, **others: str) -> dict[str, Any]:
+    """The values of these options, by their names, or after these by others: `given(options, "seed", terms="max")`."""
+    return {name: options[name] for name in names} | {other: options[name] for other, name in others.items()}
+
+
 def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
     """eps from --eps or --time-step; None where neither is given and that is allowed."""
     if eps is not None and time_step is not None:

@@ -63,8 +63,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
                 file,
                 symbols=symbols,
                 eps=eps,
-                seconds=options["seconds"],
-                seed=options["seed"],
+                **opt.given(options, "seconds", "seed"),
                 progress=progress,
                 reached=report,
             )

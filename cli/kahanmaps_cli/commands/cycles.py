@@ -77,10 +77,7 @@ def command(system: str | None, **options: Any) -> int:
                     eps,
                     prime,
                     reversor=reversor,
-                    samples=options["samples"],
-                    steps=options["steps"],
-                    seed=options["seed"],
-                    seconds=options["seconds"],
+                    **opt.given(options, "samples", "steps", "seed", "seconds"),
                     progress=progress,
                 )
                 runs.append((census, lib.compare(census, options["seed"])))
@@ -142,9 +139,7 @@ def _record(
         "cycles",
         file,
         "exact modulo primes",
-        seed=options["seed"],
-        samples=options["samples"],
-        steps_asked=options["steps"],
+        **opt.given(options, "seed", "samples", steps_asked="steps"),
         seconds=options["seconds"],
         reversor=lib.plain(reversor),
         primes=list(dict.fromkeys(options["primes"])),

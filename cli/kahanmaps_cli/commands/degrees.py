@@ -77,16 +77,8 @@ def measured(
     file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
 ) -> lib.DegreeGrowth:
     """The degrees that the options ask for."""
-    return lib.degree_growth(
-        file.map,
-        eps,
-        seconds=options["seconds"],
-        max_terms=options["terms"],
-        max_degree=options["max_degree"],
-        seed=options["seed"],
-        steps=options.get("steps"),
-        progress=progress,
-    )
+    asked = opt.given(options, "seconds", "max_degree", "seed", max_terms="terms")
+    return lib.degree_growth(file.map, eps, **asked, steps=options.get("steps"), progress=progress)
 
 
 def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
@@ -113,8 +105,7 @@ def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrow
         file,
         "modulo the primes of the lines",
         time_step=time_step if file.map.has_time_step else None,
-        seconds=options["seconds"],
-        terms_asked=options["terms"],
+        **opt.given(options, "seconds", terms_asked="terms"),
         max_degree=options["max_degree"],
         **found.to_json(),
     )

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.options import load_system, system_options
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import (
@@ -24,7 +24,7 @@ from kahanmaps_cli.value_rows import Cell, rows_of, table
 
 
 @click.command("find-integrals")
-@system_options
+@opt.system_options
 @click.option(
     "--monomials",
     "sets",
@@ -73,7 +73,7 @@ def command(system: str | None, **options: Any) -> int:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
         symbols, eps = symbols_and_eps(options)
-        limits = {name: options[name] for name in ("max_degree", "seconds", "seed")}
+        limits = opt.given(options, "max_degree", "seconds", "seed")
         found = lib.find_integrals(file, symbols=symbols, eps=eps, progress=progress, **limits)
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
@@ -84,7 +84,7 @@ def command(system: str | None, **options: Any) -> int:
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options)
+        file = opt.load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         if options["flow"] and (options["sets"] or options["as_toml"]):
             raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
@@ -103,9 +103,8 @@ def command(system: str | None, **options: Any) -> int:
             file,
             symbols=symbols,
             eps=eps,
-            max_degree=options["max_degree"],
+            **opt.given(options, "max_degree", "seed"),
             seconds=options["seconds"] / (1 + options["flow"]),
-            seed=options["seed"],
             progress=progress,
         )
         found = search(flow=options["flow"])
@@ -138,9 +137,7 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
         options["darboux"],
         symbols=symbols,
         eps=eps,
-        flow=options["flow"],
-        seconds=options["seconds"],
-        seed=options["seed"],
+        **opt.given(options, "flow", "seconds", "seed"),
         progress=progress,
     )
     if options["as_json"]:

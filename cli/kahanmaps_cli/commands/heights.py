@@ -87,11 +87,8 @@ def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: 
         file.map,
         eps,
         starts=options["given"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
-        steps=options["steps"],
-        max_digits=options["max_digits"],
-        seconds=options["seconds"],
         structure=file.structure,
-        seed=options["seed"],
+        **opt.given(options, "steps", "max_digits", "seconds", "seed"),
         progress=progress,
     )
 
@@ -110,5 +107,5 @@ def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
 def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey) -> dict[str, Any]:
     values = [str(value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits)]
     steps = [str(2 * value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits) if file.map.has_time_step]
-    asked = {name: options[name] for name in ("seed", "steps", "max_digits", "seconds")}
+    asked = opt.given(options, "seed", "steps", "max_digits", "seconds")
     return record_of("heights", file, "exact", eps=values, time_step=steps, **asked, **found.to_json())

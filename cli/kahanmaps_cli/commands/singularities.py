@@ -58,14 +58,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = opt.load_system(system, options)
     with Progress(quiet) as progress:
         runs = [
-            lib.singularities(
-                file.map,
-                value,
-                steps=options["steps"],
-                seed=options["seed"],
-                seconds=options["seconds"],
-                progress=progress,
-            )
+            lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "seconds"), progress=progress)
             for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))
         ]
     agree = len({run.shape for run in runs}) == 1
