@@ -12,9 +12,9 @@ from typing import Any
 
 import click
 
-from kahanmaps.errors import counted, quoted, suggestion
+from kahanmaps.errors import counted
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.batch_show import print_status, status_data
+from kahanmaps_cli.batch_show import print_status, require_experiments, status_data
 from kahanmaps_cli.progress import Progress, as_typed, duration, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.signals import interruptible
@@ -28,7 +28,7 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS)
     missing = _missing(db, spec, options)
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
-    _require_names(options["only"], spec)
+    require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     if options["as_json"]:
         data = [
             {
@@ -73,7 +73,7 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
     spec = None if path is None else lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS)
     if spec is not None:
-        _require_names(options["only"], spec)
+        require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     with lib.Store.open(db, create=spec is not None) as store:
         planned = {} if spec is None else lib.plan(spec, store)
         names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
@@ -174,15 +174,6 @@ def _tell_end(
         say(f"{'interrupted: ' if interrupted else ''}{_tasks(missing)} without a result yet; to continue: {again}")
     if failed:
         say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
-
-
-def _require_names(only: tuple[str, ...], spec: lib.Spec) -> None:
-    known = [experiment.name for experiment in spec.experiments]
-    for name in only:
-        if name not in known:
-            raise lib.InputError(
-                f"there is no experiment {quoted(name)}, expected one of {', '.join(known)}{suggestion(name, known)}"
-            )
 
 
 def _missing(db: str, spec: lib.Spec, options: Mapping[str, Any]) -> int | None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from kahanmaps.errors import quoted, suggestion
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.progress import duration
 from kahanmaps_cli.render import envelope, print_json
@@ -22,10 +23,7 @@ _VALUE_WIDTH = 300
 def status_data(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
     """How far the experiments are, as plain data."""
     found = store.status()
-    for name in only:
-        if name not in [one.name for one in found]:
-            known = ", ".join(one.name for one in found) or "none"
-            raise lib.InputError(f"there is no experiment {lib.quoted(name)} in it, expected one of: {known}")
+    require_experiments(only, [one.name for one in found])
     return {
         **envelope("batch status"),
         "experiments": [
@@ -42,6 +40,16 @@ def status_data(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
         ],
         "unplanned": store.unplanned(),
     }
+
+
+def require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
+    """Raises InputError for a name that no experiment has."""
+    for name in only:
+        if name not in known:
+            hint = suggestion(name, known)
+            raise lib.InputError(
+                f"there is no experiment {quoted(name)}, expected one of {', '.join(known) or 'none'}{hint}"
+            )
 
 
 def print_status(data: Mapping[str, Any]) -> None:

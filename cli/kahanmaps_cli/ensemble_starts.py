@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from kahanmaps.errors import BadPrime, ExpressionError, InputError
@@ -41,6 +41,16 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> lib.N
     if size == 0.0:
         raise InputError("found a --box that is 0 in machine numbers, expected a larger one")
     return lib.starts_in_box(count, dim, size, seed)
+
+
+def asked_starts(
+    file: lib.SystemFile, options: Mapping[str, Any], prime: int | None = None, count: int | None = None
+) -> lib.NDArray[Any]:
+    """The starts that the options ask for: those of a file, or drawn at random, `count` of them unless they say."""
+    if options["starts"] is not None:
+        return read_starts(options["starts"], file.variables, prime)
+    count = options["count"] if count is None or options["count"] is not None else count
+    return drawn(count, file.dim, 1 if options["box"] is None else options["box"], options["seed"] or 0, prime)
 
 
 def read_starts(path: str, variables: Sequence[str], prime: int | None) -> lib.NDArray[Any]:

@@ -10,6 +10,16 @@ from typing import Any, TypeVar
 import click
 
 from kahanmaps_cli import library as lib
+from kahanmaps_cli.batch_run import dry_run, run_batch
+from kahanmaps_cli.batch_show import (
+    export_rows,
+    found_data,
+    print_found,
+    print_status,
+    print_summary,
+    print_tasks,
+    status_data,
+)
 from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
@@ -103,8 +113,6 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
     Exit status: 0 every task is done, whatever the verdicts, 2 usage error, 3 some task failed or has no result, 130
     interrupted.
     """
-    from kahanmaps_cli.batch_run import dry_run, run_batch
-
     if options["as_json"] and options["as_jsonl"]:
         raise click.UsageError("give --json or --jsonl, not both")
     if spec is None and (db is None or options["dry_run"]):
@@ -130,8 +138,6 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 
     May be asked while a batch is running.
     """
-    from kahanmaps_cli.batch_show import print_status, status_data
-
     with _open(db) as store:
         data = status_data(store, only)
     if as_json:
@@ -153,8 +159,6 @@ def show(key: str, db: str, as_json: bool) -> None:
 
     KEY: the first digits of its key, four or more; batch run --dry-run and batch export have the keys.
     """
-    from kahanmaps_cli.batch_show import found_data, print_found
-
     with _open(db) as store:
         found = store.find(key)
         if not found:
@@ -183,8 +187,6 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
       kahanmaps batch export --db study.db --jsonl | jq .verdict
       kahanmaps batch export --db study.db --parquet -o study.parquet
     """
-    from kahanmaps_cli.batch_show import export_rows
-
     if form is None:
         endings = {".csv": "csv", ".jsonl": "jsonl", ".parquet": "parquet"}
         form = endings.get(Path(output).suffix.lower()) if output else None
@@ -215,8 +217,6 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
     --by takes options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
     growth), and experiment, task, outcome, verdict, message.
     """
-    from kahanmaps_cli.batch_show import print_summary
-
     if as_json and as_markdown:
         raise click.UsageError("give --json or --markdown, not both")
     names = [name.strip() for name in by.split(",") if name.strip()]
@@ -266,8 +266,6 @@ def tasks(name: str | None, as_json: bool) -> None:
       kahanmaps batch tasks
       kahanmaps batch tasks check-commute
     """
-    from kahanmaps_cli.batch_show import print_tasks
-
     print_tasks(name, as_json)
 
 

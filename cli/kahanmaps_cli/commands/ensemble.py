@@ -11,7 +11,7 @@ from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
-from kahanmaps_cli.ensemble_starts import drawn, read_starts
+from kahanmaps_cli.ensemble_starts import asked_starts
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, Whole
 from kahanmaps_cli.progress import Progress, say
@@ -74,12 +74,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     file.map.at(
         number, lib.GF(prime) if kind == "mod" else lib.QQ
     )  # the demands on eps and the prime, in the words of orbit
-    if options["starts"] is not None:
-        starts = read_starts(options["starts"], file.variables, prime if kind == "mod" else None)
-    else:
-        box = 1 if options["box"] is None else options["box"]
-        seed = options["seed"] or 0
-        starts = drawn(options["count"], file.dim, box, seed, prime if kind == "mod" else None)
+    starts = asked_starts(file, options, prime if kind == "mod" else None)
     structure = structure_for(file, options["method"])
     form = None if isinstance(structure, lib.NoStructure) else structure.form
     made = ModularRun if kind == "mod" else FloatRun

@@ -9,7 +9,7 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.ensemble_starts import drawn, read_starts
+from kahanmaps_cli.ensemble_starts import asked_starts
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import on_terminal, print_table, tell
@@ -47,12 +47,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     _require_sense(options, steps, transient)
     file = opt.load_system(system, options)
     eps = opt.eps_of(file, options)
-    if options["starts"] is not None:
-        starts = read_starts(options["starts"], file.variables, None)
-    else:
-        count = _DEFAULT_STARTS if options["count"] is None else options["count"]
-        box = 1 if options["box"] is None else options["box"]
-        starts = drawn(count, file.dim, box, options["seed"] or 0, None)
+    starts = asked_starts(file, options, count=_DEFAULT_STARTS)
     with Progress(quiet) as progress:
         found = lib.lyapunov_exponents(
             file.map,
