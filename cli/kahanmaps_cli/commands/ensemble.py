@@ -10,7 +10,7 @@ import click
 from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
+from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, structure_for
 from kahanmaps_cli.ensemble_starts import asked_starts
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, Whole
@@ -78,14 +78,14 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     structure = structure_for(file, options["method"])
     form = None if isinstance(structure, lib.NoStructure) else structure.form
     made = ModularRun if kind == "mod" else FloatRun
-    run: Run = made(file, number, starts, form, integrals, options["steps"], options)
+    run: Run = made(Asked(file, number, starts, form, integrals, options))
     if verbose and not quiet:
         why = structure.reason if isinstance(structure, lib.NoStructure) else structure.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
     steps, output = options["steps"], options["output"]
     try:
         with interruptible(run.interrupt), Progress(quiet) as progress:
-            run.walk(steps, options["every"] or 0, output, lambda k: progress(f"step {k} of {steps}"))
+            run.walk(lambda k: progress(f"step {k} of {steps}"))
     except OSError as error:  # a full disk comes without a name
         error.filename = error.filename or output
         raise
