@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from shutil import copyfileobj, get_terminal_size
 from tempfile import TemporaryFile
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.numbers import json_float, short_float
 from kahanmaps_cli.options import (
     backward_option,
@@ -31,9 +32,6 @@ from kahanmaps_cli.progress import Progress, TimeLeft, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.streams import is_read
-
-if TYPE_CHECKING:
-    from kahanmaps.maps.orbits import OrbitEnd
 
 _FORMATS = ("text", "json", "jsonl", "csv", "npz", "npy")
 _TEXT = ("", ".txt", ".tsv", ".out", ".dat", ".log")  # endings of files of text
@@ -115,8 +113,6 @@ def command(
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if at is not None and every != 1:
         raise click.UsageError("give --at N1,N2,... or --every K, not both")
-    from kahanmaps.maps.orbits import OrbitEnd
-
     file = load_system(system, options)
     eps = eps_of(file, options)
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
@@ -156,7 +152,7 @@ def command(
                     return 3  # the reader (head, say) has what it wanted, and the orbit may be long
             end = run.walk.end
         except OutputFull as full:
-            end = OrbitEnd("budget", full.steps, str(full))
+            end = lib.OrbitEnd("budget", full.steps, str(full))
         record = _end_record(end, run)
         writer.end(record)
     told = output is None and form == "text" and sys.stdout.isatty()  # the last line says how it ended
@@ -178,11 +174,11 @@ def _require_npy(options: dict[str, Any], output: str | None) -> None:
 
 def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
     """Float points, as fast as they come."""
-    from kahanmaps.maps.floats.fast import stream_orbit
-
     try:
         with interruptible(run.walk.interrupt), Progress(quiet) as progress:
-            end = stream_orbit(run.walk.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}"))
+            end = lib.stream_orbit(
+                run.walk.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}")
+            )
     except OSError as error:  # a full disk comes without a name
         error.filename = error.filename or output
         raise
@@ -196,7 +192,7 @@ def _stop() -> None:
     raise KeyboardInterrupt
 
 
-def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
+def _end_record(end: lib.OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     record: dict[str, Any] = {"status": end.status, "steps": end.steps, "message": end.message}
     if end.period is not None:
         record["period"] = end.period
@@ -238,10 +234,8 @@ def _form_from_name(output: str | None) -> str:
 
 @contextmanager
 def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
-    from kahanmaps.whole_files import sync, whole_file
-
     if output is not None and form == "npz":
-        with whole_file(output) as stream:
+        with lib.whole_file(output) as stream:
             yield stream
     elif output is not None:
         if form == "csv" and os.path.isdir(meta_of(output)):  # said before an older table is lost
@@ -249,7 +243,7 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
         try:
             with open(output, "w", encoding="utf-8", errors="backslashreplace") as stream:
                 yield stream
-                sync(stream)
+                lib.sync(stream)
         except OSError as error:  # a full disk comes without a name
             error.filename = error.filename or output
             raise
