@@ -14,16 +14,8 @@ from typing import IO, Any
 import click
 
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.numbers import json_float, short_float
-from kahanmaps_cli.options import (
-    backward_option,
-    eps_of,
-    eps_options,
-    integral_option,
-    load_system,
-    quiet_option,
-    system_options,
-)
 from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer, meta_of
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.outputs import OutputFile
@@ -39,13 +31,13 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 
 @click.command("orbit")
-@system_options
+@opt.system_options
 @click.option("--start", type=PointText(), required=True, metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
-@eps_options
+@opt.eps_options
 @click.option("--steps", type=int, metavar="N", help="How many steps to take.")
 @click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
 @click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
-@backward_option
+@opt.backward_option
 @click.option(
     "--arithmetic",
     type=Arithmetic(),
@@ -61,7 +53,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @click.option("--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="For ball:auto; default 15.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="What computes float orbits; numba needs [fast].")
-@integral_option(
+@opt.integral_option(
     "A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
     "the word known for all that theorems give (not in floats)."
 )
@@ -70,7 +62,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
-@quiet_option
+@opt.quiet_option
 def command(
     system: str | None,
     form: str | None,
@@ -113,8 +105,8 @@ def command(
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if at is not None and every != 1:
         raise click.UsageError("give --at N1,N2,... or --every K, not both")
-    file = load_system(system, options)
-    eps = eps_of(file, options)
+    file = opt.load_system(system, options)
+    eps = opt.eps_of(file, options)
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"][0] != "float":

@@ -9,17 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.options import (
-    eps_options,
-    load_system,
-    quiet_option,
-    seconds_option,
-    seed_option,
-    symbolic_option,
-    system_options,
-    the_eps,
-)
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.progress import Progress, say
@@ -37,7 +28,7 @@ _ONLY_FOR = {
 
 
 @click.command("report", cls=PictureCommand)
-@system_options
+@opt.system_options
 @click.option(
     "--from",
     "source",
@@ -50,10 +41,10 @@ _ONLY_FOR = {
 @click.option("--db", metavar="BATCH.db", help="Instead: the results of a batch.")
 @click.option("--by", metavar="NAME,...", help="With --db: group results by these (default: experiment).")
 @click.option("--value", "values", multiple=True, metavar="NAME", help="With --db: only this number, with a picture.")
-@eps_options
-@symbolic_option
-@seconds_option(None, "Time for the analysis (default: 16 to 150 by dimension).")
-@seed_option
+@opt.eps_options
+@opt.symbolic_option
+@opt.seconds_option(None, "Time for the analysis (default: 16 to 150 by dimension).")
+@opt.seed_option
 @draw_options
 @click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")
 @click.option(
@@ -67,7 +58,7 @@ _ONLY_FOR = {
 )
 @click.option("--title", help="The title of the page (default: the name of the system).")
 @click.option("--no-pictures", is_flag=True, help="Formulas and tables only.")
-@quiet_option
+@opt.quiet_option
 def command(system: str | None, **options: Any) -> int:
     """One HTML page about SYSTEM, a member of the family or a batch, to be read, printed or sent.
 
@@ -162,7 +153,7 @@ def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tu
     if options["source"] == "analyze":
         return _analysis(system, options, progress, how)
     file = _system_or_member(system, options)
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     settings = lib.Settings(eps=eps, seed=options["seed"], progress=progress)
     left_out: list[str] = []
     if options["source"] == "verify":
@@ -177,7 +168,7 @@ def _analysis(system: str | None, options: dict[str, Any], progress: Progress, h
     from kahanmaps_cli.search import symbols_and_eps
 
     symbols, eps = symbols_and_eps(options)
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     found = lib.analyze(
         file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress
     )
@@ -190,7 +181,7 @@ def _system_or_member(system: str | None, options: dict[str, Any]) -> lib.System
     is_drawn = any(options[name] is not None and options[name] is not False for name in DRAWN)
     named = system is not None or options["variables"] or options["rhs"]
     if named or not (is_drawn or options["source"] == "verify"):
-        return load_system(system, options)
+        return opt.load_system(system, options)
     return drawn_file(options)
 
 
