@@ -26,12 +26,7 @@ from kahanmaps.checks.claims import Evidence as Evidence
 from kahanmaps.checks.claims import Finding as Finding
 from kahanmaps.checks.claims import Report as Report
 from kahanmaps.checks.claims import Verdict as Verdict
-from kahanmaps.checks.claims import combined as combined
-from kahanmaps.checks.commute import check_commute as check_commute
-from kahanmaps.checks.conserve import check_integrals as check_integrals
 from kahanmaps.checks.conserve import known_integrals as known_integrals
-from kahanmaps.checks.preserve import check_measure as check_measure
-from kahanmaps.checks.preserve import check_poisson as check_poisson
 from kahanmaps.checks.settings import Settings as Settings
 from kahanmaps.checks.settings import eps_record as eps_record
 from kahanmaps.checks.settings import eps_words as eps_words
@@ -106,7 +101,6 @@ from kahanmaps.family.structure import NoStructure as NoStructure
 from kahanmaps.family.structure import Structure as Structure
 from kahanmaps.invariants.heights import Growth as Growth
 from kahanmaps.invariants.integrals import ClaimedIntegral as ClaimedIntegral
-from kahanmaps.invariants.poisson import GivenTensor as GivenTensor
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as analyze
 from kahanmaps.laboratory.finite.cycle_laws import Comparison as Comparison
@@ -172,7 +166,6 @@ from kahanmaps.paper.survivors import table as table
 from kahanmaps.paper.verifier import VerifyOptions as VerifyOptions
 from kahanmaps.paper.verify import verify as verify
 from kahanmaps.paper.verify import verify_universal as verify_universal
-from kahanmaps.reports.report import report_html as report_html
 from kahanmaps.sources import source as source
 from kahanmaps.systems.quadratic import MAX_DIMENSION as MAX_DIMENSION
 from kahanmaps.version import __version__ as __version__

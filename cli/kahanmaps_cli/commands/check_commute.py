@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import check_options, inline_options, is_inline, load_pair, settings_from, system_argument
 from kahanmaps_cli.params import ExactNumber
@@ -40,6 +39,8 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
 
     Exit status: 0 they commute (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
+    from kahanmaps.checks.commute import check_commute
+
     inline = is_inline(options)
     if inline and system is not None and other is None:
         system, other = None, system  # the inline system is the first, the argument the second
@@ -48,5 +49,5 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
         file, second = load_pair(system, other, options)
-        report = lib.check_commute(file, second, settings, eps2)
+        report = check_commute(file, second, settings, eps2)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import count
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import check_options, integral_option, load_system, settings_from, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
+
+if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
 
 
 @click.command("check-integrals")
@@ -36,18 +38,19 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
 
     Exit status: 0 conserved (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
+    from kahanmaps.algebra.text import parse_rational_function
+    from kahanmaps.checks.conserve import check_integrals
+
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
         file = load_system(system, options)
         names = file.claim_names
-        extra = {
-            name: lib.parse_rational_function(text, names, file.parameters) for name, text in _named(integrals, file)
-        }
-        report = lib.check_integrals(file, settings, extra)
+        extra = {name: parse_rational_function(text, names, file.parameters) for name, text in _named(integrals, file)}
+        report = check_integrals(file, settings, extra)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
 
-def _named(integrals: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
+def _named(integrals: Sequence[tuple[str, str]], file: SystemFile) -> list[tuple[str, str]]:
     """The claims with their names; those without one are called I1, I2, ..., as far as these are free.
 
     The bare name of an integral of the file adds nothing: all of these are checked anyway.

@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import check_options, load_system, settings_from, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
@@ -30,11 +29,14 @@ def command(system: str | None, density: str | None, **options: Any) -> int:
 
     Exit status: 0 invariant (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
+    from kahanmaps.algebra.text import parse_rational_function
+    from kahanmaps.checks.preserve import check_measure
+
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
         file = load_system(system, options)
         extra = None
         if density is not None:
-            extra = lib.parse_rational_function(density, file.claim_names, file.parameters)
-        report = lib.check_measure(file, settings, extra)
+            extra = parse_rational_function(density, file.claim_names, file.parameters)
+        report = check_measure(file, settings, extra)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

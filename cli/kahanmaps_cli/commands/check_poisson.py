@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import check_options, load_system, settings_from, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
@@ -35,9 +34,12 @@ def command(system: str | None, path: str | None, **options: Any) -> int:
 
     Exit status: 0 it is (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early.
     """
+    from kahanmaps.checks.preserve import check_poisson
+    from kahanmaps.invariants.poisson import GivenTensor
+
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
         file = load_system(system, options)
-        tensor = None if path is None else lib.GivenTensor.read(path, file.variables, file.parameters)
-        report = lib.check_poisson(file, settings, tensor)
+        tensor = None if path is None else GivenTensor.read(path, file.variables, file.parameters)
+        report = check_poisson(file, settings, tensor)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])
