@@ -145,9 +145,8 @@ def _arithmetic(options: dict[str, Any]) -> str:
 def _require_point(file: SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
     """The same demands on eps, prime and start as orbits make, in the same words."""
     from kahanmaps.algebra.fields import GF, QQ
-    from kahanmaps.maps.kahan import KahanMap
 
-    KahanMap(file.system, eps, GF(prime) if kind == "mod" else QQ).point(start)
+    file.map.at(eps, GF(prime) if kind == "mod" else QQ).point(start)
 
 
 def _structure(file: SystemFile) -> Structure | str:
