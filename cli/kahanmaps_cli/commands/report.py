@@ -24,7 +24,6 @@ from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
-
     from kahanmaps.checks.claims import Report
     from kahanmaps.checks.settings import Settings
     from kahanmaps.documents.files import SystemFile
