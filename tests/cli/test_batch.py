@@ -391,7 +391,11 @@ def test_a_second_ctrl_c_is_immediate(batch):
     process = subprocess.Popen(
         [*COMMAND, "batch", "run", "study.toml", "-j", "2"], stderr=subprocess.PIPE, text=True, env=environment()
     )
-    time.sleep(2)
+    children = ["pgrep", "-cP", str(process.pid)]
+    while subprocess.run(children, capture_output=True, text=True).stdout.strip() != "2":
+        assert process.poll() is None
+        time.sleep(0.1)
+    time.sleep(1)
     process.send_signal(signal.SIGINT)
     time.sleep(0.5)
     assert process.poll() is None  # waits for the tasks in flight
