@@ -67,8 +67,12 @@ def _read_system(value: Any) -> Any:
     return value
 
 
-# What has a meaning beyond its type; each raises ValueError with a sentence.
-_READERS: Mapping[str, Callable[[Any], Any]] = {"system": _read_system, "time": read_time, "memory": read_memory}
+# What has more than a type, by its format in the schema; each raises ValueError with a sentence.
+_READERS: Mapping[str, Callable[[Any], Any]] = {
+    "systems": _read_system,
+    "time-limit": read_time,
+    "memory-limit": read_memory,
+}
 _TYPES: Mapping[str, type] = {"string": str, "integer": int, "array": list, "object": dict}
 _OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
@@ -96,7 +100,7 @@ def _mistakes(
     """The places in a value that are not as a part of the schema says, and what is wrong there."""
     shape = shared.get(shape.get("$ref", "").rpartition("/")[2], shape)
     expected = shape.get("description", expected)
-    if reader := _READERS.get(str(place[-1]) if place else ""):
+    if reader := _READERS.get(shape.get("format", "")):
         try:
             reader(value)
         except ValueError as error:
