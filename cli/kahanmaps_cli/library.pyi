@@ -151,7 +151,6 @@ from kahanmaps.maps.floats.lyapunov import lyapunov_exponents as lyapunov_expone
 from kahanmaps.maps.floats.stream import NpyFile as NpyFile
 from kahanmaps.maps.implicit import det_of as det_of
 from kahanmaps.maps.kahan import Kahan as Kahan
-from kahanmaps.maps.kahan import KahanMap as KahanMap
 from kahanmaps.maps.kernels import processors as processors
 from kahanmaps.maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from kahanmaps.maps.normal_form.division import text_in_gamma as text_in_gamma

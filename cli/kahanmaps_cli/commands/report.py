@@ -24,8 +24,6 @@ from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from kahanmaps.checks.claims import Report
     from kahanmaps.checks.settings import Settings
     from kahanmaps.documents.files import SystemFile
@@ -209,23 +207,15 @@ def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile
 
 def _checks(file: SystemFile, settings: Settings) -> tuple[list[Report], list[str]]:
     """The reports of the checks that apply, and a sentence for each that does not."""
-    from kahanmaps.checks.commute import check_commute
-    from kahanmaps.checks.conserve import check_integrals
-    from kahanmaps.checks.preserve import check_measure, check_poisson
+    from kahanmaps.checks.table import CHECKS
     from kahanmaps.errors import InputError
 
-    checks: dict[str, Callable[[], Report]] = {
-        "check-integrals": lambda: check_integrals(file, settings),
-        "check-measure": lambda: check_measure(file, settings),
-        "check-poisson": lambda: check_poisson(file, settings),
-        "check-commute": lambda: check_commute(file, None, settings),
-    }
     reports: list[Report] = []
     left_out: list[str] = []
-    for name, check in checks.items():
+    for name, check in sorted(CHECKS.items(), key=lambda named: named[1].is_of_pair):
         settings.progress(name)
         try:
-            reports.append(check())
+            reports.append(check(file, None, settings) if check.is_of_pair else check(file, settings))
         except InputError as error:
             left_out.append(f"{name} does not apply: {error}")
     if not reports:
