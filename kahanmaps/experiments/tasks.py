@@ -21,7 +21,7 @@ from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.checks.table import CHECKS, Check
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, fields, task, whole_report
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, Whole, fields, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import height_growth
@@ -36,7 +36,7 @@ _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
 
 
-@task("check-commute", needs=MEMBER_OR_OTHER)
+@task("check-commute", needs=MEMBER_OR_OTHER, reports=True)
 def commute(
     system: SystemFile,
     other: SystemFile | None = None,
@@ -47,11 +47,10 @@ def commute(
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
     max_digits: int | None = None,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Do two Kahan maps commute, or all rational associated maps of a member of the family?"""
     settings = _settings(eps, start, steps, seed, error_bits, max_digits)
-    return _of_report(check_commute(system, other, settings, eps2), report)
+    return _of_report(check_commute(system, other, settings, eps2))
 
 
 def _of_one_system(check: Check) -> None:
@@ -65,12 +64,11 @@ def _of_one_system(check: Check) -> None:
         seed: int = 0,
         error_bits: int = DEFAULT_ERROR_BITS,
         max_digits: int | None = None,
-        report: bool = False,
-    ) -> Result:
-        return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+    ) -> Whole:
+        return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)))
 
     perform.__doc__ = check.for_batch or check.question
-    task(check.command)(perform)
+    task(check.command, reports=True)(perform)
 
 
 for _check in CHECKS.values():
@@ -78,7 +76,7 @@ for _check in CHECKS.values():
         _of_one_system(_check)
 
 
-@task("verify", needs=MEMBER)
+@task("verify", needs=MEMBER, reports=True)
 def verify_member(
     system: SystemFile,
     eps: Any = None,
@@ -88,17 +86,16 @@ def verify_member(
     controls: bool = False,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Every statement of the paper, for one member of the family."""
     from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify
 
     settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
-    return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)), report)
+    return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)))
 
 
-@task("verify-universal")
+@task("verify-universal", reports=True)
 def verify_in_general(
     m: int,
     sections: tuple[int, ...] | None = None,
@@ -106,14 +103,13 @@ def verify_in_general(
     controls: bool = False,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Every statement of the paper, for the member in general."""
     from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify_universal
 
     settings = Settings(seed=seed, error_bits=error_bits)
-    return _of_report(verify_universal(m, settings, VerifyOptions(sections, order, None, controls)), report)
+    return _of_report(verify_universal(m, settings, VerifyOptions(sections, order, None, controls)))
 
 
 @task("family-space", needs=MEMBER)
@@ -276,7 +272,7 @@ def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_
     )
 
 
-def _of_report(report: Report, whole: bool) -> Result:
+def _of_report(report: Report) -> Whole:
     """The verdict, how many claims have which, and every claim that does not hold, with its witness."""
     counted = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in counted)
@@ -291,8 +287,7 @@ def _of_report(report: Report, whole: bool) -> Result:
         "ended_early": report.ended_early,
         **({"m": report.context["m"]} if "m" in report.context else {}),
         **({"doubtful": doubtful} if doubtful else {}),
-        **whole_report(report, whole),
-    }
+    }, report
 
 
 def _float_structure(system: SystemFile, method: str | None) -> Structure | NoStructure:
