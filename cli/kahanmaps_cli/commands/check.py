@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from inspect import cleandoc
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.checks.table import CHECKS, Check, ClaimOption
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import (
     check_options,
@@ -25,9 +26,6 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
 
 _STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
 
@@ -87,7 +85,7 @@ def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tup
     return system, other
 
 
-def _claimed(file: SystemFile, option: ClaimOption | None, claim: Any) -> Any:
+def _claimed(file: lib.SystemFile, option: ClaimOption | None, claim: Any) -> Any:
     """What the check takes, from what was given on the line."""
     if option is None or claim is None:
         return None
@@ -96,7 +94,7 @@ def _claimed(file: SystemFile, option: ClaimOption | None, claim: Any) -> Any:
     return option.read(file, claim)
 
 
-def _named(claims: Sequence[tuple[str, str]], file: SystemFile) -> list[tuple[str, str]]:
+def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
     """The claims with their names; those without one are called I1, I2, ..., as far as these are free.
 
     The bare name of an integral of the file adds nothing: all of these are checked anyway.

@@ -465,7 +465,7 @@ class PlanarNumba(Planar):
 class GenericNumba(Generic):
     """Steps of any map."""
 
-    piece, long_piece, few, group = 1024, 1 << 14, 8, 1024
+    piece, long_piece, few, group = 128, 1 << 14, 8, 1024
 
     def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
         n, more = self.equation.rows, len(self.equation.products)
