@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from kahanmaps.errors import printable
 
 # A mark, and a colour to be mixed with that of the text: with a contrast above 4.5 : 1 on white and on near black.
-_WORDS = {
+WORDS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
     "supported": ("≈", "#0e8fa8"),
@@ -125,9 +125,9 @@ def verdict(word: object) -> str:
     '<span class="verdict">note</span>'
     """
     text = str(word)
-    if text not in _WORDS:
+    if text not in WORDS:
         return f'<span class="verdict">{escape(text)}</span>'
-    mark, colour = _WORDS[text]
+    mark, colour = WORDS[text]
     style = f"color: color-mix(in srgb, currentColor 35%, {colour}); white-space: nowrap"
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 

@@ -113,7 +113,7 @@ class _Report:
         if self._is_silent:
             return
         if begins:
-            from kahanmaps.display.laboratory_text import analysis_head
+            from kahanmaps.display.laboratory import analysis_head
 
             tell(analysis_head(found))
         self._tell(found.final_sections)
@@ -138,7 +138,7 @@ class _Report:
 
 
 def _print_markdown(found: Analysis) -> None:
-    from kahanmaps.display.laboratory_text import analysis_title
+    from kahanmaps.display.laboratory import analysis_title
     from kahanmaps.display.markup import code, markdown
 
     lines = [f"# {markdown(analysis_title(found))}", "", "```"]
