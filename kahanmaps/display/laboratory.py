@@ -101,7 +101,7 @@ def result_html(found: Any, map_: BirationalMap | None = None) -> str:
 def _cell(cell: object) -> str:
     if isinstance(cell, Shown):
         return cell.html()
-    text = str(cell).strip()
+    text = str(cell).strip().removeprefix("# ")
     return markup.verdict(text) if text in markup.WORDS else _text(text)
 
 

@@ -84,7 +84,7 @@ def eps_words(eps: object = None, step: object = None) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """A table. `head` and `caption` are text, the cells of `rows` are HTML already.
+    """A table. `head` and `caption` are text, the cells of `rows` are HTML already; the last of a short row is wide.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
@@ -94,7 +94,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
     above = f"<caption>{escape(caption)}</caption>" if caption else ""
     names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in head)
     names = f"<thead><tr>{names}</tr></thead>" if names else ""
-    lines = ["<tr>" + "".join(f"<td {_LEFT}>{cell}</td>" for cell in row) + "</tr>" for row in rows]
+    held = [list(row) for row in rows]
+    width = max(map(len, (head, *held)))
+    lines = []
+    for *cells, last in held:
+        wide = f' colspan="{width - len(cells)}"' if len(cells) + 1 < width else ""
+        line = "".join(f"<td {_LEFT}>{cell}</td>" for cell in cells)
+        lines.append(f"<tr>{line}<td{wide} {_LEFT}>{last}</td></tr>")
     return "\n".join([f"<table>{above}{names}<tbody>", *lines, "</tbody></table>"])
 
 
