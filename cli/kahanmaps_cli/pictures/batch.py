@@ -8,34 +8,33 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from
+from kahanmaps_cli.progress import Progress
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from kahanmaps.experiments.records import Row
 
 _TOLD = 1000  # rows between words of progress
 
 
-@click.command("batch", cls=PictureCommand)
-@click.argument("database", required=False, type=click.Path(dir_okay=False), metavar="[DB]")
-@click.option(
-    "--db",
-    type=click.Path(dir_okay=False),
-    envvar="KAHANMAPS_DB",
-    metavar="FILE",
-    help="The database of results, instead of DB (or set KAHANMAPS_DB).",
+@picture(
+    "batch",
+    click.argument("database", required=False, type=click.Path(dir_okay=False), metavar="[DB]"),
+    click.option(
+        "--db",
+        type=click.Path(dir_okay=False),
+        envvar="KAHANMAPS_DB",
+        metavar="FILE",
+        help="The database of results, instead of DB (or set KAHANMAPS_DB).",
+    ),
+    click.option("--by", metavar="NAME,...", help="Group by these, e.g. m,eps (default: experiment)."),
+    click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number. Repeatable."),
+    click.option("--x", metavar="NAME", help="With --y: a dot for each task, along this axis ..."),
+    click.option("--y", metavar="NAME", help="... and at the height of this number; --by NAME colours them."),
+    click.option("--scale", type=click.Choice(["linear", "log"]), help="Of the numbers (default: by their range)."),
+    click.option("-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable."),
 )
-@click.option("--by", metavar="NAME,...", help="Group by these, e.g. m,eps (default: experiment).")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number. Repeatable.")
-@click.option("--x", metavar="NAME", help="With --y: a dot for each task, along this axis ...")
-@click.option("--y", metavar="NAME", help="... and at the height of this number; --by NAME colours them.")
-@click.option("--scale", type=click.Choice(["linear", "log"]), help="Of the numbers (default: by their range).")
-@click.option("-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable.")
-@picture_options
-def command(database: str | None, db: str | None, **options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """Results of a batch: counts, distributions, or one number against another.
 
     \b
@@ -52,7 +51,7 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
     """
     from kahanmaps.experiments.store import Store
 
-    require_output(options)
+    database, db = options["database"], options["db"]
     source = click.get_current_context().get_parameter_source("db")
     if database is not None and source is ParameterSource.COMMANDLINE:
         raise click.UsageError("give DB or --db FILE, not both")
@@ -64,17 +63,12 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
         raise click.UsageError("give --x NAME and --y NAME, both or none")
     if options["x"] is not None and (options["values"] or len(by) > 1):
         raise click.UsageError("found --x with --value or several names in --by, expected at most one name in --by")
-    with Store.open(path, readonly=True) as store, Progress(options["quiet"]) as progress:
+    with Store.open(path, readonly=True) as store:
         rows = _told(store.rows(list(options["only"]) or None, missing=True), path, progress)
-        figure, talk = _pairs(rows, by, options) if options["x"] is not None else _groups(rows, by, options)
-    deliver(figure, options)
-    if not options["quiet"]:
-        for sentence in talk:
-            say(sentence)
-    return 0
+        return (_groups if options["x"] is None else _pairs)(rows, by, options)
 
 
-def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure, list[str]]:
+def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> Drawn:
     from kahanmaps.errors import counted
     from kahanmaps.experiments.summary import summarise
     from kahanmaps.plots.batch import draw_batch, groups_beyond
@@ -86,10 +80,10 @@ def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tupl
     for name in values:
         if beyond := groups_beyond(summary, name):
             talk.append(f"{name}: {counted(beyond, 'group')} with numbers beyond the range of machine floats (1.8e308)")
-    return draw_batch(summary, values, style_from(options), scale=options["scale"]), talk
+    return Drawn(draw_batch(summary, values, style_from(options), scale=options["scale"]), talk=talk)
 
 
-def _pairs(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure, list[str]]:
+def _pairs(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> Drawn:
     from kahanmaps.experiments.columns import value_pairs
     from kahanmaps.plots.batch import clipped, draw_pairs
 
@@ -101,7 +95,7 @@ def _pairs(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple
         talk.append(f"{pairs.left_out} results have no {options['x']} or no number {options['y']}: left out")
     if clipped(pairs):
         talk.append(f"{clipped(pairs)} numbers are beyond the range of machine floats (1.8e308): left out")
-    return draw_pairs(pairs, style_from(options), scale=options["scale"]), talk
+    return Drawn(draw_pairs(pairs, style_from(options), scale=options["scale"]), talk=talk)
 
 
 def _told(rows: Iterable[Row], path: str, progress: Progress) -> Iterator[Row]:

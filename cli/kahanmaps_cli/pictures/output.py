@@ -7,7 +7,9 @@ import re
 import shutil
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import update_wrapper
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -15,8 +17,8 @@ import click
 from kahanmaps.errors import printable
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.params import OptionType
-from kahanmaps_cli.progress import as_typed, say
+from kahanmaps_cli.params import OptionType, PointText
+from kahanmaps_cli.progress import Progress, as_typed, say
 from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.plots.style import Style
     from kahanmaps.plots.terminal import Cell
+    from kahanmaps.plots.windows import Window
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"
@@ -86,22 +89,82 @@ def style_from(options: dict[str, Any]) -> Style:
     return Style(**given)
 
 
-def require_output(options: dict[str, Any]) -> None:
-    """Refuse, before anything is computed, a picture of no known kind."""
-    from kahanmaps.plots.figures import format_of, require_matplotlib
-
-    require_matplotlib()
-    style_from(options)
-    if options["output"] != "-" and options["kind"] != "text":
-        format_of(options["output"], options["kind"])
-
-
 def goes_to_terminal(options: dict[str, Any]) -> bool:
     """Whether the picture is made of characters."""
     return options["kind"] == "text" or (options["kind"] is None and options["output"] == "-")
 
 
-def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
+@dataclass(frozen=True)
+class Drawn:
+    """A picture for `picture` to deliver; None where nothing was found that could be drawn.
+
+    `file` is the system for its recipe, `talk` are sentences for standard error, `status` is the exit status.
+    """
+
+    figure: Figure | None
+    file: SystemFile | None = None
+    talk: Sequence[str] = ()
+    status: int = 0
+
+
+Draw = Callable[[dict[str, Any], Progress], Drawn]
+
+
+def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click.Command]:
+    """A command `kahanmaps plot NAME` with these options and those of all pictures, from what draws by their values."""
+
+    def made(draw: Draw) -> click.Command:
+        def command(**options: Any) -> int:
+            """Draw, talk, and deliver."""
+            from kahanmaps.plots.figures import format_of, require_matplotlib
+
+            require_matplotlib()  # and a picture of no known kind is refused before anything is computed
+            style_from(options)
+            if options["output"] != "-" and options["kind"] != "text":
+                format_of(options["output"], options["kind"])
+            with Progress(options["quiet"]) as progress:
+                drawn = draw(options, progress)
+            if not options["quiet"]:
+                for sentence in drawn.talk:
+                    say(sentence)
+            if drawn.figure is not None:
+                _deliver(drawn.figure, options, drawn.file)
+            return drawn.status
+
+        update_wrapper(command, draw)
+        return click.command(name, cls=PictureCommand)(stack(*options, picture_options)(command))
+
+    return made
+
+
+def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
+    """The option --window."""
+    return click.option("--window", type=PointText(), metavar=numbers, help="The part that is shown.")
+
+
+def window_from(options: dict[str, Any], axes: int) -> Window | None:
+    """The window that --window asks for, in so many axes."""
+    from kahanmaps.maps.floats.doubles import to_floats
+    from kahanmaps.plots.windows import require_window
+
+    return None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), axes)
+
+
+def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> tuple[int, int] | None:
+    """The numbers of two variables that the text X,Y of an option names; None for none."""
+    if text is None:
+        return None
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or any(name not in variables for name in names):
+        raise click.UsageError(
+            f"found {option} {text[:60]}, expected two of the variables {', '.join(variables)}, as X,Y"
+        )
+    if names[0] == names[1] and len(variables) > 1:
+        raise click.UsageError(f"found {option} {text[:60]}, expected two different variables")
+    return variables.index(names[0]), variables.index(names[1])
+
+
+def _deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None) -> None:
     """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
     from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain, wrapped
     from kahanmaps.plots.recipe import Recipe

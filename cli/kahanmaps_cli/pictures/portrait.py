@@ -19,10 +19,10 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
 from kahanmaps_cli.pictures.portrait_orbits import Orbits
 from kahanmaps_cli.pictures.stored import read_orbits
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.progress import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,51 +35,59 @@ _STEPS, _STEPS_ON_A_LINE, _DENSITY_STEPS = 1000, 100, 100_000
 _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "euler")
 
 
-@click.command("portrait", cls=PictureCommand)
-@system_options
-@eps_options
-@click.option("--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits.")
-@random_starts_options
-@click.option(
-    "--steps",
-    type=int,
-    metavar="N",
-    help="Steps of each orbit (default 1000; of one variable 100; with --density 100000).",
+@picture(
+    "portrait",
+    system_options,
+    eps_options,
+    click.option(
+        "--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits."
+    ),
+    random_starts_options,
+    click.option(
+        "--steps",
+        type=int,
+        metavar="N",
+        help="Steps of each orbit (default 1000; of one variable 100; with --density 100000).",
+    ),
+    backward_option,
+    click.option(
+        "--from",
+        "stored",
+        type=click.Path(exists=True, dir_okay=False),
+        metavar="FILE",
+        help="Draw the orbits in a .npy, .npz, .jsonl or .csv file that orbit or ensemble wrote; SYSTEM may be left "
+        "out.",
+    ),
+    click.option(
+        "--axes", metavar="A,B[,C]", help="Two or three variables or expressions; step is the number of the step."
+    ),
+    click.option("--3d", "space", is_flag=True, help="Three axes, chosen by themselves."),
+    click.option(
+        "--colour-by",
+        "--color-by",
+        "colour",
+        default="orbit",
+        show_default=True,
+        metavar="F",
+        help="orbit, step, an integral (or H) by its name, or an expression.",
+    ),
+    click.option(
+        "--lines", is_flag=True, help="Join the points of each orbit: neighbours on a curve, or one step and the next."
+    ),
+    click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes."),
+    click.option(
+        "--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not those of the starts."
+    ),
+    click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them."),
+    click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below."),
+    click.option(
+        "--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines."
+    ),
+    click.option("--no-field", is_flag=True, help="No arrows, equilibria and separatrices of a planar system."),
+    window_option(),
+    click.option("--equal", is_flag=True, help="The same unit of length along both axes."),
 )
-@backward_option
-@click.option(
-    "--from",
-    "stored",
-    type=click.Path(exists=True, dir_okay=False),
-    metavar="FILE",
-    help="Draw the orbits in a .npy, .npz, .jsonl or .csv file that orbit or ensemble wrote; SYSTEM may be left out.",
-)
-@click.option(
-    "--axes", metavar="A,B[,C]", help="Two or three variables or expressions; step is the number of the step."
-)
-@click.option("--3d", "space", is_flag=True, help="Three axes, chosen by themselves.")
-@click.option(
-    "--colour-by",
-    "--color-by",
-    "colour",
-    default="orbit",
-    show_default=True,
-    metavar="F",
-    help="orbit, step, an integral (or H) by its name, or an expression.",
-)
-@click.option(
-    "--lines", is_flag=True, help="Join the points of each orbit: neighbours on a curve, or one step and the next."
-)
-@click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes.")
-@click.option("--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts.")
-@click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them.")
-@click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below.")
-@click.option("--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines.")
-@click.option("--no-field", is_flag=True, help="No arrows, equilibria and separatrices of a planar system.")
-@click.option("--window", type=PointText(), metavar="X0,X1,Y0,Y1", help="The part that is shown.")
-@click.option("--equal", is_flag=True, help="The same unit of length along both axes.")
-@picture_options
-def command(system: str | None, **options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The phase portrait of SYSTEM: float orbits of its map, projected.
 
     \b
@@ -102,17 +110,12 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
-    require_output(options)
-    style_from(options)
+    system = options["system"]
     _require_sense(system, options)
     orbits = _stored(system, options) if options["stored"] else _walked(system, options)
-    with Progress(options["quiet"]) as progress:
-        figure = (_density if options["density"] else _portrait)(orbits, options, progress)
-    if orbits.walked is not None and not options["quiet"]:
-        for line in (*orbits.told(), *orbits.notes):
-            say(line)
-    deliver(figure, options, orbits.file)
-    return 130 if orbits.interrupted else 3 if orbits.ended else 0
+    figure = (_density if options["density"] else _portrait)(orbits, options, progress)
+    talk = () if orbits.walked is None else (*orbits.told(), *orbits.notes)
+    return Drawn(figure, orbits.file, talk, 130 if orbits.interrupted else 3 if orbits.ended else 0)
 
 
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:
@@ -197,13 +200,6 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
     return Orbits.to_walk(file, eps, starts, steps, backward=options["backward"], axes=options["axes"])
 
 
-def _window(options: dict[str, Any], axes: int) -> Window | None:
-    from kahanmaps.maps.floats.doubles import to_floats
-    from kahanmaps.plots.windows import require_window
-
-    return None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), axes)
-
-
 def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Figure:
     from dataclasses import replace
 
@@ -214,7 +210,7 @@ def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fi
     levels = None if options["levels"] is None else orbits.function(options["levels"])
     found = orbits.walk(progress)
     axes = orbits.axes_from(options["axes"], 3 if options["space"] else 2)
-    window = _window(options, len(axes))
+    window = window_from(options, len(axes))
     euler = orbits.euler() if options["euler"] else None
     shown = portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
     shown = replace(shown, flow=orbits.flow(axes, shown.window, options))
@@ -257,7 +253,7 @@ def _density(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fig
     axes: Any = orbits.axes_from(options["axes"], 2, pilot)
     if len(axes) != 2 or any(isinstance(axis, str) for axis in axes):
         raise click.UsageError("--density counts points in a plane: it takes two axes, and step is not one")
-    window = _window(options, 2)
+    window = window_from(options, 2)
     if window is None:
         import numpy as np
 
