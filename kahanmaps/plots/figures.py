@@ -16,6 +16,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
@@ -57,10 +58,12 @@ def drawing(style: Style) -> Iterator[None]:
     """
     require_matplotlib()
     import matplotlib as mpl
+    import matplotlib.style
 
     with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(style.settings())
+        mpl.rcdefaults()  # nothing of a user's matplotlibrc gets through
+        with as_file(files("kahanmaps.plots") / "pictures.mplstyle") as path:
+            mpl.style.use([path, style.settings()])
         yield
 
 

@@ -76,7 +76,7 @@ _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "eul
     ),
     click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes."),
     click.option(
-        "--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not those of the starts."
+        "--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts."
     ),
     click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them."),
     click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below."),
