@@ -117,14 +117,13 @@ class Orbits:
 
     def function(self, text: str) -> PointFunction:
         """An integral of the system's file or H by its name, or an expression."""
-        from kahanmaps.plots.drift_functions import Expression
-        from kahanmaps.plots.point_functions import point_function
+        from kahanmaps.plots.point_functions import PointFunction, point_function
 
-        named = {name: known.function for name, known in self._known().items() if isinstance(known, Expression)}
+        named = {name: known.function for name, known in self._known().items() if isinstance(known, PointFunction)}
         parameters = {} if self.file is None else self.file.rounded.parameters
         return point_function(text.strip(), self.variables, self.eps, parameters, named)
 
-    def colouring(self, text: str) -> PointFunction | WatchedFunction:
+    def colouring(self, text: str) -> WatchedFunction:
         """The same, and integrals that theorems give, in which the image of the point occurs."""
         known = self._known().get(text.strip())
         return self.function(text) if known is None else known
