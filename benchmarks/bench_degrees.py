@@ -14,12 +14,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from flint import nmod_poly
+from flint import fmpq, nmod_poly
 from work import Absent, Row, require_equal, row, run_gp, say, table, timed
 
 from kahanmaps import degree_growth, load
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.laboratory.singular.singularities import Patterns, patterns
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -29,14 +30,16 @@ EPS = "1/10"
 WORKS = [("planar_cubic_hamiltonian", 40), ("euler_top", 12), ("clebsch_first_flow", 8), ("lorenz", 7)]
 WORKS += [("planar_cubic_hamiltonian", 80), ("euler_top", 28), ("clebsch_first_flow", 14), ("lorenz", 8)]
 QUICK = [("planar_cubic_hamiltonian", 12), ("euler_top", 5)]
-OURS = "kahanmaps, two lines compared"
+OURS = "kahanmaps, two lines compared and explained"
+ALONE = "kahanmaps, the lines alone, singularities known before"
 POLYNOMIALS = "python-flint: minors of polynomial matrices, gcds, two lines"
 PARI = "PARI/GP: matsolve over GF(p)(t), two lines"
 
 
-def ours(system: QuadraticSystem, n: int) -> list[int]:
+def ours(system: QuadraticSystem, n: int, patterns: Patterns | None = None) -> list[int]:
     """The degrees from d_0 = 1 to d_n."""
-    return list(degree_growth(system, EPS, max_terms=n, seconds=600, max_degree=10**6).degrees)
+    found = degree_growth(system, EPS, max_terms=n, seconds=600, max_degree=10**6, patterns=patterns)
+    return list(found.degrees)
 
 
 LINES = (1, 2)
@@ -127,6 +130,9 @@ def measure(quick: bool = False) -> list[Row]:
         seconds, degrees = timed(partial(ours, system, n), most=3)
         what = f"{name}, n = {n}, d_n = {degrees[-1]}"
         rows.append(row(GROUP, OURS, what, seconds, 1.0))
+        alone, found = timed(partial(ours, system, n, patterns(system, fmpq(EPS))), most=3)
+        require_equal(ALONE, found, degrees)
+        rows.append(row(GROUP, ALONE, what, alone, alone / seconds))
         for label, run in PEERS:
             try:
                 slow, found = run(system, n)

@@ -254,9 +254,9 @@ GROUPS = {
     ),
     bench_degrees.GROUP: (
         "Time relative to kahanmaps, which walks two lines with different primes, compares them, and explains the\n"
-        "degrees by the singularities, which is most of the time where iterates are few. The peers walk two lines\n"
-        "modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does itself up to dimension 5; in dimension 6 it\n"
-        "takes power series."
+        "degrees by the singularities: a constant cost, most of the time where iterates are few. The second row is\n"
+        "the lines alone, which is what the peers do, modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does\n"
+        "itself up to dimension 5; in dimension 6 it takes power series."
     ),
     bench_analysis.GROUP: (
         "Time relative to what `analyze` does first to count integrals: how many polynomials of each degree vanish\n"

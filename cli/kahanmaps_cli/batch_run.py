@@ -8,36 +8,27 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps.errors import counted, quoted, suggestion
-from kahanmaps_cli.batch_show import print_status, status_data
+from kahanmaps.errors import counted
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.batch_show import print_status, require_experiments, status_data
 from kahanmaps_cli.progress import Progress, as_typed, duration, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
-
-if TYPE_CHECKING:
-    from kahanmaps.experiments.records import Executor, Job, Record
-    from kahanmaps.experiments.spec import Spec
-    from kahanmaps.experiments.store import Store
-    from kahanmaps.experiments.tables import Planned
 
 _SHOWN = 3  # tasks of each experiment in a dry run
 
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
-    from kahanmaps.experiments.records import option_words, system_words
-    from kahanmaps.experiments.spec import MAX_TASKS, read_spec
-    from kahanmaps.maps.convention import CONVENTION
-
-    spec = read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
+    spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS)
     missing = _missing(db, spec, options)
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
-    _require_names(options["only"], spec)
+    require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     if options["as_json"]:
         data = [
             {
@@ -56,7 +47,7 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
         print_json(
             {
                 **envelope("batch run --dry-run"),
-                "convention": CONVENTION,
+                "convention": lib.CONVENTION,
                 "spec": path,
                 "tasks": sum(experiment.size for experiment in chosen),
                 "missing": missing,
@@ -70,8 +61,8 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
             task = experiment[k]
             given = {name: value for name, value in task.options.items() if value is not None}
             if "other" in given:
-                given["other"] = system_words(given["other"])
-            tell(f"\t{task.key[:8]}\t{system_words(task.system)}\t{option_words(given)}")
+                given["other"] = lib.system_words(given["other"])
+            tell(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given)}")
         if experiment.size > _SHOWN:
             tell(f"\t... and {experiment.size - _SHOWN} more")
     tell(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
@@ -80,15 +71,11 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
 
 def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
-    from kahanmaps.experiments.run import plan
-    from kahanmaps.experiments.spec import MAX_TASKS, read_spec
-    from kahanmaps.experiments.store import Store
-
-    spec = None if path is None else read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
+    spec = None if path is None else lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS)
     if spec is not None:
-        _require_names(options["only"], spec)
-    with Store.open(db, create=spec is not None) as store:
-        planned = {} if spec is None else plan(spec, store)
+        require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
+    with lib.Store.open(db, create=spec is not None) as store:
+        planned = {} if spec is None else lib.plan(spec, store)
         names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
         which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
         todo = store.count_pending(**which, retry_failed=options["retry_failed"])
@@ -115,20 +102,16 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     return 3 if failed or missing else 0
 
 
-def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Mapping[str, Any]) -> bool:
+def _do(jobs: Iterator[lib.Job], store: lib.Store, progress: BatchProgress, options: Mapping[str, Any]) -> bool:
     """Do the jobs, each record stored before the next job is handed out; whether somebody interrupted."""
-    from kahanmaps.experiments.run import Batch
-
     with closing(_executor(store, progress, options)) as executor:
-        batch = Batch(jobs, executor)
-
-        def interrupt() -> None:
-            batch.interrupt()
-            if executor.in_flight:
-                progress.say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
-
-        with interruptible(interrupt):
+        batch, is_told = lib.Batch(jobs, executor), False
+        with interruptible(batch.interrupt):
             for records in batch:
+                if batch.was_interrupted and not is_told:  # not in the handler, which may find a line half written
+                    is_told = True
+                    if executor.in_flight:
+                        progress.say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
                 if records:
                     store.add(records)
                 progress.tell(records, executor.in_flight)
@@ -138,13 +121,10 @@ def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Map
     return batch.was_interrupted
 
 
-def _executor(store: Store, progress: BatchProgress, options: Mapping[str, Any]) -> Executor:
-    from kahanmaps.experiments.run import executor_for
-    from kahanmaps.maps.kernels import processors
-
-    return executor_for(
+def _executor(store: lib.Store, progress: BatchProgress, options: Mapping[str, Any]) -> lib.Executor:
+    return lib.executor_for(
         store.document,
-        options["jobs"] or processors(),
+        options["jobs"] or lib.processors(),
         options["scheduler"],
         options["worker_python"],
         options["group_seconds"],
@@ -152,7 +132,7 @@ def _executor(store: Store, progress: BatchProgress, options: Mapping[str, Any])
     )
 
 
-def _tell_plan(planned: Mapping[str, Planned], todo: int, db: str) -> None:
+def _tell_plan(planned: Mapping[str, lib.Planned], todo: int, db: str) -> None:
     for name, found in planned.items():
         if found.is_resumed:
             continue
@@ -186,11 +166,9 @@ def _tell_end(
     again = as_typed(words)
     why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
     if progress.lost:
-        from kahanmaps.experiments.children import TRIES
-
         say(
             f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "
-            f"{TRIES} times ({progress.why_lost})"
+            f"{lib.TRIES} times ({progress.why_lost})"
         )
     if missing:
         say(f"{'interrupted: ' if interrupted else ''}{_tasks(missing)} without a result yet; to continue: {again}")
@@ -198,24 +176,11 @@ def _tell_end(
         say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
 
 
-def _require_names(only: tuple[str, ...], spec: Spec) -> None:
-    from kahanmaps.errors import InputError
-
-    known = [experiment.name for experiment in spec.experiments]
-    for name in only:
-        if name not in known:
-            raise InputError(
-                f"there is no experiment {quoted(name)}, expected one of {', '.join(known)}{suggestion(name, known)}"
-            )
-
-
-def _missing(db: str, spec: Spec, options: Mapping[str, Any]) -> int | None:
+def _missing(db: str, spec: lib.Spec, options: Mapping[str, Any]) -> int | None:
     """How many tasks have no result, if there is a database to ask; it is not changed."""
     if not os.path.exists(db):
         return None
-    from kahanmaps.experiments.store import Store
-
-    with Store.open(db, readonly=True) as store:
+    with lib.Store.open(db, readonly=True) as store:
         done = {row.task.key for row in store.rows() if row.record is not None}
     names = options["only"] or [experiment.name for experiment in spec.experiments]
     keys = {task.key for experiment in spec.experiments if experiment.name in names for task in experiment.tasks()}
@@ -251,7 +216,7 @@ class BatchProgress(Progress):
         """Since the beginning."""
         return time.monotonic() - self._begin
 
-    def tell(self, records: Sequence[Record], in_flight: int) -> None:
+    def tell(self, records: Sequence[lib.Record], in_flight: int) -> None:
         """Some more records, or none for a while; how many tasks are being done."""
         for record in records:
             self.outcomes[str(record.outcome)] += 1

@@ -7,29 +7,23 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps.errors import quoted, suggestion
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.progress import duration
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
-if TYPE_CHECKING:
-    from kahanmaps.experiments.store import Found, Store
-
 _VALUE_WIDTH = 300
 
 
-def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
+def status_data(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
     """How far the experiments are, as plain data."""
-    from kahanmaps.errors import InputError, quoted
-
     found = store.status()
-    for name in only:
-        if name not in [one.name for one in found]:
-            known = ", ".join(one.name for one in found) or "none"
-            raise InputError(f"there is no experiment {quoted(name)} in it, expected one of: {known}")
+    require_experiments(only, [one.name for one in found])
     return {
         **envelope("batch status"),
         "experiments": [
@@ -46,6 +40,16 @@ def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
         ],
         "unplanned": store.unplanned(),
     }
+
+
+def require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
+    """Raises InputError for a name that no experiment has."""
+    for name in only:
+        if name not in known:
+            hint = suggestion(name, known)
+            raise lib.InputError(
+                f"there is no experiment {quoted(name)}, expected one of {', '.join(known) or 'none'}{hint}"
+            )
 
 
 def print_status(data: Mapping[str, Any]) -> None:
@@ -65,14 +69,12 @@ def print_status(data: Mapping[str, Any]) -> None:
         click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
 
 
-def found_data(store: Store, found: Found) -> dict[str, Any]:
+def found_data(store: lib.Store, found: lib.Found) -> dict[str, Any]:
     """A task and its record as plain data."""
-    from kahanmaps.maps.convention import CONVENTION
-
     task, record, places, attempts = found
     return {
         **envelope("batch show"),
-        "convention": CONVENTION,
+        "convention": lib.CONVENTION,
         "key": task.key,
         "task": task.kind,
         "system": task.system,
@@ -114,7 +116,7 @@ def print_found(data: Sequence[Mapping[str, Any]]) -> None:
 
 
 def print_summary(
-    store: Store,
+    store: lib.Store,
     by: Sequence[str],
     *,
     as_json: bool,
@@ -124,16 +126,11 @@ def print_summary(
     only: Sequence[str],
 ) -> None:
     """The tables of a summary."""
-    from kahanmaps.experiments.summary import summarise
-    from kahanmaps.maps.convention import CONVENTION
-
-    found = summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
+    found = lib.summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
     if as_json:
-        print_json({**envelope("batch summary"), "convention": CONVENTION, **found.to_json()})
+        print_json({**envelope("batch summary"), "convention": lib.CONVENTION, **found.to_json()})
     elif as_markdown:
-        from kahanmaps.display.experiments import summary_markdown
-
-        echo(summary_markdown(found), end="")
+        echo(lib.summary_markdown(found), end="")
     elif on_terminal():
         for table in found.tables(digits=4):
             print_table([table.columns, *table.rows], words=table.words)
@@ -142,30 +139,24 @@ def print_summary(
             echo(line)
 
 
-def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
+def export_rows(store: lib.Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
     """Write the results; a file is complete or is not there."""
-    from kahanmaps.experiments.export import write_csv, write_jsonl, write_parquet
-    from kahanmaps.whole_files import whole_file
-
     if form == "parquet" and output is not None:
-        write_parquet(lambda: store.rows(only), output, stable=stable)
+        lib.write_parquet(lambda: store.rows(only), output, stable=stable)
         return
     with ExitStack() as stack:
         stream: Any = sys.stdout
         if output not in (None, "-"):
-            stream = codecs.getwriter("utf-8")(stack.enter_context(whole_file(output)))
+            stream = codecs.getwriter("utf-8")(stack.enter_context(lib.whole_file(output)))
         if form == "csv":
-            write_csv(lambda: store.rows(only), stream, stable=stable)
+            lib.write_csv(lambda: store.rows(only), stream, stable=stable)
         else:
-            write_jsonl(store.rows(only), stream, stable=stable)
+            lib.write_jsonl(store.rows(only), stream, stable=stable)
 
 
 def print_tasks(name: str | None, as_json: bool) -> None:
     """The kinds of tasks, or one with its options."""
-    from kahanmaps.experiments.options import FAMILY
-    from kahanmaps.experiments.registry import task_kind, task_kinds
-
-    kinds = list(task_kinds().values()) if name is None else [task_kind(name)]
+    kinds = list(lib.task_kinds().values()) if name is None else [lib.task_kind(name)]
     if as_json:
         data = [
             {
@@ -194,7 +185,7 @@ def print_tasks(name: str | None, as_json: bool) -> None:
         tell_entry(f"  {key:<12}  ", option.help + (f" ({default})" if default != "default null" else ""))
     if kind.needs is not None:
         tell('with system = "family" also:')
-        for key, option in FAMILY.items():
+        for key, option in lib.FAMILY.items():
             tell_entry(f"  {key:<12}  ", option.help)
         if "seed" not in kind.options:
             tell_entry(f"  {'seed':<12}  ", "seed of everything drawn at random (default 0)")

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import stack
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.associated import FamilyMember
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -26,46 +23,35 @@ draw_options: Callable[[F], F] = stack(
 DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 
 
-def drawn_file(options: dict[str, Any]) -> SystemFile:
+def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
     """The member that the options ask for as a system file; without any of them one with m = 3."""
-    from kahanmaps.documents.files import SystemFile
-
     drawn = {name: options[name] for name in DRAWN}
     if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
         drawn["m"] = 3
     member = draw_member(**drawn, seed=options["seed"])
-    return SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
+    return lib.SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
 
 
 def draw_member(
     m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
-) -> FamilyMember:
+) -> lib.FamilyMember:
     """The member that the options ask for."""
-    from kahanmaps.algebra.text import parse_point
-    from kahanmaps.family.draw import (
-        draw_generic,
-        draw_with_chi,
-        draw_with_eigenvalues,
-        parse_chi,
-        random_eigenvalues,
-    )
-
     if sum((eigenvalues is not None, generic, chi is not None)) > 1:
         raise click.UsageError("give one of --eigenvalues, --generic and --chi")
     if size is not None and not 1 <= size <= 10**6:
         raise click.UsageError(f"found --size {size}, expected 1 to 1000000")
     if eigenvalues is not None:
-        values = parse_point(eigenvalues)
+        values = lib.parse_point(eigenvalues)
         if m is not None and m != len(values):
             raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
-        return draw_with_eigenvalues(values, seed, size or 2)
+        return lib.draw_with_eigenvalues(values, seed, size or 2)
     if chi is not None:
-        polynomial = parse_chi(chi)
+        polynomial = lib.parse_chi(chi)
         if m is not None and m != polynomial.degree():
             raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
-        return draw_with_chi(polynomial, seed, size or 1)
+        return lib.draw_with_chi(polynomial, seed, size or 1)
     if m is None:
         raise click.UsageError("missing --m M (half the dimension), or --eigenvalues L1,L2,..., or --chi EXPR")
     if generic:
-        return draw_generic(m, seed, size or 1)
-    return draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
+        return lib.draw_generic(m, seed, size or 1)
+    return lib.draw_with_eigenvalues(lib.random_eigenvalues(m, seed), seed, size or 2)

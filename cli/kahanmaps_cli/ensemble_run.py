@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from contextlib import nullcontext
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from kahanmaps.errors import InputError
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.numbers import json_float, json_number, short_float
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.planar import NormalForm
-    from kahanmaps.family.structure import NoStructure, Structure
 
 FAILURES_SHOWN = 20
 _WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded
@@ -26,112 +21,113 @@ _PIECE = 0.1  # seconds between looks at Ctrl-C
 Told = Callable[[int], None]
 
 
-def structure_for(file: SystemFile, wish: str | None) -> Structure | NoStructure:
+def structure_for(file: lib.SystemFile, wish: str | None) -> lib.Structure | lib.NoStructure:
     """The normal form that steps are made in, or why there is none."""
-    from kahanmaps.family.structure import NoStructure
-
     if wish == "generic":
-        return NoStructure("generic, as asked for")
+        return lib.NoStructure("generic, as asked for")
     structure = file.structure
-    if not isinstance(structure, NoStructure) and structure.T is not None:
-        structure = NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
-    if isinstance(structure, NoStructure) and wish == "normal-form":
+    if not isinstance(structure, lib.NoStructure) and structure.T is not None:
+        structure = lib.NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
+    if isinstance(structure, lib.NoStructure) and wish == "normal-form":
         raise InputError(f"the method normal-form needs a normal form, and there is none: {structure.reason}")
     return structure
 
 
-def _kernel(wish: str | None, work: int) -> str | None:
-    return "numpy" if wish is None and work < _WORTH_COMPILING else wish
+class Asked(NamedTuple):
+    """What is asked of a run: `options` are those of the command."""
+
+    file: lib.SystemFile
+    eps: Any
+    starts: lib.NDArray[Any]
+    form: lib.NormalForm | None
+    integrals: Mapping[str, lib.RationalFunction]
+    options: Mapping[str, Any]
+
+    @property
+    def stepping(self) -> dict[str, Any]:
+        """How either kind of ensemble is to step."""
+        wish, steps = self.options["kernel"], self.options["steps"]
+        kernel = "numpy" if wish is None and len(self.starts) * steps < _WORTH_COMPILING else wish
+        return {"form": self.form, "kernel": kernel, "backward": self.options["backward"]}
 
 
-class _Walk:
-    """How far a run has come; what it tells is `counts`, `failures`, `moved` and `near`, for people and JSON."""
+class _Walk(ABC):
+    """How far many orbits have come; what it tells is `counts`, `failures`, `moved` and `near`, for people and JSON."""
 
-    reached = 0
-    records = 0
-    interrupted = False
+    kind: Literal["<f8", "<i8"]  # of the numbers in a .npy file
+    ensemble: Any
+    method: str
+    kernel: str
+    look = 0  # steps between two looks at integrals, if these want more than the first and the last
+
+    def __init__(self, asked: Asked) -> None:
+        self.asked = asked
+        self.steps: int = asked.options["steps"]
+        self.shape: tuple[int, ...] = asked.starts.shape  # orbits and dimension
+        self.reached = 0
+        self.records = 0
+        self.interrupted = False
 
     def interrupt(self) -> None:
         """Ask to end after the portion in hand."""
         self.interrupted = True
 
+    def walk(self, told: Told) -> None:
+        """Take the steps; the starts and multiples of --every, or the first and the last, go to a .npy file."""
+        output, every = self.asked.options["output"], self.asked.options["every"]
+        whole = every or max(1, self.steps)
+        interval = every or self.look or whole
+        with nullcontext() if output is None else lib.NpyFile(output, self.shape, self.kind) as file:
+            for k, points in enumerate(self.portions(interval, told)):
+                if file is not None and (interval == whole or k == 0):
+                    file.append(points)
+            if file is not None and interval != whole and self.reached == self.steps:
+                file.append(self.ensemble.x[None])
+            self.records = 0 if file is None else file.rows
+
+    @abstractmethod
+    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
+        """Take the steps; the starts, then points at multiples of the interval, some at a time."""
+
 
 class FloatRun(_Walk):
     """In machine numbers."""
 
-    def __init__(
-        self,
-        file: SystemFile,
-        eps: Any,
-        starts: NDArray[Any],
-        form: NormalForm | None,
-        integrals: Mapping[str, RationalFunction],
-        steps: int,
-        options: dict[str, Any],
-    ) -> None:
-        from kahanmaps.maps.floats.fast import FloatEnsemble, float_function, to_float
+    kind = "<f8"
 
-        value = to_float(eps)  # backward too: the inverse conserves what the map conserves
+    def __init__(self, asked: Asked) -> None:
+        super().__init__(asked)
+        value = lib.to_float(asked.eps)  # backward too: the inverse conserves what the map conserves
 
-        def of_point(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
-            found = float_function(function)
+        def of_point(function: lib.RationalFunction) -> Callable[[Sequence[float]], float | None]:
+            found = lib.float_function(function)
             return lambda x: found([*x, value])
 
-        self.asked = len(integrals)
-        self.ensemble = FloatEnsemble(
-            file.map,
-            eps,
-            starts,
-            backward=options["backward"],
-            form=form,
-            kernel=_kernel(options["kernel"], len(starts) * steps),
-            threads=options["threads"],
-            integrals={name: of_point(function) for name, function in integrals.items()},
+        self.ensemble: lib.FloatEnsemble = lib.FloatEnsemble(
+            asked.file.map,
+            asked.eps,
+            asked.starts,
+            **asked.stepping,
+            threads=asked.options["threads"],
+            integrals={name: of_point(function) for name, function in asked.integrals.items()},
         )
-        self.method = "generic" if form is None else "normal-form"
+        self.method = "generic" if asked.form is None else "normal-form"
         self.kernel = self.ensemble.kernel
+        if asked.integrals:
+            self.look = max(1, -(-self.steps // max(1, min(_LOOKS, _VALUES // self.shape[0]))))
 
     def interrupt(self) -> None:
         super().interrupt()
         self.ensemble.interrupt()
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Orbits and dimension."""
-        return self.ensemble.n, self.ensemble.system.dim
-
-    def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
-        """Take the steps; with `output` the starts and multiples of `every` go to that .npy file."""
-
+    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
         def progress(step: int) -> None:
             told(step)
             if self.interrupted:
                 self.ensemble.interrupt()
 
-        looks = max(1, min(_LOOKS, _VALUES // self.ensemble.n))
-        look = every or max(1, -(-steps // looks))
-        if output is not None and (every or not self.asked):
-            self.records = self.ensemble.stream(output, steps, every or max(1, steps), progress=progress)
-        elif output is not None:
-            self._first_and_last(steps, look, output, progress)
-        elif self.asked:
-            for _ in self.ensemble.records(steps, look, progress=progress):
-                pass
-        else:
-            self.ensemble.advance(steps, progress=progress)
+        yield from self.ensemble.records(self.steps, interval, progress=progress)
         self.reached = self.ensemble.step
-
-    def _first_and_last(self, steps: int, look: int, output: str, progress: Told) -> None:
-        """Look at integrals more often than points are kept."""
-        from kahanmaps.maps.floats.stream import NpyFile
-
-        with NpyFile(output, self.shape) as file:
-            file.append(self.ensemble.x[None])
-            for _ in self.ensemble.records(steps, look, progress=progress):
-                pass
-            if steps and self.ensemble.step == steps:
-                file.append(self.ensemble.x[None])
-            self.records = file.rows
 
     @property
     def counts(self) -> dict[str, int]:
@@ -169,72 +165,38 @@ class FloatRun(_Walk):
     def moved_lines(self) -> list[str]:
         lines = []
         for record in self.moved():
+            told = "no orbit was completed"
             if "largest" in record:
-                initial = record["initial"]
-                start = (
-                    short_float(initial)
-                    if not isinstance(initial, list)
-                    else "+-".join(map(short_float, initial)) + "i"
-                )
-                largest = short_float(record["largest"])
-                lines.append(f"{record['name']}\tat most {largest} (orbit {record['orbit']}, from {start})")
-            else:
-                lines.append(f"{record['name']}\tno orbit was completed")
+                initial, largest = record["initial"], short_float(record["largest"])
+                is_complex = isinstance(initial, list)
+                start = "+-".join(map(short_float, initial)) + "i" if is_complex else short_float(initial)
+                told = f"at most {largest} (orbit {record['orbit']}, from {start})"
+            lines.append(f"{record['name']}\t{told}")
         return lines
 
 
 class ModularRun(_Walk):
     """Modulo a prime, where an integral either holds or does not."""
 
-    def __init__(
-        self,
-        file: SystemFile,
-        eps: Any,
-        starts: NDArray[Any],
-        form: NormalForm | None,
-        integrals: Mapping[str, RationalFunction],
-        steps: int,
-        options: dict[str, Any],
-    ) -> None:
-        from kahanmaps.maps.residues.ensemble import ModularEnsemble
+    kind = "<i8"
 
-        self.file = file
-        self.eps = eps
-        self.backward: bool = options["backward"]
-        self.ensemble = ModularEnsemble(
-            file.map,
-            eps,
-            starts,
-            options["arithmetic"][1],
-            form=form,
-            kernel=_kernel(options["kernel"], len(starts) * steps),
-            threads=options["threads"] or 1,
-            backward=options["backward"],
+    def __init__(self, asked: Asked) -> None:
+        super().__init__(asked)
+        prime, threads = asked.options["arithmetic"][1], asked.options["threads"] or 1
+        self.ensemble: lib.ModularEnsemble = lib.ModularEnsemble(
+            asked.file.map, asked.eps, asked.starts, prime, **asked.stepping, threads=threads
         )
-        if options["method"] == "normal-form" and self.ensemble.method != "planes":
+        if asked.options["method"] == "normal-form" and self.ensemble.method != "planes":
             raise InputError("the method normal-form needs a chi that splits modulo P: take generic, or another prime")
         self.method = "normal-form" if self.ensemble.method == "planes" else "generic"
         self.kernel = f"{self.ensemble.kernel} {self.ensemble.method}"
-        self._integrals = integrals
         self._initial = self._values()
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        return len(self.ensemble), self.ensemble.system.dim
-
-    def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
-        from kahanmaps.maps.floats.stream import NpyFile
-
-        if output is None:
-            self._advance(steps, told)
-            return
-        every = every or max(1, steps)
-        with NpyFile(output, self.shape, "<i8") as file:
-            file.append(self.ensemble.x[None])
-            while self.reached + every <= steps and self._advance(self.reached + every, told):
-                file.append(self.ensemble.x[None])
-            self._advance(steps, told)
-            self.records = file.rows
+    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
+        yield self.ensemble.x[None]
+        while self.reached + interval <= self.steps and self._advance(self.reached + interval, told):
+            yield self.ensemble.x[None]
+        self._advance(self.steps, told)
 
     def _advance(self, stop: int, told: Told) -> bool:
         """To step `stop`, in pieces that take a moment; whether it was reached."""
@@ -250,13 +212,11 @@ class ModularRun(_Walk):
         return self.reached >= stop
 
     def _values(self) -> dict[str, list[Any]]:
-        from kahanmaps.invariants.integrals import ClaimedIntegral
-
         field = self.ensemble.field
-        claims = {name: ClaimedIntegral(name, function) for name, function in self._integrals.items()}
+        claims = {name: lib.ClaimedIntegral(name, function) for name, function in self.asked.integrals.items()}
         points = self.ensemble.x.tolist() if claims else []
         return {
-            name: [claim.value(field, self.eps, [field.convert(entry) for entry in x]) for x in points]
+            name: [claim.value(field, self.asked.eps, [field.convert(entry) for entry in x]) for x in points]
             for name, claim in claims.items()
         }
 
@@ -266,10 +226,8 @@ class ModularRun(_Walk):
         return {"completed": len(self.ensemble) - singular, "singular": singular}
 
     def failures(self) -> Iterator[dict[str, Any]]:
-        from kahanmaps.maps.implicit import det_of
-
-        over = self.file.map.at(self.eps, self.ensemble.field)
-        det = det_of(over.denominator_name(self.backward))
+        over = self.asked.file.map.at(self.asked.eps, self.ensemble.field)
+        det = lib.det_of(over.denominator_name(self.asked.options["backward"]))
         for orbit in (self.ensemble.singular_at >= 0).nonzero()[0].tolist():
             at = int(self.ensemble.singular_at[orbit])
             message = f"{det} = 0 at step {at}: the map has no value there"

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from kahanmaps.errors import BadPrime, ExpressionError, InputError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from kahanmaps_cli import library as lib
 
 MAX_TEXT_BYTES = 100_000_000
 MAX_NPY_BYTES = 2_000_000_000
@@ -24,13 +22,9 @@ _MAGIC = b"\x93NUMPY"
 Convert = Callable[[str], "float | int"]
 
 
-def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArray[Any]:
+def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> lib.NDArray[Any]:
     """Starts at random: doubles from -box to box, or residues modulo a prime; the same ones for the same seed."""
     import numpy as np
-
-    from kahanmaps.algebra.fields import rational
-    from kahanmaps.maps.floats.doubles import to_float
-    from kahanmaps.maps.floats.ensemble import starts_in_box
 
     if count < 1:
         raise InputError(f"found --random {count}, expected at least 1 start")
@@ -40,16 +34,26 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArr
         raise InputError(f"found --seed {seed}, expected 0 or more")
     if prime is not None:
         return np.random.default_rng(seed).integers(0, prime, (count, dim), dtype=np.int64)
-    box = rational(box)
+    box = lib.rational(box)
     if box <= 0:
         raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
-    size = to_float(box)
+    size = lib.to_float(box)
     if size == 0.0:
         raise InputError("found a --box that is 0 in machine numbers, expected a larger one")
-    return starts_in_box(count, dim, size, seed)
+    return lib.starts_in_box(count, dim, size, seed)
 
 
-def read_starts(path: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:
+def asked_starts(
+    file: lib.SystemFile, options: Mapping[str, Any], prime: int | None = None, count: int | None = None
+) -> lib.NDArray[Any]:
+    """The starts that the options ask for: those of a file, or drawn at random, `count` of them unless they say."""
+    if options["starts"] is not None:
+        return read_starts(options["starts"], file.variables, prime)
+    count = options["count"] if count is None or options["count"] is not None else count
+    return drawn(count, file.dim, 1 if options["box"] is None else options["box"], options["seed"] or 0, prime)
+
+
+def read_starts(path: str, variables: Sequence[str], prime: int | None) -> lib.NDArray[Any]:
     """The starts in a file, or on standard input for "-": an array (n, dim) of doubles, or of residues below the prime.
 
     Raises InputError with file and line of the first mistake.
@@ -73,7 +77,7 @@ def read_starts(path: str, variables: Sequence[str], prime: int | None) -> NDArr
     return _Text(where, variables, prime).read(text)
 
 
-def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:
+def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | None) -> lib.NDArray[Any]:
     """The array of a .npy file; nothing is ever unpickled."""
     import numpy as np
 
@@ -97,12 +101,12 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | No
         raise InputError(f"{where}: found an array of shape {shape}, expected at most {MAX_NUMBERS} numbers")
     if prime is not None:
         unsigned = np.issubdtype(dtype, np.unsignedinteger)
-        residues: NDArray[Any] = rows.astype(np.uint64 if unsigned else np.int64) % (
+        residues: lib.NDArray[Any] = rows.astype(np.uint64 if unsigned else np.int64) % (
             np.uint64 if unsigned else np.int64
         )(prime)
         return residues.astype(np.int64)
     with np.errstate(over="ignore"):
-        starts: NDArray[Any] = np.ascontiguousarray(rows, dtype=np.float64)
+        starts: lib.NDArray[Any] = np.ascontiguousarray(rows, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if len(bad):
         found = starts[bad[0]][~np.isfinite(starts[bad[0]])][0]
@@ -121,7 +125,7 @@ class _Text:
         self.columns: list[int] | None = None
         self.width = len(self.variables)
 
-    def read(self, text: str) -> NDArray[Any]:
+    def read(self, text: str) -> lib.NDArray[Any]:
         import numpy as np
 
         rows: list[list[float | int]] = []
@@ -168,21 +172,15 @@ class _Text:
 
 
 def _to_double(text: str) -> float:
-    from kahanmaps.algebra.text import parse_number
-    from kahanmaps.maps.floats.doubles import to_float
-
-    return to_float(parse_number(text))
+    return lib.to_float(lib.parse_number(text))
 
 
 def _to_residue(prime: int) -> Convert:
-    from kahanmaps.algebra.fields import GF
-    from kahanmaps.algebra.text import parse_number
-
-    field = GF(prime)
+    field = lib.GF(prime)
 
     def residue(text: str) -> int:
         try:
-            return int(field.convert(parse_number(text)))
+            return int(field.convert(lib.parse_number(text)))
         except BadPrime:
             raise InputError(f"the prime {prime} divides the denominator") from None
 

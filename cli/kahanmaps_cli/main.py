@@ -205,7 +205,17 @@ def _run(argv: Sequence[str] | None) -> int:
     except BrokenPipeError:
         return UNDECIDED
     except Exception as error:
+        if _is_interrupt(error):
+            say("interrupted")
+            return INTERRUPTED
         return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: Python makes RuntimeError of it where a class is being made, in an import."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _report(error: Exception) -> int:

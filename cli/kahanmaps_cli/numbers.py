@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kahanmaps.errors import InputError, counted
-
-if TYPE_CHECKING:
-    from flint import fmpq_mat
+from kahanmaps_cli import library as lib
 
 
 def json_float(value: Any) -> float | str:
@@ -30,15 +28,10 @@ def short_float(value: Any) -> str:
     return f"{float(value):.3g}"
 
 
-def read_matrix(text: str) -> fmpq_mat:
+def read_matrix(text: str) -> lib.fmpq_mat:
     """A square matrix written row by row, rows separated by semicolons."""
-    from flint import fmpq_mat
-
-    from kahanmaps.algebra.text import parse_point
-    from kahanmaps.systems.quadratic import MAX_DIMENSION
-
-    rows = [list(parse_point(row)) for row in text.split(";")]
-    if len(rows) > MAX_DIMENSION or any(len(row) != len(rows) for row in rows):
+    rows = [list(lib.parse_point(row)) for row in text.split(";")]
+    if len(rows) > lib.MAX_DIMENSION or any(len(row) != len(rows) for row in rows):
         found = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
-        raise InputError(f"found {found}, expected a square matrix, at most {MAX_DIMENSION} x {MAX_DIMENSION}")
-    return fmpq_mat(rows)
+        raise InputError(f"found {found}, expected a square matrix, at most {lib.MAX_DIMENSION} x {lib.MAX_DIMENSION}")
+    return lib.fmpq_mat(rows)

@@ -5,19 +5,15 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
-from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
+from kahanmaps_cli.params import ExactNumber, Kind, NameValue, PointText, Seconds, Whole
 from kahanmaps_cli.progress import say
-
-if TYPE_CHECKING:
-    from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.documents.files import SystemFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,7 +46,7 @@ class Renamed(click.Option):
 system_argument: Callable[[F], F] = click.argument("system", required=False, shell_complete=complete_system)
 
 
-def _parameter_option(kind: NameValue, help_text: str) -> Callable[[F], F]:
+def _parameter_option(kind: Kind, help_text: str) -> Callable[[F], F]:
     return click.option(
         "-p",
         "--parameter",
@@ -153,13 +149,11 @@ def integral_option(help_text: str) -> Callable[[F], F]:
     )
 
 
-def asked_integral(file: SystemFile, name: str, text: str, otherwise: str) -> tuple[str, RationalFunction]:
+def asked_integral(file: lib.SystemFile, name: str, text: str, otherwise: str) -> tuple[str, lib.RationalFunction]:
     """An integral of the file by its name, or an expression, called by its own text where that is short."""
-    from kahanmaps.algebra.text import parse_rational_function
-
     if text in file.integrals:
         return name or text, file.integrals[text]
-    function = parse_rational_function(text, file.claim_names, file.parameters)
+    function = lib.parse_rational_function(text, file.claim_names, file.parameters)
     return name or (" ".join(text.split()) if len(text) <= 30 else otherwise), function
 
 
@@ -197,6 +191,11 @@ check_options: Callable[[F], F] = stack(
 )
 
 
+def given(options: Mapping[str, Any], *names: str, **others: str) -> dict[str, Any]:
+    """The values of these options, by their names, or after these by others: `given(options, "seed", terms="max")`."""
+    return {name: options[name] for name in names} | {other: options[name] for other, name in others.items()}
+
+
 def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
     """eps from --eps or --time-step; None where neither is given and that is allowed."""
     if eps is not None and time_step is not None:
@@ -208,7 +207,7 @@ def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
     return eps
 
 
-def eps_of(file: SystemFile, options: Mapping[str, Any]) -> Any:
+def eps_of(file: lib.SystemFile, options: Mapping[str, Any]) -> Any:
     """eps from --eps or --time-step, which have to be given where the map depends on it; None where it does not."""
     eps = the_eps(options["eps"], options["time_step"], required=file.map.has_eps)
     return eps if file.map.has_eps else None
@@ -226,7 +225,7 @@ def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
 
 def load_pair(
     reference: str | None, other: str | None, options: Mapping[str, Any]
-) -> tuple[SystemFile, SystemFile | None]:
+) -> tuple[lib.SystemFile, lib.SystemFile | None]:
     """Two systems, the second one perhaps none: -p sets a parameter of both, or of the one that has it."""
     given = dict(options.get("parameters", ()))
     if other is None or not given:
@@ -247,15 +246,11 @@ def load_pair(
     return load_system(reference, {**options, "parameters": of_first}), load_system(other, {"parameters": of_second})
 
 
-def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile:
+def load_system(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, equations, or options.
 
     Of the options those of `inline_options` are looked at, as far as they are there.
     """
-    from kahanmaps.documents.files import MAX_FILE_BYTES, parse_system
-    from kahanmaps.documents.inline import inline_file
-    from kahanmaps.errors import InputError, reading
-
     variables, rhs = options.get("variables"), options.get("rhs", ())
     image, inverse = options.get("image", ()), options.get("inverse", ())
     parameters: Sequence[tuple[str, str]] = options.get("parameters", ())
@@ -272,7 +267,7 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
         if variables is None or not image:
             raise click.UsageError("an inline map needs --vars X,Y,... and one --image EXPR for each variable")
         section = {"image": _list(image), **({"inverse": _list(inverse)} if inverse else {})}
-        return parse_system(inline_file(variables, given, "map", section), "inline")
+        return lib.parse_system(lib.inline_file(variables, given, "map", section), "inline")
     if variables is not None or rhs:
         if reference is not None:
             raise click.UsageError(f"give a SYSTEM ({reference}) or an inline one (--vars and --rhs), not both")
@@ -281,8 +276,8 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
                 "an inline system needs both --vars X,Y,... and one --rhs EXPR for each variable, "
                 "or --rhs \"x' = x*y; y' = -x\""
             )
-        return parse_system(
-            inline_file(variables, given, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
+        return lib.parse_system(
+            lib.inline_file(variables, given, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
             "inline",
         )
     if reference is None:
@@ -291,26 +286,23 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
             "or equations: \"x' = x*y; y' = -x^2\""
         )
     if reference == "-":
-        text = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+        text = sys.stdin.buffer.read(lib.MAX_FILE_BYTES + 1)
         if not text.strip():
-            raise InputError("found nothing on standard input, expected a system file")
-        with reading("standard input"):
-            return parse_system(text, "standard input", given)
+            raise lib.InputError("found nothing on standard input, expected a system file")
+        with lib.reading("standard input"):
+            return lib.parse_system(text, "standard input", given)
     return load_reference(reference, given)
 
 
-def load_reference(reference: str, parameters: Mapping[str, str]) -> SystemFile:
+def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemFile:
     """The system of that name or in that file; where there is no such file, those that are named like it are told."""
-    from kahanmaps.documents.catalog import load
-    from kahanmaps.errors import InputError
-
     try:
-        return load(reference, parameters)
-    except InputError as error:
+        return lib.load(reference, parameters)
+    except lib.InputError as error:
         looks_like_a_path = reference.endswith(".toml") or os.sep in reference
         if not looks_like_a_path or os.path.lexists(reference):
             raise
-        raise InputError(f"{error}{_files_like(reference)}") from error
+        raise lib.InputError(f"{error}{_files_like(reference)}") from error
 
 
 def _files_like(path: str) -> str:
@@ -331,12 +323,10 @@ def _list(texts: Sequence[str]) -> list[str]:
     return [part.strip() for text in texts for part in text.split(";")]
 
 
-def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> Settings:
+def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> lib.Settings:
     """The settings of a check from the values of `check_options`."""
-    from kahanmaps.checks.settings import Settings
-
     steps = options["steps"]
-    return Settings(
+    return lib.Settings(
         eps=the_eps(options["eps"], options["time_step"], required=False),
         start=options["start"],
         steps=10 if steps is None else steps,

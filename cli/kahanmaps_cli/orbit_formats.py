@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import IO, Any
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.render import ending, envelope
 from kahanmaps_cli.terminal import tell
 
@@ -107,11 +108,9 @@ class Csv(Writer):
         self._beside = beside
 
     def header(self, header: dict[str, Any]) -> None:
-        from kahanmaps.experiments.export import cell
-
         self._header = header
         self._tell(None)
-        self._line(",".join(["step", *self.columns, *(_quoted(cell(name)) for name in self.integrals)]))
+        self._line(",".join(["step", *self.columns, *(_quoted(lib.cell(name)) for name in self.integrals)]))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
@@ -121,11 +120,9 @@ class Csv(Writer):
         self._tell(end)
 
     def _tell(self, end: dict[str, Any] | None) -> None:
-        from kahanmaps.whole_files import write_whole
-
         if self._beside is not None:
             told = {**envelope("orbit"), "header": self._header, "end": end}
-            write_whole(self._beside, (json.dumps(told, indent=1) + "\n").encode())
+            lib.write_whole(self._beside, (json.dumps(told, indent=1) + "\n").encode())
 
 
 def meta_of(path: str) -> str:

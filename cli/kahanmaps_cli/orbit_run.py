@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import asked_integral
-
-if TYPE_CHECKING:
-    from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.documents.files import SystemFile
 
 Column = tuple[str, Callable[[Sequence[Any]], str | None]]
 Point = tuple[int, "list[str] | None", "list[str | None]"]
@@ -23,16 +20,14 @@ class OrbitRun:
     `steps` is the last step.
     """
 
-    def __init__(self, file: SystemFile, eps: Any, options: dict[str, Any]) -> None:
-        from kahanmaps.maps.orbit import orbit
-
+    def __init__(self, file: lib.SystemFile, eps: Any, options: dict[str, Any]) -> None:
         self.file = file
         self.eps = eps
         self.steps: int = options["steps"] if options["at"] is None else max(options["at"])
         self.start = options["start"]
         self.backward = options["backward"]
         self.columns: list[Column] = []
-        self.walk = orbit(
+        self.walk = lib.orbit(
             file.map,
             self.start,
             eps,
@@ -63,24 +58,20 @@ class OrbitRun:
 
     def header(self) -> dict[str, Any]:
         """What a result can be redone from."""
-        from kahanmaps.algebra.text import format_number
-        from kahanmaps.maps.convention import convention
-        from kahanmaps.version import __version__
-
         header = {
             "system": self.file.name,
             "variables": list(self.file.variables),
             **self.file.map.written(),
-            "eps": None if self.eps is None else format_number(self.eps),
-            "time_step": format_number(2 * self.eps) if self.file.map.has_time_step else None,
-            "convention": convention(self.file.map),
+            "eps": None if self.eps is None else lib.format_number(self.eps),
+            "time_step": lib.format_number(2 * self.eps) if self.file.map.has_time_step else None,
+            "convention": lib.convention(self.file.map),
             "arithmetic": str(self.walk.arithmetic),
             "method": self.walk.method,
-            "start": [format_number(entry) for entry in self.start],
+            "start": [lib.format_number(entry) for entry in self.start],
             "direction": "backward" if self.backward else "forward",
             "steps": self.steps,
             "seed": None,
-            "version": __version__,
+            "version": lib.__version__,
         }
         if self.kind == "float":
             header["kernel"] = self.walk.orbit.kernel
@@ -102,14 +93,11 @@ class OrbitRun:
                 self._add_function(*asked_integral(self.file, name, text, f"I{k}"))
 
     def _add_known(self) -> None:
-        from kahanmaps.checks.conserve import known_integrals
-        from kahanmaps.errors import InputError
-
-        known = [integral for integral, _, _ in known_integrals(self.file)]
+        known = [integral for integral, _, _ in lib.known_integrals(self.file)]
         if not known and not self.file.integrals:
-            raise InputError(f"--integral known: no integral of {self.file.name} is known or claimed")
+            raise lib.InputError(f"--integral known: no integral of {self.file.name} is known or claimed")
         if known and self.kind == "float":
-            raise InputError(
+            raise lib.InputError(
                 "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
             )
         for integral in known:
@@ -117,22 +105,18 @@ class OrbitRun:
         for name, function in self.file.integrals.items():
             self._add_function(name, function)
 
-    def _add_function(self, name: str, function: RationalFunction) -> None:
-        from kahanmaps.invariants.integrals import ClaimedIntegral
-
+    def _add_function(self, name: str, function: lib.RationalFunction) -> None:
         if self.kind == "float":
-            from kahanmaps.maps.floats.fast import float_function, to_float
-
             root = self.file.map.root
-            values = [] if root is None else [to_float(root.rounded())]
+            values = [] if root is None else [lib.to_float(root.rounded())]
             # eps itself, also where the orbit steps by -eps: integrals are those of the map.
-            self.columns.append((name, _float_column(float_function(function), [*values, to_float(self.eps)])))
+            self.columns.append((name, _float_column(lib.float_function(function), [*values, lib.to_float(self.eps)])))
         else:
-            self.columns.append((name, self._exact_column(ClaimedIntegral(name, function, root=self.file.map.root))))
+            self.columns.append(
+                (name, self._exact_column(lib.ClaimedIntegral(name, function, root=self.file.map.root)))
+            )
 
     def _exact_column(self, integral: Any) -> Callable[[Sequence[Any]], str | None]:
-        from kahanmaps.errors import KahanmapsError
-
         field, root = self.walk.arithmetic.field, self.file.map.root
         if root is not None and self.kind == "exact":
             field = root.number_field
@@ -140,7 +124,7 @@ class OrbitRun:
         def value(x: Sequence[Any]) -> str | None:
             try:
                 found = integral.value(field, self.eps, x)
-            except KahanmapsError:  # the integral is not defined where the map is not
+            except lib.KahanmapsError:  # the integral is not defined where the map is not
                 return None
             return None if found is None else field.format(found)
 

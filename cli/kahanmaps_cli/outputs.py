@@ -17,6 +17,8 @@ from urllib.parse import unquote
 
 import click
 
+from kahanmaps_cli import library as lib
+
 _KEY = "kahanmaps_cli.files"
 
 Identity = tuple[int, int]
@@ -148,9 +150,7 @@ def _require_folder(path: Path) -> None:
 
 def _require_place(path: str, grows: bool) -> None:
     """Raise OSError where there is no place for the file, before anything is computed."""
-    from kahanmaps.whole_files import resolved
-
-    folder = resolved(path).parent
+    folder = lib.resolved(path).parent
     if not path or not folder.is_dir():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
     is_there = Path(path).exists()

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kahanmaps.errors import InputError, quoted
+from kahanmaps_cli import library as lib
 
 if TYPE_CHECKING:
     OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
@@ -22,67 +24,109 @@ _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
 _MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
 
-class ExactNumber(OptionType):
-    """An integer, p/q or a decimal, read exactly."""
+class Kind(OptionType):
+    """What `read` makes of the text of an option, with these settings; its InputError is the message.
 
-    name = "number"
+    Values that are no texts are defaults, and left alone.
+    """
+
+    def __init__(self, name: str, read: Callable[..., Any], *settings: Any) -> None:
+        self.name = name
+        self._read = read
+        self._settings = settings
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from kahanmaps.algebra.text import parse_number
-
         if not isinstance(value, str):
             return value
         try:
-            return parse_number(value)
+            return self._read(value, *self._settings)
         except InputError as error:
             self.fail(str(error), param, ctx)
 
 
-class PointText(OptionType):
-    """Numbers separated by commas, read exactly."""
-
-    name = "point"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from kahanmaps.algebra.text import parse_point
-
-        if not isinstance(value, str):
-            return value
-        try:
-            return parse_point(value)
-        except InputError as error:
-            self.fail(str(error), param, ctx)
+def _read_number(text: str) -> Any:
+    return lib.parse_number(text)
 
 
-class Whole(OptionType):
+def _read_point(text: str) -> Any:
+    return lib.parse_point(text)
+
+
+def _read_arithmetic(text: str) -> Any:
+    return lib.Arithmetic.parse(text)
+
+
+def _read_whole(text: str, least: int) -> int:
+    text = _spelt_out(text.strip())
+    digits = text.removeprefix("-").removeprefix("+")
+    # Longer ones are refused before they meet Python's own limit on digits.
+    if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
+        raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
+    return int(text)
+
+
+def _read_short_integer(text: str) -> int:
+    text = text.strip()
+    if len(text) > _MOST_DIGITS:
+        raise InputError(f"found {quoted(text)}, expected an integer of at most {_MOST_DIGITS} digits")
+    return int(click.INT(_spelt_out(text)))
+
+
+def _read_seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0.0
+    if not (isfinite(seconds) and seconds > 0):
+        raise InputError(f"found {quoted(text)}, expected a number of seconds above 0")
+    return seconds
+
+
+def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
+    left, equals, right = (piece.strip() for piece in text.partition("="))
+    if equals and left and right and left.isprintable():
+        return left, right
+    if name_is_optional and not equals and left:
+        return "", left
+    raise InputError(f"found {quoted(text)}, expected NAME=VALUE")
+
+
+def _read_steps(text: str) -> list[int]:
+    steps = set()
+    for piece in text.split(","):
+        piece = _spelt_out(piece.strip())
+        if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_STEP_DIGITS:
+            expected = f"step numbers of at most {_MOST_STEP_DIGITS} digits, separated by commas"
+            raise InputError(f"found {quoted(piece)}, expected {expected}")
+        steps.add(int(piece))
+    return sorted(steps)
+
+
+def _read_shard(text: str) -> tuple[int, ...]:
+    pieces = text.partition("/")[::2]
+    numbers = tuple(int(part) if part.isascii() and part.isdigit() and len(part) < 10 else 0 for part in pieces)
+    if not 1 <= numbers[0] <= numbers[1]:
+        raise InputError(f"found {text[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16")
+    return numbers
+
+
+ExactNumber = partial(Kind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
+PointText = partial(Kind, "point", _read_point)  # such numbers separated by commas
+Arithmetic = partial(Kind, "kind", _read_arithmetic)  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
+Seconds = partial(Kind, "seconds", _read_seconds)  # a time above 0
+Steps = partial(Kind, "n1,n2,...", _read_steps)  # step numbers separated by commas
+Shard = partial(Kind, "i/n", _read_shard)  # I/N: the I-th of N parts
+ShortInteger = partial(Kind, "integer", _read_short_integer)  # what `type=int` means in our commands
+
+
+def Whole(least: int = 0) -> Kind:
     """An integer that is at least `least`."""
-
-    name = "integer"
-
-    def __init__(self, least: int = 0) -> None:
-        self.least = least
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        text = str(value).strip()
-        text = _spelt_out(text)
-        digits = text.removeprefix("-").removeprefix("+")
-        # Longer ones are refused before they meet Python's own limit on digits.
-        if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= self.least):
-            self.fail(f"found {quoted(text)}, expected an integer, {self.least} or more", param, ctx)
-        return int(text)
+    return Kind("integer", _read_whole, least)
 
 
-class ShortInteger(OptionType):
-    """An integer that a machine can count to, and many digits more: what `type=int` means in our commands."""
-
-    name = "integer"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, str) and len(value.strip()) > _MOST_DIGITS:
-            self.fail(f"found {quoted(value)}, expected an integer of at most {_MOST_DIGITS} digits", param, ctx)
-        if isinstance(value, str):
-            value = _spelt_out(value.strip())
-        return click.INT.convert(value, param, ctx)
+def NameValue(name_is_optional: bool = False) -> Kind:
+    """NAME=VALUE; without a name the whole text is the value where `name_is_optional`."""
+    return Kind("name=value", _read_pair, name_is_optional)
 
 
 def _spelt_out(text: str) -> str:
@@ -126,90 +170,3 @@ def with_our_rules(command: click.Command) -> click.Command:
         for below in command.commands.values():
             with_our_rules(below)
     return command
-
-
-class Seconds(OptionType):
-    """A time above 0."""
-
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        try:
-            seconds = float(value)
-        except ValueError:
-            seconds = 0.0
-        if not (isfinite(seconds) and seconds > 0):
-            self.fail(f"found {quoted(str(value))}, expected a number of seconds above 0", param, ctx)
-        return seconds
-
-
-class NameValue(OptionType):
-    """NAME=VALUE; without a name the whole text is the value where `name_is_optional`."""
-
-    name = "name=value"
-
-    def __init__(self, name_is_optional: bool = False) -> None:
-        self.name_is_optional = name_is_optional
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        left, equals, right = (piece.strip() for piece in value.partition("="))
-        if equals and left and right and left.isprintable():
-            return left, right
-        if self.name_is_optional and not equals and left:
-            return "", left
-        self.fail(f"found {quoted(value)}, expected NAME=VALUE", param, ctx)
-
-
-class Arithmetic(OptionType):
-    """exact, float, mod:P (P a prime), ball:BITS or ball:auto."""
-
-    name = "kind"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        from kahanmaps.maps import arithmetic
-
-        try:
-            return arithmetic.Arithmetic.parse(value)
-        except InputError as error:
-            self.fail(str(error), param, ctx)
-
-
-class Steps(OptionType):
-    """Step numbers separated by commas."""
-
-    name = "n1,n2,..."
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        steps = []
-        for piece in value.split(","):
-            piece = _spelt_out(piece.strip())
-            if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_STEP_DIGITS:
-                self.fail(
-                    f"found {quoted(piece)}, expected step numbers of at most {_MOST_STEP_DIGITS} digits, separated by "
-                    "commas",
-                    param,
-                    ctx,
-                )
-            steps.append(int(piece))
-        return sorted(set(steps))
-
-
-class Shard(OptionType):
-    """I/N: the I-th of N parts."""
-
-    name = "i/n"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        part, slash, parts = value.partition("/")
-        numbers = [int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0 for text in (part, parts)]
-        if not slash or not 1 <= numbers[0] <= numbers[1]:
-            self.fail(f"found {value[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16", param, ctx)
-        return tuple(numbers)

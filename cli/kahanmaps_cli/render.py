@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, shorten, styled, tell
-
-if TYPE_CHECKING:
-    from kahanmaps.checks.claims import Evidence, Finding, Report
-    from kahanmaps.documents.files import SystemFile
 
 # On a terminal long lists of claims are cut to this many.
 CLAIMS_SHOWN = 40
@@ -21,16 +18,12 @@ CLAIMS_SHOWN = 40
 
 def envelope(command: str) -> dict[str, str]:
     """What every object begins with that a command prints as JSON."""
-    from kahanmaps.version import __version__
-
-    return {"command": command, "version": __version__}
+    return {"command": command, "version": lib.__version__}
 
 
-def record_of(command: str, file: SystemFile, arithmetic: str, **more: Any) -> dict[str, Any]:
+def record_of(command: str, file: lib.SystemFile, arithmetic: str, **more: Any) -> dict[str, Any]:
     """What a command found of a system, as plain data, with the system itself."""
-    from kahanmaps.maps.convention import convention
-
-    common = {"system": file.name, "convention": convention(file.map), "arithmetic": arithmetic}
+    common = {"system": file.name, "convention": lib.convention(file.map), "arithmetic": arithmetic}
     return {**envelope(command), **common, **more, "document": dict(file.document)}
 
 
@@ -39,7 +32,7 @@ def print_json(data: Mapping[str, Any]) -> None:
     click.echo(json.dumps(data))
 
 
-def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
+def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
     """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
     if as_json:
         print_json(report.to_json())
@@ -58,28 +51,24 @@ def ending(status: str, message: str) -> str:
     return message if message.startswith(status) else f"{status}: {message}"
 
 
-def exit_status(report: Report) -> int:
+def exit_status(report: lib.Report) -> int:
     """0 holds, 1 refuted, 3 undecided, or an orbit that was asked for and ended early."""
-    from kahanmaps.checks.claims import Verdict
-
-    if report.verdict is Verdict.REFUTED:
+    if report.verdict is lib.Verdict.REFUTED:
         return 1
-    if report.verdict is Verdict.UNDECIDED or report.ended_early:
+    if report.verdict is lib.Verdict.UNDECIDED or report.ended_early:
         return 3
     return 0
 
 
-def verdict_style(finding: Finding) -> str:
+def verdict_style(finding: lib.Finding) -> str:
     """Red is for what nobody expected: a control that is refuted, as it should be, stays without a colour."""
     if not finding.is_as_expected:
         return "bold red"
     return "" if finding.control else COLOURS[str(finding.verdict)]
 
 
-def _print_terminal(report: Report, verbose: bool) -> None:
-    from kahanmaps.display.report_text import headline
-
-    tell(headline(report), style="bold")
+def _print_terminal(report: lib.Report, verbose: bool) -> None:
+    tell(lib.headline(report), style="bold")
     shown = _selection(report.findings)
     _print_table(report, shown, verbose)
     if len(shown) < len(report.findings):
@@ -92,10 +81,8 @@ def _print_terminal(report: Report, verbose: bool) -> None:
     tell(f"verdict\t{report.verdict}", 9)
 
 
-def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
+def _print_table(report: lib.Report, shown: list[lib.Finding], verbose: bool) -> None:
     from rich.table import Table
-
-    from kahanmaps.display.report_text import details, verdict_text
 
     table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
@@ -105,9 +92,9 @@ def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
     told: set[str] = set()
     for finding in shown:
         claim = finding.claim
-        verdict = styled(verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
+        verdict = styled(lib.verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
         if verbose:
-            for line in details(finding, told, NUMBER_WIDTH):
+            for line in lib.details(finding, told, NUMBER_WIDTH):
                 claim += "\n  " + line
             table.add_row(verdict, styled(claim))
         else:
@@ -117,7 +104,7 @@ def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
     console().print(table)
 
 
-def _short(evidence: Evidence) -> str:
+def _short(evidence: lib.Evidence) -> str:
     """What decided a claim, in a table cell."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
@@ -125,10 +112,8 @@ def _short(evidence: Evidence) -> str:
     return f"{evidence.data['theorem']} ({len(hypotheses)} hypotheses verified exactly)"
 
 
-def _below(findings: list[Finding]) -> list[str]:
+def _below(findings: list[lib.Finding]) -> list[str]:
     """What a reader of the short table wants to know next: hypotheses, further evidence, witnesses."""
-    from kahanmaps.display.report_text import verdict_text, witness_lines
-
     lines = []
     hypotheses = list(dict.fromkeys(text for f in findings for text in f.evidence.data.get("hypotheses", ())))
     if hypotheses:
@@ -138,12 +123,12 @@ def _below(findings: list[Finding]) -> list[str]:
     lines += [f"also: {summary}" for summary in also[:4]]
     for finding in findings:
         if finding.witness is not None:
-            lines.append(f"{verdict_text(finding)}: {finding.claim}")
-            lines += [f"  {line}" for line in witness_lines(finding.witness, NUMBER_WIDTH)]
+            lines.append(f"{lib.verdict_text(finding)}: {finding.claim}")
+            lines += [f"  {line}" for line in lib.witness_lines(finding.witness, NUMBER_WIDTH)]
     return lines
 
 
-def _selection(findings: tuple[Finding, ...]) -> list[Finding]:
+def _selection(findings: tuple[lib.Finding, ...]) -> list[lib.Finding]:
     """All findings, or where they are too many for a terminal the first ones and every one that is not proved."""
     if len(findings) <= CLAIMS_SHOWN:
         return list(findings)

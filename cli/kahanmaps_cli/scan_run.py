@@ -4,38 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Event
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
 from kahanmaps.errors import quoted
-from kahanmaps_cli.options import (
-    eps_options,
-    is_inline,
-    load_system,
-    seconds_option,
-    seed_option,
-    stack,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.signals import interruptible
 
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.scan.result import Scan
-
 F = TypeVar("F", bound=Callable[..., Any])
 
-scan_options: Callable[[F], F] = stack(
-    system_options,
+scan_options: Callable[[F], F] = opt.stack(
+    opt.system_options,
     click.option(
         "--over",
         required=True,
         metavar="A,B,...",
         help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
     ),
-    eps_options,
+    opt.eps_options,
     click.option(
         "--by",
         type=click.Choice(["degrees", "integrals", "density"]),
@@ -47,9 +36,9 @@ scan_options: Callable[[F], F] = stack(
         "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N, or relations and densities up to degree N."
     ),
     click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
-    seconds_option(120.0, "Stop about then, and say what was seen."),
+    opt.seconds_option(120.0, "Stop about then, and say what was seen."),
     click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
-    seed_option,
+    opt.seed_option,
 )
 
 
@@ -62,44 +51,36 @@ def names_of(options: dict[str, Any]) -> list[str]:
     return names
 
 
-def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
+def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Scan:
     """The scan that a command line asks for."""
-    from kahanmaps.laboratory.scan.kept import Kept
-    from kahanmaps.laboratory.scan.scan import scan
-    from kahanmaps.laboratory.scan.sweep import TimeOver
-
     names = names_of(options)
-    if is_inline(options, system):
+    if opt.is_inline(options, system):
         given = {"eps", *(name for name, _ in options["parameters"])}
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
         raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     interrupted = Event()
 
     def told(sentence: str) -> None:
         if interrupted.is_set():
-            raise TimeOver
+            raise lib.TimeOver
         progress(sentence)
 
     with Progress(quiet) as progress, interruptible(interrupted.set):
-        return scan(
+        return lib.scan(
             file,
             names,
-            eps=the_eps(options["eps"], options["time_step"], required=False),
-            by=options["by"],
-            terms=options["terms"],
+            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
+            **opt.given(options, "by", "terms", "seconds", "seed", "jobs"),
             primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),
-            seconds=options["seconds"],
-            seed=options["seed"],
-            jobs=options["jobs"],
-            kept=None if options.get("keep") is None else Kept(options["keep"], *(options["shard"] or ())),
+            kept=None if options.get("keep") is None else lib.Kept(options["keep"], *(options["shard"] or ())),
             progress=told,
         )
 
 
-def ending(found: Scan, quiet: bool) -> int:
+def ending(found: lib.Scan, quiet: bool) -> int:
     """The exit status, and a word where it is not 0."""
     if found.ended in ("complete", "part"):
         return 0

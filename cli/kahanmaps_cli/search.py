@@ -7,15 +7,8 @@ from typing import Any, TypeVar
 
 import click
 
-from kahanmaps_cli.options import (
-    eps_options,
-    output_options,
-    seconds_option,
-    seed_option,
-    stack,
-    symbolic_option,
-    the_eps,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import formula, tell
 
@@ -24,14 +17,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def search_options(section: str) -> Callable[[F], F]:
     """eps, --symbolic, --seconds, --seed and the forms of output; `section` is that of a system file."""
-    return stack(
-        eps_options,
-        symbolic_option,
-        seconds_option(60, "Time for the search."),
-        seed_option,
+    return opt.stack(
+        opt.eps_options,
+        opt.symbolic_option,
+        opt.seconds_option(60, "Time for the search."),
+        opt.seed_option,
         click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
         click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
-        output_options,
+        opt.output_options,
     )
 
 
@@ -44,7 +37,7 @@ def require_one_form(options: dict[str, Any]) -> None:
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
     """The names of --symbolic without eps, and the number eps or None."""
     named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     if eps is not None and "eps" in named:
         raise click.UsageError("give --eps as a number, or eps among --symbolic, not both")
     return tuple(name for name in named if name != "eps"), eps
@@ -52,24 +45,20 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 def scope(found: Any) -> str:
     """For which eps and which symbols the formulas hold, to follow the name of the map."""
-    from kahanmaps.checks.settings import eps_record, eps_words
-
     if getattr(found, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
-    step = eps_words(eps_record(found.eps, found.file.map))
+    step = lib.eps_words(lib.eps_record(found.eps, found.file.map))
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 
 def heading(name: str, found: Any) -> dict[str, Any]:
     """What is needed to redo a search, as plain data."""
-    from kahanmaps.checks.settings import eps_record
-
     return {
         **envelope(name),
         "system": found.file.name,
         "parameters": {key: str(value) for key, value in found.file.parameters.items()},
         "symbols": list(found.symbols),
-        **eps_record(found.eps, found.file.map),
+        **lib.eps_record(found.eps, found.file.map),
         "arithmetic": "exact formulas, from residues modulo primes",
         "seed": found.seed,
     }

@@ -6,18 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.errors import KahanmapsError
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
 
 _MOST = 10_000
 
@@ -34,7 +32,7 @@ class Cell:
     undecided: str = ""
 
 
-def table(system: str | None, options: dict[str, Any], found: Callable[[SystemFile, Progress], Cell]) -> int:
+def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, Progress], Cell]) -> int:
     """A line for each combination of values, without a range all that was found; in JSON a record each.
 
     A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
@@ -79,21 +77,20 @@ def table(system: str | None, options: dict[str, Any], found: Callable[[SystemFi
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:
     """The parameters for each combination of values, the last range running fastest; None without a range."""
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.experiments.grid import RationalRange, is_range
-
-    if not any(is_range(value) for _, value in parameters):
+    if not any(lib.is_range(value) for _, value in parameters):
         return None
     if system == "-":
         raise click.UsageError("found a range of values and the system on standard input: write it to a file")
     axes: list[Sequence[Any]] = []
     for _, value in parameters:
         text, colon, step = value.partition(":")
-        axes.append(RationalRange.from_text(f"{text} step {step}" if colon else text) if is_range(value) else [value])
+        axes.append(
+            lib.RationalRange.from_text(f"{text} step {step}" if colon else text) if lib.is_range(value) else [value]
+        )
     if (size := prod(map(len, axes))) > _MOST:
         raise click.UsageError(f"found {size} combinations of values, expected at most {_MOST}")
     names = [name for name, _ in parameters]
     return [
-        tuple((name, x if isinstance(x, str) else format_number(x)) for name, x in zip(names, row, strict=True))
+        tuple((name, x if isinstance(x, str) else lib.format_number(x)) for name, x in zip(names, row, strict=True))
         for row in product(*axes)
     ]

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from kahanmaps.display import markup
 from kahanmaps.display.report_text import headline, witness_lines
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-    from kahanmaps.checks.claims import Evidence, Finding, Report
 
 _HOW = {
     "symbolic, normal form": "symbolic",
@@ -40,12 +39,10 @@ _LEGEND = {
 }
 
 
-def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose: bool, quiet: bool) -> int:
+def print_verification(report: lib.Report, as_json: bool, as_markdown: bool, verbose: bool, quiet: bool) -> int:
     """Print the report and return the exit status."""
-    from kahanmaps.paper.survivors import table
-
     if report.context.get("beyond") and not as_json:
-        echo(table(report))
+        echo(lib.table(report))
         return exit_status(report)
     if as_markdown:
         echo(markdown(report))
@@ -56,7 +53,7 @@ def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose
     return exit_status(report)
 
 
-def markdown(report: Report) -> str:
+def markdown(report: lib.Report) -> str:
     """The table in Markdown; docs/audit.md is made of it."""
     lines = [markup.markdown(headline(report))]
     section = None
@@ -77,9 +74,9 @@ def markdown(report: Report) -> str:
     return "\n".join([*lines, "", f"Verdict: {report.verdict} ({_count(report)})"])
 
 
-def _print_terminal(report: Report, verbose: bool) -> None:
+def _print_terminal(report: lib.Report, verbose: bool) -> None:
     tell(headline(report), style="bold")
-    by_section: dict[tuple[int, str], list[Finding]] = {}
+    by_section: dict[tuple[int, str], list[lib.Finding]] = {}
     others = []
     for finding in report.findings:
         if "section" in finding.place:
@@ -103,7 +100,7 @@ def _print_terminal(report: Report, verbose: bool) -> None:
     tell(f"verdict\t{report.verdict}\t({_count(report)})", 9)
 
 
-def _rows(finding: Finding, verbose: bool) -> list[str]:
+def _rows(finding: lib.Finding, verbose: bool) -> list[str]:
     """What is said of a finding, its formula first."""
     lines = [finding.formula or finding.claim]
     misprint = finding.place.get("misprint")
@@ -118,7 +115,7 @@ def _rows(finding: Finding, verbose: bool) -> list[str]:
     return lines
 
 
-def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) -> Table:
+def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool) -> Table:
     from rich import box
     from rich.table import Table
 
@@ -142,13 +139,13 @@ def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) ->
     return table
 
 
-def _how(evidence: Evidence) -> str:
+def _how(evidence: lib.Evidence) -> str:
     word = _HOW.get(evidence.method, evidence.method)
     bound: Any = evidence.data.get("error_bound")
     return f"{word}, {bound}" if bound else word
 
 
-def _below(report: Report) -> list[str]:
+def _below(report: lib.Report) -> list[str]:
     """Sentences on the evidence beside the one that decided."""
     lines = []
     bounds = [
@@ -169,7 +166,7 @@ def _below(report: Report) -> list[str]:
     return lines
 
 
-def _count(report: Report) -> str:
+def _count(report: lib.Report) -> str:
     counted = Counter(str(f.verdict) for f in report.findings if f.applies and not f.control)
     text = ", ".join(f"{number} {verdict}" for verdict, number in counted.items())
     misprints = sum(1 for f in report.findings if f.place.get("misprint"))

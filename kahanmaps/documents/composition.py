@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple, Self
 
 from flint import fmpq
@@ -60,16 +61,9 @@ class CompositionReader(PartReader, ABC):
         self.document = {**self.document, "composition": {"of": [part.plain for part in known]}}
         from kahanmaps.maps.composed import composed_map
 
-        try:
-            return composed_map(
-                *((part.map, part.power) for part in known),
-                variables=self.variables,
-                symbols=self.symbols,
-                values=[part.values for part in known],
-            )
-        except InputError as error:
-            self._mistake("composition.of", str(error))
-            return None
+        values = [part.values for part in known]
+        make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
+        return self._made("composition.of", make, *((part.map, part.power) for part in known))
 
     def _part(self, path: str, entry: Any) -> _Part | None:
         if not isinstance(entry, dict):
@@ -133,10 +127,9 @@ class CompositionReader(PartReader, ABC):
             text = self._text(f"{path}.parameters.{name}", value)
             if text is None:
                 continue
-            try:
-                function = parse_rational_function(text, self.symbols, self.parameters)
-            except InputError as error:
-                self._mistake(f"{path}.parameters.{name}", str(error))
+            place = f"{path}.parameters.{name}"
+            function = self._made(place, parse_rational_function, text, self.symbols, self.parameters)
+            if function is None:
                 continue
             values.pop(name, None)
             above, below = function.numerator, function.denominator

@@ -264,11 +264,7 @@ class DocumentReader(CompositionReader):
         known = [polynomial for polynomial in found if polynomial is not None]
         if rhs is None or len(known) != len(rhs) or self.variables is None or self.unsure:
             return None
-        try:
-            return make(known, degree)
-        except InputError as error:
-            self._mistake("system.rhs", str(error))
-            return None
+        return self._made("system.rhs", make, known, degree)
 
     def _read_bilinear(self, section: Mapping[str, Any]) -> BirationalMap | None:
         new = section.get("new", [name.upper() for name in self.variables or ()])
@@ -313,10 +309,8 @@ class DocumentReader(CompositionReader):
 
     def _sound(self, make: Callable[..., ImplicitMap], path: str, *given: Any) -> ImplicitMap | None:
         """The map made of what is given, if it has values, and an inverse where one is given."""
-        try:
-            map_ = make(*given)
-        except InputError as error:
-            self._mistake(path, str(error))
+        map_ = self._made(path, make, *given)
+        if map_ is None:
             return None
         if reason := why_no_map(map_, None if self.root is None else self.root[1]):
             self._mistake(path, reason)
@@ -332,23 +326,16 @@ class DocumentReader(CompositionReader):
         n = len(self.variables) if self.variables is not None else None
         J: fmpq_mat | None = None
         if given == "standard":
-            try:
-                J = standard_structure(n) if n is not None else None
-            except InputError as error:
-                self._mistake("hamiltonian.J", str(error))
+            J = None if n is None else self._made("hamiltonian.J", standard_structure, n)
         elif isinstance(given, str):
             self._mistake("hamiltonian.J", f'found {show(given)}, expected "standard" or a skew matrix')
         else:
             J = self._matrix("hamiltonian.J", given, n)
         if J is None or self.variables is None or self.unsure:
             return None
-        try:
-            zero = parse_polynomial("0", self.variables)
-            hamiltonian = CubicHamiltonian(H if H is not None else zero, J)
-        except InputError as error:
-            self._mistake("hamiltonian.J", str(error))
-            return None
-        return hamiltonian if H is not None else None
+        zero = parse_polynomial("0", self.variables)
+        hamiltonian = self._made("hamiltonian.J", CubicHamiltonian, zero if H is None else H, J)
+        return None if H is None else hamiltonian
 
     def _read_field(self, section: Mapping[str, Any]) -> BirationalMap | None:
         """The Kahan map of J grad H, where both may contain symbols."""

@@ -8,7 +8,6 @@ Numbers are exact: decimals are read as decimals, quoted or not.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,7 +24,7 @@ from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
 from kahanmaps.documents.reader import KINDS
-from kahanmaps.documents.toml_text import to_toml
+from kahanmaps.documents.toml_text import TomlKind, to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.algebraic import AlgebraicMap
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import ConjugateAssociate, FamilyMember
 
 MAX_FILE_BYTES = 16_000_000
+_TOML = TomlKind("system file", MAX_FILE_BYTES, SystemFileError)
 _LONGEST_LABEL = 120
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
@@ -234,7 +234,7 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
 
     Raises SystemFileError with every mistake of the file, InputError where it cannot be read.
     """
-    data = _read(path)
+    data = _TOML.read(path)
     with reading(path):
         return parse_system(data, str(path), parameters)
 
@@ -258,7 +258,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     kahanmaps.errors.SystemFileError: example: 1 mistake
       system.rhs[1]: found a polynomial of degree 3, expected at most 2
     """
-    reader = DocumentReader(_document(text, where), where, parameters or {}, partial(_named, Path(where).parent))
+    reader = DocumentReader(_TOML.document(text, where), where, parameters or {}, partial(_named, Path(where).parent))
     reader.inside = (os.path.abspath(where),)
     return SystemFile(*reader.read())
 
@@ -272,38 +272,10 @@ def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
         folder = resources.files("kahanmaps.documents").joinpath("catalog")
         for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
             if name.isidentifier() and found.is_file():
-                return _document(found.read_bytes(), name), name, None
+                return _TOML.document(found.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
-    return _document(_read(path), name), os.path.abspath(path), partial(_named, path.parent)
-
-
-def _read(path: str | Path) -> bytes:
-    try:
-        with open(path, "rb") as stream:
-            return stream.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"cannot read the system file {path}: {error.strerror or error}") from error
-    except ValueError as error:  # a path with a NUL character
-        raise InputError(f"cannot read the system file {str(path)!r}: {error}") from error
-
-
-def _document(text: str | bytes, where: str) -> dict[str, Any]:
-    """The plain data of a text in TOML."""
-    if len(text) > MAX_FILE_BYTES:
-        raise InputError(f"{where} is larger than {MAX_FILE_BYTES} bytes, the limit for a system file")
-    try:
-        # Some editors put a byte order mark first.
-        decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
-        # Python's own limit on digits applies to integers written without quotes, before we see them.
-        return tomllib.loads(decoded, parse_float=str)
-    except UnicodeDecodeError as error:
-        raise SystemFileError(where, [("TOML", f"not UTF-8 text: {error.reason} at byte {error.start}")]) from error
-    except tomllib.TOMLDecodeError as error:
-        raise SystemFileError(where, [("TOML", f"{error}")]) from error
-    except (RecursionError, ValueError) as error:
-        hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
-        raise SystemFileError(where, [("TOML", f"cannot be read: {hint}")]) from error
+    return _TOML.document(_TOML.read(path), name), os.path.abspath(path), partial(_named, path.parent)
 
 
 def _rows(matrix: fmpq_mat) -> list[list[str]]:

@@ -6,7 +6,7 @@ What is read goes by the names that hold there: the variables, the parameters wi
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
@@ -16,6 +16,8 @@ from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomi
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.errors import InputError, UnknownName, counted, quoted, show
 from kahanmaps.systems.quadratic import MAX_DIMENSION
+
+T = TypeVar("T")
 
 KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
 KEYS = {
@@ -76,6 +78,14 @@ class PartReader:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
+    def _made(self, path: str, make: Callable[..., T], *given: Any) -> T | None:
+        """What is made of what is given; None, and a mistake, where it cannot be."""
+        try:
+            return make(*given)
+        except InputError as error:
+            self._mistake(path, str(error))
+            return None
+
     def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
         known = KEYS[section]
         for key in table:
@@ -93,11 +103,7 @@ class PartReader:
 
     def _text(self, path: str, value: Any) -> str | None:
         if isinstance(value, int | str) and not isinstance(value, bool):
-            try:
-                return value if isinstance(value, str) else format_number(fmpq(value))
-            except InputError as error:
-                self._mistake(path, str(error))
-                return None
+            return value if isinstance(value, str) else self._made(path, format_number, fmpq(value))
         self._mistake(path, f"found {show(value)}, expected an expression in quotes")
         return None
 
@@ -144,13 +150,11 @@ class PartReader:
                 self._mistake(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
                 bad = True
             for j, entry in enumerate(row):
-                text = self._text(f"{path}[{i + 1}][{j + 1}]", entry)
-                try:
-                    entries.append(parse_constant(text, self.parameters) if text is not None else fmpq(0))
-                    bad = bad or text is None
-                except InputError as error:
-                    self._mistake(f"{path}[{i + 1}][{j + 1}]", str(error))
-                    bad = True
+                place = f"{path}[{i + 1}][{j + 1}]"
+                text = self._text(place, entry)
+                number = None if text is None else self._made(place, parse_constant, text, self.parameters)
+                entries.append(fmpq(0) if number is None else number)
+                bad = bad or number is None
         return None if bad else fmpq_mat(expected, expected, entries)
 
     def _required(self, section: str, table: Mapping[str, Any], key: str) -> Any:
@@ -178,11 +182,7 @@ class PartReader:
         text = self._text(path, value)
         if text is None or self.variables is None:
             return None
-        try:
-            return parse_rational_function(text, (*self.variables, *self.symbols, "eps"), self.parameters)
-        except InputError as error:
-            self._mistake(path, str(error))
-            return None
+        return self._made(path, parse_rational_function, text, (*self.variables, *self.symbols, "eps"), self.parameters)
 
 
 def json_like(value: Any) -> Any:

@@ -1,15 +1,59 @@
-"""Plain data as TOML text, as far as system files need it: text, integers, lists, tables, lists of tables in them.
+"""Plain data from TOML text and as TOML text: system files and batch specs.
 
-Python reads TOML and does not write it; a dependency for forty lines would be one too many.
+Python reads TOML and does not write it; a dependency for forty lines would be one too many. Written is what system
+files need: text, integers, lists, tables, lists of tables in them.
 """
 
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from flint import fmpz
+
+from kahanmaps.errors import InputError, SystemFileError
+
+
+class TomlKind(NamedTuple):
+    """A kind of file in TOML: what it is called, how many bytes one may have, the error that has its mistakes."""
+
+    name: str
+    most: int
+    error: type[SystemFileError]
+
+    def read(self, path: str | Path) -> bytes:
+        """The bytes of a file, one more at most than it may have. Raises InputError where it cannot be read."""
+        try:
+            with open(path, "rb") as stream:
+                return stream.read(self.most + 1)
+        except OSError as error:
+            raise InputError(f"cannot read the {self.name} {path}: {error.strerror or error}") from error
+        except ValueError as error:  # a path with a NUL character
+            raise InputError(f"cannot read the {self.name} {str(path)!r}: {error}") from error
+
+    def document(self, text: str | bytes, where: str) -> dict[str, Any]:
+        """The plain data of a text, decimals as text; `where` names it in messages. Raises `error`, InputError."""
+        if len(text) > self.most:
+            raise InputError(f"{where} is larger than {self.most} bytes, the limit for a {self.name}")
+        try:
+            # Some editors put a byte order mark first.
+            decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
+            # Python's own limit on digits applies to integers written without quotes, before we see them.
+            return tomllib.loads(decoded, parse_float=lambda number: number.replace("_", ""))
+        except (RecursionError, ValueError) as error:
+            raise self.error(where, [("TOML", _reason(error))]) from error
+
+
+def _reason(error: RecursionError | ValueError) -> str:
+    if isinstance(error, UnicodeDecodeError):
+        return f"not UTF-8 text: {error.reason} at byte {error.start}"
+    if isinstance(error, tomllib.TOMLDecodeError):
+        return str(error)
+    hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
+    return f"cannot be read: {hint}"
 
 
 def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:

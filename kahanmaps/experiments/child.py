@@ -38,6 +38,7 @@ def main(parent: int) -> None:
     """Do tasks until standard input ends. `parent` is the process that must be alive."""
     end_with_parent(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which decides
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # held back until here
     questions, answers = _private_stdin(), _private_stdout()
     me = os.getpid()
     documents: dict[str, str] = {}

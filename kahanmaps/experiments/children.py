@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -69,7 +70,7 @@ class LocalChildren:
         self._documents = documents
         self._group_seconds = group_seconds
         self._tries = tries
-        self._threads = ThreadPoolExecutor(jobs)
+        self._threads = ThreadPoolExecutor(jobs, initializer=_hold_ctrl_c)
         self._mine = threading.local()  # the child of a thread, if it has one that may go on
         self._children: list[_Child] = []
         self._running: set[Future[Record | None]] = set()
@@ -257,6 +258,14 @@ class _Child:
             assert stream is not None
             with suppress(OSError):
                 stream.close()
+
+
+def _hold_ctrl_c() -> None:
+    """Have children begin with Ctrl-C held back, until they ignore it: inside an import it ends them in odd ways.
+
+    Python's start has no place for KeyboardInterrupt: it becomes a fatal error with status 1, or RuntimeError.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def _record_of(child: _Child, found: dict[str, Any]) -> Record:

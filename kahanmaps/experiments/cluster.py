@@ -19,18 +19,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import count
-from typing import NamedTuple
 
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.experiments.children import TRIES, ending
 from kahanmaps.experiments.dask_client import DaskClient, Result, told
-from kahanmaps.experiments.records import Documents, Executor, Job, Limits, Outcome, Record, Task
+from kahanmaps.experiments.records import Documents, Executor, Job, Outcome, Record
 
 GROUP_MODULE = "kahanmaps.experiments.group"
 PASSED_ON = ("KAHANMAPS_TASKS", "PYTHONPATH")  # variables that mean the same to the workers as to us
 
 START_UP = 60.0  # seconds a group may take beyond the limits of its jobs, on a cold and busy worker,
 START_UP_OF_A_JOB = 5.0  # and for each job in it
+LARGEST_GROUP = 200  # jobs
 MEMORY_OF_MEANS = 20  # a mean follows a batch that goes from cheap tasks to dear ones
 UNFIT_AFTER = 3  # groups that ended by themselves without a record, when there has never been one
 TAIL = 2000  # characters of standard error kept
@@ -45,33 +45,27 @@ class WorkersUnfit(ClusterLost):
     """Raised when the set-up is wrong: the workers cannot run tasks at all, whichever these are."""
 
 
-class KeptJob(NamedTuple):
-    """A job in flight, and how many tries of it alone have failed: its text is shorter than the task."""
-
-    kind: str
-    text: str
-    limits: Limits
-    tries: int = 0
+Tried = tuple[Job, int]  # a job, and how many tries of it alone have failed
 
 
 @dataclass
 class JobGroup:
     """Jobs that one command does, by key; what has come back is taken out."""
 
-    jobs: dict[str, KeptJob] = field(default_factory=dict)
+    jobs: dict[str, Tried] = field(default_factory=dict)
     documents: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
 
     @property
     def timeout(self) -> float | None:
         """How long the command may take: what its jobs may, and a generous start; None if one of them is unlimited."""
-        times = [job.limits.time for job in self.jobs.values()]
+        times = [job.limits.time for job, _ in self.jobs.values()]
         return None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
 
     @property
     def text(self) -> bytes:
         """What the group command reads."""
-        jobs = [{"task": job.text, "limits": asdict(job.limits)} for job in self.jobs.values()]
+        jobs = [{"task": job.task.text, "limits": asdict(job.limits)} for job, _ in self.jobs.values()]
         return json.dumps({"documents": self.documents, "jobs": jobs}).encode()
 
 
@@ -97,7 +91,7 @@ class ClusterWorkers(Executor):
 
     `command` is what a worker runs for a group, by default `python -m kahanmaps.experiments.group` with this
     interpreter, which the workers have to find at the same path. A group takes about `group_seconds`, by what the last
-    tasks of the same kind took, and has at most `largest_group` jobs. `talk` is told, now and then, what is being
+    tasks of the same kind took, and has at most 200 jobs. `talk` is told, now and then, what is being
     waited for.
 
     At most two groups for each thread of the workers are under way, so that memory here does not depend on the number
@@ -112,7 +106,6 @@ class ClusterWorkers(Executor):
         command: Sequence[str] | None = None,
         python: str | None = None,
         group_seconds: float = 5.0,
-        largest_group: int = 200,
         talk: Callable[[str], None] | None = None,
         connect_seconds: float = 10.0,
     ) -> None:
@@ -120,23 +113,19 @@ class ClusterWorkers(Executor):
         self._command = _with_environment(command or [python or sys.executable, "-m", GROUP_MODULE])
         self._documents = documents
         self._group_seconds = group_seconds
-        self._largest_group = largest_group
         # A kind of task of which nothing is known takes a whole group's time.
         self._means: defaultdict[str, Mean] = defaultdict(lambda: Mean(group_seconds))
         self._talk = talk or (lambda text: None)
         self._keys: set[str] = set()  # of jobs in flight
         self._open = JobGroup()
-        self._again: deque[KeptJob] = deque()  # jobs to be tried alone
+        self._again: deque[Tried] = deque()  # jobs to be tried alone
         self._groups: dict[int, JobGroup] = {}  # at the scheduler
         self._numbers = count()
         self._unfit = 0  # groups that ended by themselves before any record
         self._is_proven = False  # a record has come from the workers
         self._silent_since: float | None = None
         self._next_word = SILENCE
-        self._dask = self._connect(connect_seconds)
-
-    def _connect(self, seconds: float) -> DaskClient:
-        return DaskClient(self.address, seconds)
+        self._dask = DaskClient(address, connect_seconds)
 
     @property
     def is_free(self) -> bool:
@@ -148,25 +137,15 @@ class ClusterWorkers(Executor):
         """How many jobs have been submitted and not yet handed back."""
         return len(self._keys)
 
-    @property
-    def threads(self) -> int:
-        """How many threads the workers have, when last looked at: so many groups run at once."""
-        return self._dask.threads
-
-    @property
-    def groups_in_flight(self) -> int:
-        """How many groups are at the scheduler."""
-        return len(self._groups)
-
     def submit(self, job: Job) -> None:
         """Take a job into the open group, which is sent when it is full, or by `wait` when a worker might idle."""
         if job.task.key in self._keys:
             raise InputError(f"task {job.task.key} is in flight already: submit it again when its record is back")
         if self._open.seconds + self._means[job.task.kind].seconds / 2 > self._group_seconds:
             self._send_open()
-        self._add(self._open, job.task, job.limits)
+        self._add(self._open, job)
         self._keys.add(job.task.key)
-        if len(self._open.jobs) >= self._largest_group or self._open.seconds >= self._group_seconds:
+        if len(self._open.jobs) >= LARGEST_GROUP or self._open.seconds >= self._group_seconds:
             self._send_open()
 
     def wait(self, timeout: float) -> list[Record]:
@@ -178,8 +157,8 @@ class ClusterWorkers(Executor):
         deadline = time.monotonic() + timeout
         while True:
             while self._again and len(self._groups) < self._window:
-                job, group = self._again.popleft(), JobGroup()
-                self._add(group, Task.from_text(job.text), job.limits, job.tries)
+                group = JobGroup()
+                self._add(group, *self._again.popleft())
                 self._send(group)
             # If every thread has a group waiting for it, there is time to fill the open one.
             if len(self._groups) < self._window:
@@ -212,11 +191,11 @@ class ClusterWorkers(Executor):
         """How many groups may be at the scheduler: one that runs and one that waits for each thread."""
         return max(2, 2 * self._dask.threads)
 
-    def _add(self, group: JobGroup, task: Task, limits: Limits, tries: int = 0) -> None:
+    def _add(self, group: JobGroup, job: Job, tries: int = 0) -> None:
         """Put a job into the group, with the documents that it needs."""
-        group.documents |= {name: self._documents(name) for name in task.documents if name not in group.documents}
-        group.jobs[task.key] = KeptJob(task.kind, task.text, limits, tries)
-        group.seconds += self._means[task.kind].seconds
+        group.documents |= {name: self._documents(name) for name in job.task.documents if name not in group.documents}
+        group.jobs[job.task.key] = job, tries
+        group.seconds += self._means[job.task.kind].seconds
 
     def _send_open(self) -> None:
         if self._open.jobs:
@@ -237,28 +216,27 @@ class ClusterWorkers(Executor):
         records: list[Record] = []
         # The group command keeps the limits of a task and tells its death in a record: what becomes of the command
         # itself is the machine's doing, and no result.
-        failures: list[tuple[KeptJob, Record]] = []
+        failures: list[tuple[Job, int, Record]] = []
         for line in result.output("stdout").split(b"\n"):
             record = record_on(line)
-            job = None if record is None else group.jobs.pop(record.key, None)
-            if record is None or job is None:  # a record that is printed twice is handed back once
+            if record is None or record.key not in group.jobs:  # a record that is printed twice is handed back once
                 continue
+            job, tries = group.jobs.pop(record.key)
             self._is_proven = True
             if record.outcome is Outcome.LOST:
-                failures.append((job._replace(tries=job.tries + 1), record))
+                failures.append((job, tries + 1, record))
             else:
-                self._means[job.kind].learn(record.seconds)
+                self._means[job.task.kind].learn(record.seconds)
                 records.append(record)
         if group.jobs:
             message, is_unfit = _failure_of(result, timeout)
             stderr = result.output("stderr").decode(errors="replace")[-TAIL:]
             self._require_fit(is_unfit, message, stderr)
-            for key, job in group.jobs.items():
-                record = Record(key, Outcome.LOST, message=message, stderr=stderr)
-                failures.append((job._replace(tries=job.tries + is_alone), record))
+            for key, (job, tries) in group.jobs.items():
+                failures.append((job, tries + is_alone, Record(key, Outcome.LOST, message=message, stderr=stderr)))
         finished = datetime.now(UTC).isoformat(timespec="seconds")
-        self._again.extend(job for job, _ in failures if job.tries < TRIES)
-        records += [replace(record, finished=finished) for job, record in failures if job.tries >= TRIES]
+        self._again.extend((job, tries) for job, tries, _ in failures if tries < TRIES)
+        records += [replace(record, finished=finished) for _, tries, record in failures if tries >= TRIES]
         self._keys.difference_update(record.key for record in records)
         return records
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -95,6 +96,20 @@ def _axis_data(values: Sequence[Any]) -> Any:
     return pieces
 
 
+def _require_rows(names: Sequence[str], axes: Mapping[str, Values]) -> None:
+    """Raises InputError for axes of a zip that are not equally long, or have the same values together twice."""
+    lengths = {name: len(axes[name]) for name in names}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise InputError(f"{told} values, expected as many in each: a zip takes them together")
+    if any(has_repeats(axes[name]) for name in names):
+        rows: dict[tuple[str, ...], int] = {}
+        for k in range(1, 1 + lengths[names[0]]):
+            row = tuple(repr(axes[name][k - 1]) for name in names)
+            if rows.setdefault(row, k) != k:
+                raise InputError(f"found the same values in places {rows[row]} and {k}: expected them once")
+
+
 class ExperimentReader:
     """Reads the table of this name, once.
 
@@ -114,10 +129,8 @@ class ExperimentReader:
         """The experiment, or None after telling what is wrong with it."""
         told_before = len(self.spec.mistakes)
         if (name := self.sound("task")) is not None:
-            try:
+            with self._at("task"):
                 self.kind = task_kind(name)
-            except InputError as error:
-                self.mistake("task", str(error))
         recipes = self._read_systems()
         kind = self.kind
         if kind is None:
@@ -136,6 +149,14 @@ class ExperimentReader:
         elif recipes:
             grid_axes = {"system": recipes, **axes}
         return Experiment(self.name, kind, recipes, constant, Grid(grid_axes, zips), limits)
+
+    @contextmanager
+    def _at(self, key: str) -> Iterator[None]:
+        """What is wrong inside is told with this key."""
+        try:
+            yield
+        except InputError as error:
+            self.mistake(key, str(error))
 
     def mistake(self, key: str, sentence: str) -> None:
         """Tell that something is wrong; `key` begins in this table."""
@@ -172,53 +193,47 @@ class ExperimentReader:
     def _read_values(self, kind: TaskKind, part: str) -> dict[str, Values]:
         """The values in one of the tables, by canonical name; what is wrong is told and left out."""
         found: dict[str, Values] = {}
-        known = self._known_options(kind)
         for name, place, raw in self.entries(part):
-            if name == "parameters" and self.has_parameters:
-                self.mistake(place, f"found {show(raw)}, expected a table of parameters")
-                continue
-            option = self._parameter(name, place) if name.startswith(PARAMETERS) else known.get(name)
-            if option is None:
-                if not (name.startswith(PARAMETERS) and self.has_parameters):  # otherwise it is told already
-                    key = place.removeprefix(f"{part}.")
-                    names = [*known, *([TIME_STEP] if "eps" in known else [])]
-                    expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
-                    self.mistake(
-                        place,
-                        f"{kind.name} has no such option, expected one of {expected}{suggestion(key, names)}",
-                    )
-                continue
-            if part == "options" and isinstance(raw, list):
-                self.mistake(place, "found a list, expected one value; lists and ranges go to axes")
-                continue
-            values = self._read_one(place, option, raw)
-            if values is None:
-                continue
-            if part == "options" and len(values) > 1:
-                self.mistake(place, f"found {len(values)} values, expected one; lists and ranges go to axes")
-                continue
-            found[name] = values
+            with self._at(place):
+                values = self._read_entry(kind, part, name, place, raw)
+                if values is not None:
+                    found[name] = values
         return found
 
-    def _parameter(self, name: str, place: str) -> Option | None:
-        """A parameter of the systems; None after telling which of them has none of this name."""
-        if not self.has_parameters:
-            return None
+    def _read_entry(self, kind: TaskKind, part: str, name: str, place: str, raw: Any) -> Values | None:
+        """The values of one option; None where what is wrong is told already. Raises InputError otherwise."""
+        if name == "parameters" and self.has_parameters:
+            raise InputError(f"found {show(raw)}, expected a table of parameters")
+        known = self._known_options(kind)
+        is_parameter = name.startswith(PARAMETERS) and self.has_parameters
+        option = self._parameter(name) if is_parameter else known.get(name)
+        if option is None:
+            names = [*known, *([TIME_STEP] if "eps" in known else [])]
+            expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
+            hint = suggestion(place.removeprefix(f"{part}."), names)
+            raise InputError(f"{kind.name} has no such option, expected one of {expected}{hint}")
+        if part == "options" and isinstance(raw, list):
+            raise InputError("found a list, expected one value; lists and ranges go to axes")
+        values = self._read_one(place, option, raw)
+        if values is not None and part == "options" and len(values) > 1:
+            raise InputError(f"found {len(values)} values, expected one; lists and ranges go to axes")
+        return values
+
+    def _parameter(self, name: str) -> Option:
+        """A parameter of the systems. Raises InputError where one of them has none of this name."""
         key = name.removeprefix(PARAMETERS)
         for file in self.files:
             if key not in file.parameters:
                 known = ", ".join(file.parameters) or "none"
                 hint = suggestion(key, list(file.parameters))
-                self.mistake(place, f"{file.name} has no such parameter, its parameters are: {known}{hint}")
-                return None
+                raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
         return exact(name, "a parameter of the system")
 
     def _read_one(self, place: str, option: Option, raw: Any) -> Values | None:
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
-                self.mistake(place, f"found {show(raw)}, expected a file, a name of the catalogue, or a list of these")
-                return None
+                raise InputError(f"found {show(raw)}, expected a file, a name of the catalogue, or a list of these")
             recipes = self._read_files(place, references)
             return Values(option, [recipes]) if recipes else None
         if place.endswith(f".{TIME_STEP}"):
@@ -258,27 +273,17 @@ class ExperimentReader:
             for name in unknown:
                 if name not in given:  # otherwise something else is wrong with it, and told
                     self.mistake(place, f"{name} is not an axis{suggestion(name, list(axes))}")
+            twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             if len(names) < 2:
                 self.mistake(place, f"found {show(names)}, expected at least two axes that run together")
                 continue
-            twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             before |= set(names)
             for name in twice:
                 self.mistake(place, f"found {name} twice, expected every axis in one zip at most")
-            if unknown or twice:
-                continue
-            lengths = {name: len(axes[name]) for name in names}
-            if len(set(lengths.values())) > 1:
-                told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-                self.mistake(place, f"{told} values, expected as many in each: a zip takes them together")
-                continue
-            rows: dict[tuple[str, ...], int] = {}
-            for k in range(1, 1 + min(lengths.values()) * any(has_repeats(axes[name]) for name in names)):
-                row = tuple(repr(axes[name][k - 1]) for name in names)
-                if rows.setdefault(row, k) != k:
-                    self.mistake(place, f"found the same values in places {rows[row]} and {k}: expected them once")
-                    break
-            zips.append(tuple(names))
+            if not unknown and not twice:
+                with self._at(place):
+                    _require_rows(names, axes)
+                zips.append(tuple(names))
         return zips
 
     def _read_limits(self, kind: TaskKind, fixed: dict[str, Values]) -> Limits:
@@ -356,7 +361,7 @@ class ExperimentReader:
         recipes: dict[str, dict[str, Any]] = {}
         for number, reference in enumerate(references, start=1):
             place = f"{key}[{number}]" if len(references) > 1 else key
-            try:
+            with self._at(place):
                 for file in self._find(reference):
                     recipe = recipe_of(file, self.spec.documents)
                     if recipe["document"] in recipes:
@@ -365,8 +370,6 @@ class ExperimentReader:
                     if key == "system":
                         self.files.append(file)
                         self._require_kind(place, file)
-            except InputError as error:
-                self.mistake(place, str(error))
         return list(recipes.values())
 
     def _find(self, reference: str) -> list[SystemFile]:

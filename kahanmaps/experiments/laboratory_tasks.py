@@ -19,7 +19,7 @@ from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import Result, fields, task, whole_report
+from kahanmaps.experiments.registry import Result, Whole, fields, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are known for all iterates
 
 
-@task("degrees")
+@task("degrees", reports=True)
 def degrees(
     system: SystemFile,
     eps: Any = None,
@@ -41,8 +41,7 @@ def degrees(
     max_degree: int = 20_000,
     seconds: int = 10,
     seed: int = 0,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """The degrees of the iterates: the kind of growth, the dynamical degree, a recurrence."""
     from kahanmaps.laboratory.growth.degrees import degree_growth
 
@@ -54,11 +53,10 @@ def degrees(
         "degrees": list(found.degrees),
         "reached": len(found.degrees) - 1,
         "ending": found.message,
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("scan")
+@task("scan", reports=True)
 def scan_parameters(
     system: SystemFile,
     over: list[str],
@@ -68,8 +66,7 @@ def scan_parameters(
     primes: list[int] | None = None,
     seconds: int = 120,
     seed: int = 0,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """The conditions on parameters under which degrees are smaller, with the growth there; the others have values."""
     from kahanmaps.laboratory.scan.result import growth_on
     from kahanmaps.laboratory.scan.scan import scan
@@ -84,11 +81,10 @@ def scan_parameters(
         "integrable": [one.text for kind, some in kinds if kind != "exponential" for one in some if one.is_confirmed],
         "generic": list(found.generic),
         "left": max(found.left, default=0),
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("find-integrals")
+@task("find-integrals", reports=True)
 def integrals(
     system: SystemFile,
     eps: Any = None,
@@ -96,8 +92,7 @@ def integrals(
     max_degree: int | None = None,
     seconds: int = 60,
     seed: int = 0,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Integrals in closed form with their verdict, and how many there are at least, by theorems and by orbits."""
     from kahanmaps.laboratory.preserve.integrals import find_integrals
 
@@ -111,11 +106,10 @@ def integrals(
         "nullities": list(found.profile.nullities),
         "period": found.profile.period,
         "reason": found.reason,
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("find-density")
+@task("find-density", reports=True)
 def density(
     system: SystemFile,
     eps: Any = None,
@@ -123,8 +117,7 @@ def density(
     max_degree: int | None = None,
     seconds: int = 30,
     seed: int = 0,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """The densities phi of least degree, or a product of powers, for which the measure dx/phi is invariant."""
     from kahanmaps.laboratory.preserve.densities import find_densities
 
@@ -137,11 +130,10 @@ def density(
         "formulas": [one.text for one in found.densities],
         "period": found.period,
         "reason": found.reason,
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("find-poisson")
+@task("find-poisson", reports=True)
 def poisson(
     system: SystemFile,
     eps: Any = None,
@@ -149,8 +141,7 @@ def poisson(
     max_degree: int = 2,
     seconds: int = 30,
     seed: int = 0,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """The Poisson tensors with polynomial entries: how many, their ranks, Casimirs among the integrals."""
     from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 
@@ -165,12 +156,11 @@ def poisson(
         "jacobi": [str(one.jacobi) for one in found.tensors],
         "casimirs": [list(one.casimirs) for one in found.tensors],
         "reason": found.reason,
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("find-symmetry")
-def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Result:
+@task("find-symmetry", reports=True)
+def symmetry(system: SystemFile, seconds: int = 30) -> Whole:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
     from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
@@ -185,19 +175,17 @@ def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Res
         "scaling": found.scaling is not None,
         "generators": [one.text for one in found.generators],
         "open": found.undecided,
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("find-commuting")
+@task("find-commuting", reports=True)
 def commuting(
     system: SystemFile,
     shape: str = "linear",
     seconds: int = 60,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """The quadratic systems whose Kahan map commutes with this one at the same eps, for every eps."""
     from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 
@@ -213,19 +201,17 @@ def commuting(
         "systems": [one.rhs for one in found.nontrivial],
         "irrational": found.irrational,
         "open": found.undecided,
-        **whole_report(found, report),
-    }
+    }, found
 
 
-@task("analyze")
+@task("analyze", reports=True)
 def analysis(
     system: SystemFile,
     eps: Any = None,
     symbolic: list[str] | None = None,
     seconds: int | None = None,
     seed: int = 0,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.structure import Structure
     from kahanmaps.laboratory.analysis import analyze
@@ -247,8 +233,7 @@ def analysis(
         "sentence": final.sentence,
         "unfinished": unfinished,
         "skipped": found.skipped,
-        **whole_report(found, report),
-    }
+    }, found
 
 
 @task("singularities")

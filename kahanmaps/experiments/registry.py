@@ -25,7 +25,10 @@ from kahanmaps.experiments.options import OTHER, VOCABULARY, Option
 
 ENVIRONMENT = "KAHANMAPS_TASKS"
 LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks"))
+REPORT = "report"
 Result = dict[str, Any]
+Whole = tuple[Result, Any]  # a result and what it is of, of which `to_json` says all
+Function = Callable[..., Result | Whole]
 
 # What a task needs its system to be.
 SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
@@ -37,10 +40,11 @@ class TaskKind:
 
     name: str
     summary: str
-    function: Callable[..., Result]
+    function: Function
     options: Mapping[str, Option]
     defaults: Mapping[str, Any]
     needs: str | None
+    reports: bool = False
 
     @property
     def required(self) -> tuple[str, ...]:
@@ -49,13 +53,19 @@ class TaskKind:
 
     def perform(self, system: Any, options: Mapping[str, Any]) -> Result:
         """Do it: `options` are canonical, `other` a system already made."""
+        options = dict(options)
+        is_whole = self.reports and options.pop(REPORT, False)
         made = {
             name: value if value is None or name == OTHER else self.options[name].make(value)
             for name, value in options.items()
         }
         if "eps" in self.required and made.get("eps") is None:  # left out for maps that do not depend on it
             made["eps"] = self.options["eps"].make("1")
-        return self.function(**made) if self.needs is None else self.function(system, **made)
+        result = self.function(**made) if self.needs is None else self.function(system, **made)
+        if isinstance(result, tuple):
+            result, found = result
+            result |= {REPORT: found.to_json()} if is_whole else {}
+        return result
 
 
 def fields(found: Any, *names: str) -> Result:
@@ -63,18 +73,16 @@ def fields(found: Any, *names: str) -> Result:
     return {name: getattr(found, name) for name in names}
 
 
-def whole_report(found: Any, is_wanted: bool) -> Result:
-    """The entry "report" of a result, if it is wanted: all that was found."""
-    return {"report": found.to_json()} if is_wanted else {}
-
-
 _KINDS: dict[str, TaskKind] = {}
 
 
-def task(name: str, needs: str = SYSTEM) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
-    """Register a function as a kind of task. Raises TypeError for a parameter that is no known option."""
+def task(name: str, needs: str = SYSTEM, *, reports: bool = False) -> Callable[[Function], Function]:
+    """Register a function as a kind of task. Raises TypeError for a parameter that is no known option.
 
-    def register(function: Callable[..., Result]) -> Callable[..., Result]:
+    One that `reports` returns what it found beside the result: it is kept as "report" where that option asks for it.
+    """
+
+    def register(function: Function) -> Function:
         parameters = dict(inspect.signature(function).parameters)
         takes_system = parameters.pop("system", None) is not None
         unknown = [key for key in parameters if key not in VOCABULARY]
@@ -87,7 +95,9 @@ def task(name: str, needs: str = SYSTEM) -> Callable[[Callable[..., Result]], Ca
             key: parameter.default for key, parameter in parameters.items() if parameter.default is not parameter.empty
         }
         options = {key: VOCABULARY[key] for key in parameters}
-        _KINDS[name] = TaskKind(name, summary, function, options, defaults, needs if takes_system else None)
+        if reports:
+            options[REPORT], defaults[REPORT] = VOCABULARY[REPORT], False
+        _KINDS[name] = TaskKind(name, summary, function, options, defaults, needs if takes_system else None, reports)
         return function
 
     return register

@@ -27,13 +27,13 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kahanmaps.errors import InputError, SystemFileError, reading
+from kahanmaps.documents.toml_text import TomlKind
+from kahanmaps.errors import SystemFileError, reading
 from kahanmaps.experiments.experiment import PARAMETERS, TIME_STEP, Experiment, ExperimentReader
 from kahanmaps.experiments.options import FAMILY, VOCABULARY
 from kahanmaps.experiments.registry import task_kinds
@@ -49,6 +49,9 @@ _VALUES = {"anyOf": [_VALUE, {"type": "array", "items": _VALUE, "minItems": 1}]}
 
 class SpecError(SystemFileError):
     """A spec with mistakes: all of them at once, each with its key."""
+
+
+_TOML = TomlKind("spec", MAX_BYTES, SpecError)
 
 
 @dataclass(frozen=True)
@@ -70,12 +73,7 @@ def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS) -> Spec:
 
     Raises SpecError with every mistake, InputError where the file cannot be read.
     """
-    try:
-        with open(path, "rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"cannot read the spec {path}: {reason or error}") from error
+    data = _TOML.read(path)
     with reading(path):
         return parse_spec(data, str(path), folder=Path(path).parent, max_tasks=max_tasks)
 
@@ -95,19 +93,7 @@ def parse_spec(
     kahanmaps.experiments.spec.SpecError: spec: 1 mistake
       experiments.a.task: there is no task 'orbot', expected one of ...; did you mean orbit?
     """
-    if len(text) > MAX_BYTES:
-        raise InputError(f"{where} is larger than {MAX_BYTES} bytes, the limit for a spec")
-    try:
-        decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
-        document = tomllib.loads(decoded, parse_float=lambda number: number.replace("_", ""))
-    except UnicodeDecodeError as error:
-        raise SpecError(where, [("TOML", f"not UTF-8 text: {error.reason} at byte {error.start}")]) from error
-    except tomllib.TOMLDecodeError as error:
-        raise SpecError(where, [("TOML", f"{error}")]) from error
-    except (RecursionError, ValueError) as error:
-        hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
-        raise SpecError(where, [("TOML", f"cannot be read: {hint}")]) from error
-    return _read(SpecDocument(document, folder or Path()), where, max_tasks)
+    return _read(SpecDocument(_TOML.document(text, where), folder or Path()), where, max_tasks)
 
 
 def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:

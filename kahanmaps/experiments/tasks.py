@@ -23,7 +23,7 @@ from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, fields, task, whole_report
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, Whole, fields, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import height_growth
@@ -38,7 +38,7 @@ _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
 
 
-@task("check-commute", needs=MEMBER_OR_OTHER)
+@task("check-commute", needs=MEMBER_OR_OTHER, reports=True)
 def commute(
     system: SystemFile,
     other: SystemFile | None = None,
@@ -49,11 +49,10 @@ def commute(
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
     max_digits: int | None = None,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Do two Kahan maps commute, or all rational associated maps of a member of the family?"""
     settings = _settings(eps, start, steps, seed, error_bits, max_digits)
-    return _of_report(check_commute(system, other, settings, eps2), report)
+    return _of_report(check_commute(system, other, settings, eps2))
 
 
 def _of_one_system(name: str, check: Callable[[SystemFile, Settings], Report], question: str) -> None:
@@ -67,12 +66,11 @@ def _of_one_system(name: str, check: Callable[[SystemFile, Settings], Report], q
         seed: int = 0,
         error_bits: int = DEFAULT_ERROR_BITS,
         max_digits: int | None = None,
-        report: bool = False,
-    ) -> Result:
-        return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+    ) -> Whole:
+        return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)))
 
     perform.__doc__ = question
-    task(name)(perform)
+    task(name, reports=True)(perform)
 
 
 _of_one_system("check-integrals", check_integrals, "Are the known or claimed integrals conserved?")
@@ -80,7 +78,7 @@ _of_one_system("check-measure", check_measure, "Is the measure dx/phi invariant?
 _of_one_system("check-poisson", check_poisson, "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?")
 
 
-@task("verify", needs=MEMBER)
+@task("verify", needs=MEMBER, reports=True)
 def verify_member(
     system: SystemFile,
     eps: Any = None,
@@ -90,17 +88,16 @@ def verify_member(
     controls: bool = False,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Every statement of the paper, for one member of the family."""
     from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify
 
     settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
-    return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)), report)
+    return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)))
 
 
-@task("verify-universal")
+@task("verify-universal", reports=True)
 def verify_in_general(
     m: int,
     sections: tuple[int, ...] | None = None,
@@ -108,14 +105,13 @@ def verify_in_general(
     controls: bool = False,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    report: bool = False,
-) -> Result:
+) -> Whole:
     """Every statement of the paper, for the member in general."""
     from kahanmaps.paper.verifier import VerifyOptions
     from kahanmaps.paper.verify import verify_universal
 
     settings = Settings(seed=seed, error_bits=error_bits)
-    return _of_report(verify_universal(m, settings, VerifyOptions(sections, order, None, controls)), report)
+    return _of_report(verify_universal(m, settings, VerifyOptions(sections, order, None, controls)))
 
 
 @task("family-space", needs=MEMBER)
@@ -278,7 +274,7 @@ def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_
     )
 
 
-def _of_report(report: Report, whole: bool) -> Result:
+def _of_report(report: Report) -> Whole:
     """The verdict, how many claims have which, and every claim that does not hold, with its witness."""
     counted = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in counted)
@@ -293,8 +289,7 @@ def _of_report(report: Report, whole: bool) -> Result:
         "ended_early": report.ended_early,
         **({"m": report.context["m"]} if "m" in report.context else {}),
         **({"doubtful": doubtful} if doubtful else {}),
-        **whole_report(report, whole),
-    }
+    }, report
 
 
 def _float_structure(system: SystemFile, method: str | None) -> Structure | NoStructure:

@@ -14,7 +14,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -342,6 +342,22 @@ def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, start, 
     assert int(row[1]) == 100
     assert 0 < int(row[2]) < 100
     assert batch("run", PAUSE, "-q").status == 0
+
+
+def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_written(batch, monkeypatch):
+    told: list[str] = []
+
+    @contextmanager
+    def pressed(interrupt: Callable[[], None]) -> Iterator[None]:
+        with monkeypatch.context() as patched:
+            patched.setattr("kahanmaps_cli.progress.click.echo", lambda *_, **__: told.append("in the handler"))
+            patched.setattr("kahanmaps.experiments.children.LocalChildren.in_flight", 2)
+            interrupt()
+        yield
+
+    monkeypatch.setattr("kahanmaps_cli.batch_run.interruptible", pressed)
+    done = batch("run", PAUSE, "-j", "2")
+    assert (done.status, told) == (130, [])
 
 
 def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batch):

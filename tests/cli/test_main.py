@@ -119,6 +119,14 @@ def test_an_error_becomes_a_message_and_an_exit_status(kahanmaps, monkeypatch, e
     assert "Traceback" not in outcome.err
 
 
+def test_ctrl_c_inside_an_import_which_python_tells_as_another_error_is_told_as_an_interrupt(kahanmaps, monkeypatch):
+    error = RuntimeError("Error calling __set_name__ on 'cached_property'")  # so up to Python 3.11
+    error.__cause__ = KeyboardInterrupt()
+    failing_with(monkeypatch, error)
+    outcome = kahanmaps("version")
+    assert (outcome.status, outcome.err) == (130, "interrupted\n")
+
+
 def test_an_internal_error_says_that_it_is_a_bug_and_how_to_see_more(kahanmaps, monkeypatch):
     failing_with(monkeypatch, RuntimeError("all wrong"))
     outcome = kahanmaps("version")

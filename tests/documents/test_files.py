@@ -634,7 +634,7 @@ def test_a_path_with_a_nul_character_is_wrong_input():
 def test_a_file_beyond_the_size_limit_is_wrong_input(spare, fits, tmp_path, monkeypatch):
     path = tmp_path / "large.toml"
     path.write_text(SYSTEM, encoding="utf-8")
-    monkeypatch.setattr(files, "MAX_FILE_BYTES", len(SYSTEM) + spare)
+    monkeypatch.setattr(files, "_TOML", files._TOML._replace(most=len(SYSTEM) + spare))
     for read in (lambda: read_system(path), lambda: parse_system(SYSTEM), lambda: parse_system(SYSTEM.encode())):
         if fits:
             assert read().name == "rotor"

@@ -194,7 +194,7 @@ def test_every_job_comes_back_exactly_once(workers):
     records = done(workers, jobs)
     assert_exactly_once(records, jobs)
     assert {record.outcome for record in records} == {Outcome.OK}
-    assert (workers.in_flight, workers.groups_in_flight) == (0, 0)
+    assert (workers.in_flight, len(workers._groups)) == (0, 0)
 
 
 def test_a_record_that_is_printed_twice_is_handed_back_once(workers):
@@ -235,12 +235,12 @@ def test_groups_grow_to_the_seconds_that_were_asked_for(workers, claim, largest)
 
 
 def test_what_is_in_flight_is_bounded_by_the_threads(workers):
-    until(lambda: workers.wait(0.1) == [] and workers.threads == 2)
+    until(lambda: workers.wait(0.1) == [] and workers._dask.threads == 2)
     largest = 0
 
     def watch(records):
         nonlocal largest
-        largest = max(largest, workers.groups_in_flight)
+        largest = max(largest, len(workers._groups))
 
     done(workers, jobs_of(300, claim=1.0), meanwhile=watch)
     assert largest <= 4
@@ -345,7 +345,7 @@ def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
         assert said == [f"waiting for workers: the scheduler at {own.file} has none"]
         own.worker(threads=3, nanny=False)
         assert len(done(workers, [])) == 1
-        until(lambda: workers.wait(0.1) == [] and workers.threads == 3)
+        until(lambda: workers.wait(0.1) == [] and workers._dask.threads == 3)
     finally:
         workers.close()
 

@@ -110,6 +110,26 @@ def test_ctrl_c_does_not_reach_a_child(tmp_path: Path):
     assert tries(tmp_path, signal.SIGINT, ALWAYS) == 1
 
 
+@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.03, 0.06, 0.1, 0.15])
+def test_ctrl_c_does_not_reach_a_child_that_begins(tmp_path: Path, seconds: float):
+    """There Python has no place for it: it ended in a fatal error with status 1, or in RuntimeError."""
+    children = LocalChildren(1, {}.__getitem__)
+    try:
+        children.submit(signalled(signal.SIGTERM, 0))
+        deadline = time.monotonic() + 20
+        while not children._children:
+            assert time.monotonic() < deadline
+        process = children._children[0].process
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        (record,) = children.wait(20.0)
+        assert record.is_ok
+        assert process.poll() is None
+        assert [child.process for child in children._children] == [process]
+    finally:
+        children.close()
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGSEGV])
 def test_a_child_that_dies_while_it_has_nothing_to_do_costs_no_task(number: Signals):
     children = LocalChildren(1, {}.__getitem__)

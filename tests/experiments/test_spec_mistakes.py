@@ -184,7 +184,7 @@ def test_what_is_no_toml_is_told_in_a_sentence(text, sentence):
 
 
 def test_a_spec_is_not_larger_than_its_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(spec_module, "MAX_BYTES", 1000)
+    monkeypatch.setattr(spec_module, "_TOML", spec_module._TOML._replace(most=1000))
     path = tmp_path / "study.toml"
     path.write_text((LORENZ + "axes = {eps = 1}\n").ljust(1000))
     assert read_spec(path).size == 1

@@ -102,6 +102,15 @@ def test_an_entry_is_as_long_as_the_heights_ask_for(name):
     assert max(map(planar_algebra._bits, P)) * block.algebra.degree < 1.2 * height + 100
 
 
+@pytest.mark.parametrize("chi", ["t^2 - 10^400*t + 3", "t^2 - 10^700", "t^7 - t - 1"])
+def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_generic_steps(chi):
+    structure, system = member_of(chi)
+    start = random_point(system.dim, 1, height=3)
+    generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, max_digits=None)]
+    planes = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, structure=structure, max_digits=None)]
+    assert [point.rationals() for point in planes] == [point.rationals() for point in generic]
+
+
 @pytest.mark.parametrize("chi", CHI)
 @given(seed=st.integers(0, 10**6), eps=st.sampled_from(["1/10", "-7/3", "20957/262577", "1000000000"]))
 def test_a_member_moves_as_by_generic_steps(chi, seed, eps):

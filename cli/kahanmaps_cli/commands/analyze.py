@@ -4,39 +4,28 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps_cli.options import (
-    eps_options,
-    load_system,
-    output_options,
-    seconds_option,
-    seed_option,
-    symbolic_option,
-    system_options,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import symbols_and_eps
 from kahanmaps_cli.terminal import echo, formula, on_terminal, tell
 
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.analysis import Analysis
-    from kahanmaps.laboratory.report import Statement
-
 INTERRUPTED = 130
 
 
 @click.command("analyze")
-@system_options
-@eps_options
-@symbolic_option
-@seconds_option(None, "Time for everything (default: 16 to 150 by dimension).")
-@seed_option
+@opt.system_options
+@opt.eps_options
+@opt.symbolic_option
+@opt.seconds_option(None, "Time for everything (default: 16 to 150 by dimension).")
+@opt.seed_option
 @click.option("--markdown", is_flag=True, help="The report in Markdown.")
-@output_options
+@opt.output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
     """What the map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
 
@@ -61,23 +50,20 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
     Exit status: 0 there is a verdict, 2 usage error, 3 undecided.
     """
-    from kahanmaps.laboratory.analysis import analyze
-
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     report = _Report(as_json or markdown)
     is_interrupted = False
     with Progress(quiet) as progress:
         report.progress = progress
         try:
-            analyze(
+            lib.analyze(
                 file,
                 symbols=symbols,
                 eps=eps,
-                seconds=options["seconds"],
-                seed=options["seed"],
+                **opt.given(options, "seconds", "seed"),
                 progress=progress,
                 reached=report,
             )
@@ -104,18 +90,16 @@ class _Report:
     """The report as text, each section as soon as it is final; `is_silent` keeps it back for another form."""
 
     def __init__(self, is_silent: bool) -> None:
-        self.found: Analysis | None = None
+        self.found: lib.Analysis | None = None
         self.progress: Progress | None = None
         self._is_silent, self._told = is_silent, 0
 
-    def __call__(self, found: Analysis) -> None:
+    def __call__(self, found: lib.Analysis) -> None:
         begins, self.found = self.found is None, found
         if self._is_silent:
             return
         if begins:
-            from kahanmaps.display.laboratory import analysis_head
-
-            tell(analysis_head(found))
+            tell(lib.analysis_head(found))
         self._tell(found.final_sections)
 
     def end(self) -> None:
@@ -126,7 +110,7 @@ class _Report:
         tell("\nverdict", style="bold")
         tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
 
-    def _tell(self, sections: Sequence[tuple[str, Sequence[Statement]]]) -> None:
+    def _tell(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
         if self.progress is not None and len(sections) > self._told:
             self.progress.clear()
         for name, lines in sections[self._told :]:
@@ -137,14 +121,11 @@ class _Report:
         sys.stdout.flush()
 
 
-def _print_markdown(found: Analysis) -> None:
-    from kahanmaps.display.laboratory import analysis_title
-    from kahanmaps.display.markup import code, markdown
-
-    lines = [f"# {markdown(analysis_title(found))}", "", "```"]
-    lines += [*str(found.file.map).split("\n"), "```", "", f"**{markdown(found.conclusion.sentence)}**", ""]
+def _print_markdown(found: lib.Analysis) -> None:
+    lines = [f"# {lib.markdown(lib.analysis_title(found))}", "", "```"]
+    lines += [*str(found.file.map).split("\n"), "```", "", f"**{lib.markdown(found.conclusion.sentence)}**", ""]
     for name, told in found.sections:
         lines += [f"## {name}", ""]
-        lines += [f"* *{one.status}*: {(code if '=' in one.text else markdown)(one.text)}" for one in told]
+        lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
         lines.append("")
     echo("\n".join(lines))

@@ -5,10 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.batch_run import dry_run, run_batch
+from kahanmaps_cli.batch_show import (
+    export_rows,
+    found_data,
+    print_found,
+    print_status,
+    print_summary,
+    print_tasks,
+    status_data,
+)
 from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
@@ -17,9 +28,6 @@ from kahanmaps_cli.params import Shard
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo
-
-if TYPE_CHECKING:
-    from kahanmaps.experiments.store import Store
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -105,8 +113,6 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
     Exit status: 0 every task is done, whatever the verdicts, 2 usage error, 3 some task failed or has no result, 130
     interrupted.
     """
-    from kahanmaps_cli.batch_run import dry_run, run_batch
-
     if options["as_json"] and options["as_jsonl"]:
         raise click.UsageError("give --json or --jsonl, not both")
     if spec is None and (db is None or options["dry_run"]):
@@ -132,8 +138,6 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 
     May be asked while a batch is running.
     """
-    from kahanmaps_cli.batch_show import print_status, status_data
-
     with _open(db) as store:
         data = status_data(store, only)
     if as_json:
@@ -155,13 +159,10 @@ def show(key: str, db: str, as_json: bool) -> None:
 
     KEY: the first digits of its key, four or more; batch run --dry-run and batch export have the keys.
     """
-    from kahanmaps.errors import InputError
-    from kahanmaps_cli.batch_show import found_data, print_found
-
     with _open(db) as store:
         found = store.find(key)
         if not found:
-            raise InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
+            raise lib.InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
         data = [found_data(store, one) for one in found]
     if as_json:
         for one in data:
@@ -186,8 +187,6 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
       kahanmaps batch export --db study.db --jsonl | jq .verdict
       kahanmaps batch export --db study.db --parquet -o study.parquet
     """
-    from kahanmaps_cli.batch_show import export_rows
-
     if form is None:
         endings = {".csv": "csv", ".jsonl": "jsonl", ".parquet": "parquet"}
         form = endings.get(Path(output).suffix.lower()) if output else None
@@ -218,8 +217,6 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
     --by takes options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
     growth), and experiment, task, outcome, verdict, message.
     """
-    from kahanmaps_cli.batch_show import print_summary
-
     if as_json and as_markdown:
         raise click.UsageError("give --json or --markdown, not both")
     names = [name.strip() for name in by.split(",") if name.strip()]
@@ -240,10 +237,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
     Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
     """
-    from kahanmaps.errors import counted
-    from kahanmaps.experiments.store import Store
-
-    with Store.open(target, create=True) as store:
+    with lib.Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]
     conflicts = sum(found.conflicts for _, found in merged)
     if as_json:
@@ -256,7 +250,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     if conflicts and not quiet:
         keys = [key for _, found in merged for key in found.conflicting]
         say(
-            f"{counted(conflicts, 'task')} with different results in two databases, those of {target} were kept: "
+            f"{lib.counted(conflicts, 'task')} with different results in two databases, those of {target} were kept: "
             f"{', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''} (batch show KEY --db FILE)"
         )
     return 3 if conflicts else 0
@@ -272,12 +266,8 @@ def tasks(name: str | None, as_json: bool) -> None:
       kahanmaps batch tasks
       kahanmaps batch tasks check-commute
     """
-    from kahanmaps_cli.batch_show import print_tasks
-
     print_tasks(name, as_json)
 
 
-def _open(db: str) -> Store:
-    from kahanmaps.experiments.store import Store
-
-    return Store.open(db, readonly=True)
+def _open(db: str) -> lib.Store:
+    return lib.Store.open(db, readonly=True)

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.progress import as_typed, say
@@ -50,8 +51,6 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     The output is a file that runs as it stands; toml is a system file. eps is an argument of the map, where it has one:
     the time step is 2 eps. Numbers are exact, but in numpy, c and fortran.
     """
-    from kahanmaps.languages.convert import convert
-
     file = load_system(system, options)
     if language == "toml":
         if options["parts"] or options["symbolic"] or options["name"]:
@@ -60,7 +59,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         return
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
-    text = convert(
+    text = lib.convert(
         file,
         language,
         parts if options["parts"] else None,
@@ -75,9 +74,7 @@ def _write(text: str, name: str, language: str, output: str | None, quiet: bool)
     if output is None or output == "-":
         click.echo(text, nl=False)
         return
-    from kahanmaps.whole_files import write_whole
-
-    write_whole(output, text.encode())
+    lib.write_whole(output, text.encode())
     if not quiet:
         say(f"{output}: {name} for {language}, {len(text.splitlines())} lines")
 

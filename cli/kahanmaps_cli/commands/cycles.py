@@ -3,43 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.numbers import read_matrix
-from kahanmaps_cli.options import (
-    output_options,
-    seconds_option,
-    seed_option,
-    several_eps_options,
-    system_or_prime_options,
-)
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
 
-if TYPE_CHECKING:
-    from flint import fmpq_mat
-
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.finite.cycle_laws import Comparison
-    from kahanmaps.laboratory.finite.cycles import Census
-
 _STOPPED = "stopped by the clock: give more --seconds, fewer --samples or a smaller prime"
 
 
 @click.command("cycles")
-@system_or_prime_options
+@opt.system_or_prime_options
 @click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="The prime; repeatable.")
-@several_eps_options
+@opt.several_eps_options
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of making the whole graph.")
 @click.option("--steps", type=int, metavar="N", help="... for at most N steps (default 8 (p + 1 + 2 sqrt p)).")
 @click.option("--reversor", metavar="ROWS", help="A matrix R with f(R x) = -R f(x): '1,0;0,-1'.")
-@seconds_option(60.0, "Time for the samples of one run.")
-@seed_option
-@output_options
+@opt.seconds_option(60.0, "Time for the samples of one run.")
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """The orbits of the map of SYSTEM on projective space over a finite field, and how long its cycles are.
 
@@ -65,10 +53,6 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 done, 2 usage error, 3 samples stopped by the clock.
     """
-    from kahanmaps.laboratory.finite.cycle_laws import compare
-    from kahanmaps.laboratory.finite.cycles import cycle_census, default_eps
-    from kahanmaps.laboratory.symmetry.reversors import find_reversor
-
     if options["steps"] is not None and options["samples"] is None:
         raise click.UsageError("--steps N is for --samples N")
     options["primes"] = (*options["primes"], *map(_prime, (text for name, text in options["parameters"] if not name)))
@@ -76,31 +60,30 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError("missing --prime P, or -p P")
     options["parameters"] = [pair for pair in options["parameters"] if pair[0]]
 
-    def censuses(file: SystemFile, progress: Progress) -> tuple[fmpq_mat | None, list[tuple[Census, Comparison]]]:
+    def censuses(
+        file: lib.SystemFile, progress: Progress
+    ) -> tuple[lib.fmpq_mat | None, list[tuple[lib.Census, lib.Comparison]]]:
         reversor = None
         if options["reversor"] is not None:
             reversor = read_matrix(options["reversor"])
         elif file.is_quadratic:
-            reversor = find_reversor(file.system)
+            reversor = lib.find_reversor(file.system)
         runs = []
         for prime in dict.fromkeys(options["primes"]):
-            values = [*options["eps"], *(step / 2 for step in options["time_step"])] or default_eps(prime)
+            values = [*options["eps"], *(step / 2 for step in options["time_step"])] or lib.default_eps(prime)
             for eps in values if file.map.has_eps else [1]:
-                census = cycle_census(
+                census = lib.cycle_census(
                     file.map,
                     eps,
                     prime,
                     reversor=reversor,
-                    samples=options["samples"],
-                    steps=options["steps"],
-                    seed=options["seed"],
-                    seconds=options["seconds"],
+                    **opt.given(options, "samples", "steps", "seed", "seconds"),
                     progress=progress,
                 )
-                runs.append((census, compare(census, options["seed"])))
+                runs.append((census, lib.compare(census, options["seed"])))
         return reversor, runs
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
+    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         reversor, runs = censuses(file, progress)
         common = [law for law in runs[0][1].compatible if all(law in found.compatible for _, found in runs)]
         longest = ", ".join(f"{census.longest} modulo {census.prime}" for census, _ in runs)
@@ -122,14 +105,15 @@ def _prime(text: str) -> int:
 
 
 def _print(
-    file: SystemFile, reversor: fmpq_mat | None, runs: list[tuple[Census, Comparison]], common: list[str]
+    file: lib.SystemFile,
+    reversor: lib.fmpq_mat | None,
+    runs: list[tuple[lib.Census, lib.Comparison]],
+    common: list[str],
 ) -> None:
-    from kahanmaps.algebra.plain import plain
-
     what = "the Kahan map" if file.is_quadratic else file.map.kind
     step = ", eps is half the time step" if file.map.has_time_step else ""
     tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){step}")
-    rows = plain(reversor)
+    rows = lib.plain(reversor)
     shown = "none known" if rows is None else ";".join(",".join(row) for row in rows)
     tell(f"reversing symmetry\t{shown}")
     for census, found in runs:
@@ -142,14 +126,12 @@ def _print(
 
 
 def _record(
-    file: SystemFile,
+    file: lib.SystemFile,
     options: dict[str, Any],
-    reversor: fmpq_mat | None,
-    runs: list[tuple[Census, Comparison]],
+    reversor: lib.fmpq_mat | None,
+    runs: list[tuple[lib.Census, lib.Comparison]],
     common: list[str],
 ) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes, plain
-
     def pairs(lengths: Mapping[int, int] | None) -> list[list[int]] | None:
         return None if lengths is None else [[length, n] for length, n in lengths.items()]
 
@@ -157,17 +139,19 @@ def _record(
         "cycles",
         file,
         "exact modulo primes",
-        seed=options["seed"],
-        samples=options["samples"],
-        steps_asked=options["steps"],
+        **opt.given(options, "seed", "samples", steps_asked="steps"),
         seconds=options["seconds"],
-        reversor=plain(reversor),
+        reversor=lib.plain(reversor),
         primes=list(dict.fromkeys(options["primes"])),
         runs=[
             {
-                **attributes(census, "prime", "complete", "looked_at", "steps", "stopped", "degree", "lost", "falling"),
-                **attributes(census, "transient", "open", "periodic", "cycles", "longest", "mean"),
-                **attributes(census, common_factor="factor", singular_everywhere="is_undefined", fixed_points="fixed"),
+                **lib.attributes(
+                    census, "prime", "complete", "looked_at", "steps", "stopped", "degree", "lost", "falling"
+                ),
+                **lib.attributes(census, "transient", "open", "periodic", "cycles", "longest", "mean"),
+                **lib.attributes(
+                    census, common_factor="factor", singular_everywhere="is_undefined", fixed_points="fixed"
+                ),
                 "eps": str(census.eps),
                 "time_step": str(2 * census.eps) if file.map.has_time_step else None,
                 "points": str(census.points),
@@ -175,10 +159,10 @@ def _record(
                 "at_infinity": pairs(census.at_infinity),
                 "symmetric": pairs(census.symmetric),
                 "longer_than_bound": pairs(found.longer),
-                **attributes(
+                **lib.attributes(
                     found, "bound", "unexplained", "scale", "model_scale", "distance", "compatible", "reasons"
                 ),
-                **attributes(
+                **lib.attributes(
                     found, share_within_bound="share_within", critical_distance="critical", not_compatible="refused"
                 ),
             }

@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps_cli.options import (
-    eps_options,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
 
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.growth.degrees import DegreeGrowth
-
 _SHOWN = 8  # degrees in a line of a table
 
 
 @click.command("degrees")
-@system_options
-@eps_options
-@seconds_option(10.0, "Stop after about so many seconds.")
+@opt.system_options
+@opt.eps_options
+@opt.seconds_option(10.0, "Stop after about so many seconds.")
 @click.option(
     "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
 )
@@ -40,8 +30,8 @@ _SHOWN = 8  # degrees in a line of a table
 @click.option(
     "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."
 )
-@seed_option
-@output_options
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
 
@@ -69,9 +59,9 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
     vary; 2 usage error; 3 undecided, or stopped early.
     """
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
+    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         found = measured(file, eps, options, progress)
         more = ", ..." if len(found.degrees) > _SHOWN else ""
         line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
@@ -83,30 +73,22 @@ def command(system: str | None, **options: Any) -> int:
     return table(system, options, cell)
 
 
-def measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]) -> DegreeGrowth:
+def measured(
+    file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
+) -> lib.DegreeGrowth:
     """The degrees that the options ask for."""
-    from kahanmaps.laboratory.growth.degrees import degree_growth
-
-    return degree_growth(
-        file.map,
-        eps,
-        seconds=options["seconds"],
-        max_terms=options["terms"],
-        max_degree=options["max_degree"],
-        seed=options["seed"],
-        steps=options.get("steps"),
-        progress=progress,
-    )
+    asked = opt.given(options, "seconds", "max_degree", "seed", max_terms="terms")
+    return lib.degree_growth(file.map, eps, **asked, steps=options.get("steps"), progress=progress)
 
 
-def is_done(found: DegreeGrowth, terms: int | None) -> bool:
+def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
     """Whether nothing was left open that was asked for: `terms` degrees, or (None) a recurrence."""
     if found.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and found.recurrence is not None
 
 
-def _print(file: SystemFile, found: DegreeGrowth) -> None:
+def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 63 bits"
     at = "generic eps" if eps is None else f"eps = {eps}"
     if eps is not None and file.map.has_time_step:
@@ -116,15 +98,14 @@ def _print(file: SystemFile, found: DegreeGrowth) -> None:
     tell(found.text)
 
 
-def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
+def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth) -> dict[str, Any]:
     time_step = "generic" if found.eps is None else str(2 * found.eps)
     return record_of(
         "degrees",
         file,
         "modulo the primes of the lines",
         time_step=time_step if file.map.has_time_step else None,
-        seconds=options["seconds"],
-        terms_asked=options["terms"],
+        **opt.given(options, "seconds", terms_asked="terms"),
         max_degree=options["max_degree"],
         **found.to_json(),
     )

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.errors import counted, quoted
-from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
-from kahanmaps_cli.ensemble_starts import drawn, read_starts
-from kahanmaps_cli.options import (
-    asked_integral,
-    backward_option,
-    eps_of,
-    eps_options,
-    integral_option,
-    load_system,
-    output_options,
-    random_starts_options,
-    system_options,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
+from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, structure_for
+from kahanmaps_cli.ensemble_starts import asked_starts
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, Whole
 from kahanmaps_cli.progress import Progress, say
@@ -28,20 +19,16 @@ from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
 
-if TYPE_CHECKING:
-    from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.documents.files import SystemFile
-
 _MAX_STEPS = 10**13  # years
 _MAX_BITS = 61
 
 
 @click.command("ensemble")
-@system_options
-@random_starts_options
-@eps_options
+@opt.system_options
+@opt.random_starts_options
+@opt.eps_options
 @click.option("--steps", type=int, metavar="N", required=True, help="How many steps to take.")
-@backward_option
+@opt.backward_option
 @click.option(
     "--arithmetic",
     type=Arithmetic(),
@@ -52,12 +39,12 @@ _MAX_BITS = 61
 )
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
-@integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
+@opt.integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
 @click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
 @click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
-@output_options
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """Many orbits of the map of SYSTEM at once: how many go through, and how well integrals are kept.
 
@@ -78,35 +65,27 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
-    from flint import fmpq
-
-    from kahanmaps.algebra.fields import GF, QQ
-    from kahanmaps.family.structure import NoStructure
-
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     integrals = _integrals(options["integrals"], file)
-    eps = eps_of(file, options)
-    number = fmpq(1) if eps is None else eps
-    file.map.at(number, GF(prime) if kind == "mod" else QQ)  # the demands on eps and the prime, in the words of orbit
-    if options["starts"] is not None:
-        starts = read_starts(options["starts"], file.variables, prime if kind == "mod" else None)
-    else:
-        box = 1 if options["box"] is None else options["box"]
-        seed = options["seed"] or 0
-        starts = drawn(options["count"], file.dim, box, seed, prime if kind == "mod" else None)
+    eps = opt.eps_of(file, options)
+    number = lib.fmpq(1) if eps is None else eps
+    file.map.at(
+        number, lib.GF(prime) if kind == "mod" else lib.QQ
+    )  # the demands on eps and the prime, in the words of orbit
+    starts = asked_starts(file, options, prime if kind == "mod" else None)
     structure = structure_for(file, options["method"])
-    form = None if isinstance(structure, NoStructure) else structure.form
+    form = None if isinstance(structure, lib.NoStructure) else structure.form
     made = ModularRun if kind == "mod" else FloatRun
-    run: Run = made(file, number, starts, form, integrals, options["steps"], options)
+    run: Run = made(Asked(file, number, starts, form, integrals, options))
     if verbose and not quiet:
-        why = structure.reason if isinstance(structure, NoStructure) else structure.text
+        why = structure.reason if isinstance(structure, lib.NoStructure) else structure.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
     steps, output = options["steps"], options["output"]
     try:
         with interruptible(run.interrupt), Progress(quiet) as progress:
-            run.walk(steps, options["every"] or 0, output, lambda k: progress(f"step {k} of {steps}"))
+            run.walk(lambda k: progress(f"step {k} of {steps}"))
     except OSError as error:  # a full disk comes without a name
         error.filename = error.filename or output
         raise
@@ -150,10 +129,10 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _integrals(requests: tuple[tuple[str, str], ...], file: SystemFile) -> dict[str, RationalFunction]:
-    found: dict[str, RationalFunction] = {}
+def _integrals(requests: tuple[tuple[str, str], ...], file: lib.SystemFile) -> dict[str, lib.RationalFunction]:
+    found: dict[str, lib.RationalFunction] = {}
     for k, request in enumerate(requests, start=1):
-        name, function = asked_integral(file, *request, f"I{k}")
+        name, function = opt.asked_integral(file, *request, f"I{k}")
         if name in found:
             raise click.UsageError(f"found two integrals of the name {name}: write --integral NAME=EXPR")
         found[name] = function
@@ -165,13 +144,11 @@ def _arithmetic(options: dict[str, Any]) -> str:
     return f"mod:{number}" if kind == "mod" else str(kind)
 
 
-def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
+def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
     """Tab-separated lines, aligned on a terminal."""
-    from kahanmaps.checks.settings import eps_record, eps_words
-
     backward = ", backward" if options["backward"] else ""
     arithmetic = _arithmetic(options)
-    tell(f"# {file.name}{eps_words(eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
+    tell(f"# {file.name}{lib.eps_words(lib.eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()
@@ -188,18 +165,15 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
         tell(f"{name}\t{text}", 15)
 
 
-def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import eps_record
-
+def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
     steps, output = options["steps"], options["output"]
     drawn_at_random = options["starts"] is None
     box = None
     if drawn_at_random and options["arithmetic"][0] == "float":
-        box = "1" if options["box"] is None else format_number(options["box"])
+        box = "1" if options["box"] is None else lib.format_number(options["box"])
     every = options["every"] or max(1, steps)
     more = {
-        **eps_record(eps, file.map),
+        **lib.eps_record(eps, file.map),
         "variables": list(file.variables),
         "method": run.method,
         "kernel": run.kernel,

@@ -4,35 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.errors import quoted
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.numbers import read_matrix
-from kahanmaps_cli.options import (
-    json_option,
-    load_system,
-    parameter_option,
-    quiet_option,
-    seed_option,
-    system_argument,
-    system_options,
-)
 from kahanmaps_cli.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import formula, tell
-
-if TYPE_CHECKING:
-    from flint import fmpq_mat
-
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.associated import FamilyMember
-    from kahanmaps.family.hidden import HiddenMember
-    from kahanmaps.family.planar import NormalForm
 
 
 @click.group("family", cls=SuggestingGroup)
@@ -51,10 +36,10 @@ def command() -> None:
 @command.command("new")
 @draw_options
 @click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
-@seed_option
+@opt.seed_option
 @click.option("--name", help="The name in the file.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
-@quiet_option
+@opt.quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
     """Draw a member at random and write it as a system file.
 
@@ -66,24 +51,21 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
     Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
     """
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.skew_hamiltonian import diagnosis
-
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
         raise click.UsageError(f"found --name {quoted(name)}, expected printable text")
     member = _with_signs(draw_member(**options), signs)
-    file = SystemFile.from_member(member, name or (file_name(Path(output).stem) if output else "member"))
+    file = lib.SystemFile.from_member(member, name or (file_name(Path(output).stem) if output else "member"))
     _write(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
-        say(f"{where}dimension {member.dim}; {diagnosis(member.A)}")
+        say(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
 
 
 @command.command("show")
-@system_options
+@opt.system_options
 @click.option("--normal-form", is_flag=True, help="Also the system as one planar cubic h(X, Y) over K = Q[t]/chi.")
-@json_option
+@opt.json_option
 def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
 
@@ -96,29 +78,26 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
     A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
     """
-    from kahanmaps.algebra.plain import attributes, plain
-    from kahanmaps.algebra.text import format_polynomial
-    from kahanmaps.family.planar import normal_form as normal_form_of
-    from kahanmaps.family.skew_hamiltonian import chi, diagnosis, format_univariate
-
-    file, member, hidden = _member_or_hidden(load_system(system, options))
+    file, member, hidden = _member_or_hidden(opt.load_system(system, options))
     data: dict[str, Any] = {
         **envelope("family show"),
         "system": file.name,
         "m": member.m,
         "dim": member.dim,
         "variables": list(member.variables),
-        "A": plain(member.A),
-        "chi": format_univariate(chi(member.A)),
+        "A": lib.plain(member.A),
+        "chi": lib.format_univariate(lib.chi(member.A)),
         "factors": [{"factor": str(f), "multiplicity": f.multiplicity} for f in member.factors],
         "generic": member.is_generic,
-        "diagnosis": diagnosis(member.A),
+        "diagnosis": lib.diagnosis(member.A),
         "signs": list(member.signs),
-        "hamiltonians": [format_polynomial(H) for H in member.chain],
+        "hamiltonians": [lib.format_polynomial(H) for H in member.chain],
     }
     if hidden is not None:
-        data["found"] = attributes(hidden, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard")
-    form = normal_form_of(member) if normal_form else None
+        data["found"] = lib.attributes(
+            hidden, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard"
+        )
+    form = lib.normal_form(member) if normal_form else None
     if form is not None:
         data["normal_form"] = _normal_form_data(form)
     if as_json:
@@ -136,16 +115,16 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     for k, text in enumerate(data["hamiltonians"]):
         tell(f"H_{k} = {formula(text)}")
     if any(sign < 0 for sign in member.signs):
-        tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(format_polynomial(member.chosen.K))}")
+        tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}")
     if form is not None:
         _print_normal_form(form, "x" if hidden is None or hidden.is_standard else "y")
 
 
 @command.command("space")
-@system_argument
-@parameter_option
+@opt.system_argument
+@opt.parameter_option
 @click.option("--matrix", metavar="ROWS", help="A itself instead of a file: '1,0;0,1'.")
-@json_option
+@opt.json_option
 def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: str | None, as_json: bool) -> None:
     """The space of cubics H with A Hess(H) = Hess(H) A^T: its dimension, 4m for generic A, and a basis.
 
@@ -153,11 +132,6 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
       kahanmaps family space paper_m3
       kahanmaps family space --matrix '1,0,0,0; 0,2,0,0; 0,0,1,0; 0,0,0,2'
     """
-    from kahanmaps.algebra.plain import plain
-    from kahanmaps.algebra.text import format_polynomial
-    from kahanmaps.family.cubics import cubic_space
-    from kahanmaps.family.skew_hamiltonian import diagnosis
-
     if (system is None) == (matrix is None):
         raise click.UsageError("give a SYSTEM of kind [family], or --matrix ROWS, one of the two")
     if matrix is not None:
@@ -165,17 +139,17 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     else:
         member = _member(system, parameters)[1]
         A, variables = member.A, member.variables
-    found = cubic_space(A, variables)
+    found = lib.cubic_space(A, variables)
     data: dict[str, Any] = {
         **envelope("family space"),
-        "A": plain(A),
+        "A": lib.plain(A),
         "dim": A.nrows(),
         "dimension": found.dimension,
         "expected_for_generic_A": found.expected,
         "unknowns": found.unknowns,
         "rank": found.rank,
-        "diagnosis": diagnosis(A),
-        "basis": [format_polynomial(H) for H in found.basis],
+        "diagnosis": lib.diagnosis(A),
+        "basis": [lib.format_polynomial(H) for H in found.basis],
     }
     if as_json:
         print_json(data)
@@ -190,10 +164,10 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
 
 
 @command.command("associated")
-@system_argument
-@parameter_option
+@opt.system_argument
+@opt.parameter_option
 @click.option("--write-to", type=OutputFolder(), metavar="DIR", help="Write each as a system file to DIR.")
-@json_option
+@opt.json_option
 def associated(
     system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
 ) -> None:
@@ -208,27 +182,22 @@ def associated(
     Where a factor g of chi is irreducible of degree 2 or more, also those over Q[t]/g that have the other sign at one
     root t of it only: systems with t as a parameter, "root of g". Conjugates, and products of them, are all others.
     """
-    from kahanmaps.algebra.plain import plain
-    from kahanmaps.algebra.text import format_polynomial, format_univariate
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.associated import FamilyMember
-
     file, member = _member(system, parameters)
     rows = []
-    written: dict[str, SystemFile] = {}
+    written: dict[str, lib.SystemFile] = {}
     for associate in member.associated():
         row: dict[str, Any] = {
             "label": associate.label,
             "signs": list(associate.signs),
-            "B_in_powers_of_A": plain(associate.coefficients),
-            "B": plain(associate.B),
-            "K": format_polynomial(associate.K),
+            "B_in_powers_of_A": lib.plain(associate.coefficients),
+            "B": lib.plain(associate.B),
+            "K": lib.format_polynomial(associate.K),
         }
         if write_to is not None:
             text = "".join("p" if sign > 0 else "m" for sign in associate.signs)
             path = Path(write_to) / f"{file_name(file.name)}-{text}.toml"
-            one = FamilyMember(member.A, member.H, associate.signs)
-            written[str(path)] = SystemFile.from_member(one, path.stem)
+            one = lib.FamilyMember(member.A, member.H, associate.signs)
+            written[str(path)] = lib.SystemFile.from_member(one, path.stem)
             will_write(str(path))
             row["file"] = str(path)
         rows.append(row)
@@ -239,13 +208,13 @@ def associated(
             "root": str(other.root),
             "symbol": other.name,
             "signs": list(other.signs),
-            "B_in_powers_of_A": [format_univariate(c.polynomial, other.name) for c in other.coefficients],
+            "B_in_powers_of_A": [lib.format_univariate(c.polynomial, other.name) for c in other.coefficients],
             "K": other.K_text,
         }
         if write_to is not None:
             which = list(member.roots.values()).index(other.root) + 1 if len(member.roots) > 1 else ""
             path = Path(write_to) / f"{file_name(file.name)}-{text}-{other.name}{which}.toml"
-            written[str(path)] = SystemFile.from_conjugate(other, path.stem)
+            written[str(path)] = lib.SystemFile.from_conjugate(other, path.stem)
             will_write(str(path))
             more["file"] = str(path)
         conjugate.append(more)
@@ -275,10 +244,10 @@ def associated(
 
 
 @command.command("tensor")
-@system_options
+@opt.system_options
 @click.option("--algebra", metavar="CHI", required=True, help="K = Q[t]/(chi), chi a polynomial in t: 't^2-2'.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
-@quiet_option
+@opt.quiet_option
 def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
     """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.
 
@@ -292,12 +261,9 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
     parameter t of SYSTEM stands for the generator of K. Integrals and the density that SYSTEM claims become the m
     integrals and the density that its map over Q inherits.
     """
-    from kahanmaps.documents.tensor import tensor_file
-    from kahanmaps.family.draw import parse_chi
-
     output = None if output == "-" else output
-    over_algebra, chi = load_system(system, options), parse_chi(algebra)
-    file = tensor_file(over_algebra, chi)
+    over_algebra, chi = opt.load_system(system, options), lib.parse_chi(algebra)
+    file = lib.tensor_file(over_algebra, chi)
     _write(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
@@ -305,22 +271,18 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
         say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
 
 
-def _normal_form_data(form: NormalForm) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes, plain
-
+def _normal_form_data(form: lib.NormalForm) -> dict[str, Any]:
     return {
         "chi": form.chi_text,
         "h": form.h_text,
         "D": form.D_text,
-        "S": plain(form.S),
+        "S": lib.plain(form.S),
         "h_in_powers_of_t": [[str(c[k]) for k in range(form.m)] for c in form.coefficients],
-        "parts": [attributes(part, "root", "weight", h="text", D="D_text") for part in form.parts],
+        "parts": [lib.attributes(part, "root", "weight", h="text", D="D_text") for part in form.parts],
     }
 
 
-def _print_normal_form(form: NormalForm, point: str) -> None:
-    from kahanmaps.algebra.text import format_number
-
+def _print_normal_form(form: lib.NormalForm, point: str) -> None:
     tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
     tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
     tell(f"h = {formula(form.h_text)}")
@@ -331,65 +293,53 @@ def _print_normal_form(form: NormalForm, point: str) -> None:
         tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
         tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
     for part in form.parts:
-        root, weight = formula(format_number(part.root)), formula(format_number(part.weight))
+        root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
         tell(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
     tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
     _print_matrix(form.S)
 
 
-def _with_signs(member: FamilyMember, signs: str | None) -> FamilyMember:
-    from kahanmaps.family.associated import FamilyMember
-
+def _with_signs(member: lib.FamilyMember, signs: str | None) -> lib.FamilyMember:
     if signs is None:
         return member
     pieces = [piece.strip() for piece in signs.split(",")]
     if any(piece not in ("1", "+1", "-1") for piece in pieces):
         raise click.UsageError(f"found --signs {quoted(signs)}, expected 1 and -1 separated by commas")
-    return FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
+    return lib.FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
 
 
-def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[SystemFile, FamilyMember]:
-    from kahanmaps.errors import InputError
-
-    file = load_system(reference, {"parameters": parameters})
+def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
+    file = opt.load_system(reference, {"parameters": parameters})
     if file.member is None:
-        raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
+        raise lib.InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member
 
 
-def _member_or_hidden(file: SystemFile) -> tuple[SystemFile, FamilyMember, HiddenMember | None]:
+def _member_or_hidden(file: lib.SystemFile) -> tuple[lib.SystemFile, lib.FamilyMember, lib.HiddenMember | None]:
     """The member that a system is declared to be, or is found to be."""
-    from kahanmaps.errors import InputError
-    from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
-
     if file.member is not None:
         return file, file.member, None
-    hamiltonian = file.hamiltonian or hidden_hamiltonian(file.system)
-    hidden = None if hamiltonian is None else hidden_member(hamiltonian)
+    hamiltonian = file.hamiltonian or lib.hidden_hamiltonian(file.system)
+    hidden = None if hamiltonian is None else lib.hidden_member(hamiltonian)
     if hidden is None:
-        raise InputError(
+        raise lib.InputError(
             f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all the "
-            f"same was looked for and not found: {reason_against(hamiltonian)}"
+            f"same was looked for and not found: {lib.reason_against(hamiltonian)}"
         )
     return file, hidden.member, hidden
 
 
-def _write(file: SystemFile, output: str | None) -> None:
-    from kahanmaps.documents.files import parse_system
-    from kahanmaps.whole_files import write_whole
-
+def _write(file: lib.SystemFile, output: str | None) -> None:
     text = file.to_toml()
-    parse_system(text, f"{file.name}, as it would be written")  # nothing is written that could not be read
+    lib.parse_system(text, f"{file.name}, as it would be written")  # nothing is written that could not be read
     if output is None:
         click.echo(text, nl=False)
         return
-    write_whole(output, text.encode())
+    lib.write_whole(output, text.encode())
 
 
-def _print_matrix(matrix: fmpq_mat) -> None:
-    from kahanmaps.algebra.plain import plain
-
-    rows = [[formula(cell, 24) for cell in row] for row in plain(matrix)]
+def _print_matrix(matrix: lib.fmpq_mat) -> None:
+    rows = [[formula(cell, 24) for cell in row] for row in lib.plain(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:
         tell("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))

@@ -6,31 +6,25 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import (
-    error_bits_option,
-    load_system,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 
 @click.command("find-commuting")
-@system_options
+@opt.system_options
 @click.option(
     "--shape",
     type=click.Choice(["linear", "quadratic"]),
     help="linear: g = B f with a constant B; quadratic: any g of degree at most 2 (default in dimension 1 to 3, where "
     "a second is enough).",
 )
-@seed_option
-@error_bits_option("What is supported is false with probability below 2^-BITS.")
-@seconds_option(60, "Stop about then, and say what is open.")
-@output_options
+@opt.seed_option
+@opt.error_bits_option("What is supported is false with probability below 2^-BITS.")
+@opt.seconds_option(60, "Stop about then, and say what is open.")
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """All rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.
 
@@ -48,14 +42,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
     """
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
-
-    file = load_system(system, options)
+    file = opt.load_system(system, options)
     seed, error_bits = options["seed"], options["error_bits"]
-    settings = Settings(seed=seed, error_bits=error_bits)
+    settings = lib.Settings(seed=seed, error_bits=error_bits)
     with Progress(quiet) as progress:
-        found = find_commuting(
+        found = lib.find_commuting(
             file.system if file.map.root is None else file.map,
             options["shape"],
             seed=seed,

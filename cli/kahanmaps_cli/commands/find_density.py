@@ -6,13 +6,14 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import load_system, system_options
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
 
 
 @click.command("find-density")
-@system_options
+@opt.system_options
 @click.option("--flow", is_flag=True, help="Densities of the differential equation itself.")
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
 @search_options("density")
@@ -32,22 +33,17 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
-    from kahanmaps.laboratory.preserve.densities import find_densities
-
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options)
+        file = opt.load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow goes without --toml, which is about the map")
-        found = find_densities(
+        found = lib.find_densities(
             file,
             symbols=symbols,
             eps=eps,
-            flow=options["flow"],
-            max_degree=options["max_degree"],
-            seconds=options["seconds"],
-            seed=options["seed"],
+            **opt.given(options, "flow", "max_degree", "seconds", "seed"),
             progress=progress,
         )
     further = f"note\t{found.further}" if found.further else ""

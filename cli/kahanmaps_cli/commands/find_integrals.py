@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps_cli.options import load_system, system_options
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import (
@@ -21,12 +22,9 @@ from kahanmaps_cli.search import (
 from kahanmaps_cli.terminal import formula, tell
 from kahanmaps_cli.value_rows import Cell, rows_of, table
 
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-
 
 @click.command("find-integrals")
-@system_options
+@opt.system_options
 @click.option(
     "--monomials",
     "sets",
@@ -69,17 +67,14 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 every integral that theorems give or orbits show has a formula, 2 usage error, 3 some have none,
     orbits were not measured, or the time was too short.
     """
-    from kahanmaps.laboratory.preserve.integrals import find_integrals
-    from kahanmaps.laboratory.preserve.limits import flow_and_map
-
     require_one_form(options)
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
+    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
         symbols, eps = symbols_and_eps(options)
-        limits = {name: options[name] for name in ("max_degree", "seconds", "seed")}
-        found = find_integrals(file, symbols=symbols, eps=eps, progress=progress, **limits)
+        limits = opt.given(options, "max_degree", "seconds", "seed")
+        found = lib.find_integrals(file, symbols=symbols, eps=eps, progress=progress, **limits)
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
         document = {"document": dict(file.document)}
@@ -89,7 +84,7 @@ def command(system: str | None, **options: Any) -> int:
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options)
+        file = opt.load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         if options["flow"] and (options["sets"] or options["as_toml"]):
             raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
@@ -104,17 +99,16 @@ def command(system: str | None, **options: Any) -> int:
                 raise click.UsageError("--darboux goes with --json, not with --toml and --latex")
             return _darboux(file, symbols, eps, options, progress)
         search = partial(
-            find_integrals,
+            lib.find_integrals,
             file,
             symbols=symbols,
             eps=eps,
-            max_degree=options["max_degree"],
+            **opt.given(options, "max_degree", "seed"),
             seconds=options["seconds"] / (1 + options["flow"]),
-            seed=options["seed"],
             progress=progress,
         )
         found = search(flow=options["flow"])
-        beside = flow_and_map(search(), None, found) if options["flow"] else None
+        beside = lib.flow_and_map(search(), None, found) if options["flow"] else None
     if beside is not None and options["as_json"]:
         both = {**heading("find-integrals", found), **found.to_json(), "beside_map": beside.to_json()}
         print_json({**both, "document": dict(file.document)})
@@ -138,16 +132,12 @@ def _count(found: Any) -> str:
 
 
 def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:
-    from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
-
-    found = darboux_polynomials(
+    found = lib.darboux_polynomials(
         file,
         options["darboux"],
         symbols=symbols,
         eps=eps,
-        flow=options["flow"],
-        seconds=options["seconds"],
-        seed=options["seed"],
+        **opt.given(options, "flow", "seconds", "seed"),
         progress=progress,
     )
     if options["as_json"]:
@@ -159,38 +149,33 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
 
 
 def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
-    from kahanmaps.algebra.text import parse_polynomial
-    from kahanmaps.errors import InputError, quoted
-    from kahanmaps.laboratory.laboratory import Laboratory
-    from kahanmaps.laboratory.modular_points import NoPoint
-    from kahanmaps.laboratory.preserve.hirota_kimura import Basis, hirota_kimura_basis
-    from kahanmaps.laboratory.preserve.integrals import closing_note
-
     if options["symbolic"]:
         raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
-    laboratory = Laboratory(file, (), eps, options["seed"])
-    rows: list[Basis] = []
+    laboratory = lib.Laboratory(file, (), eps, options["seed"])
+    rows: list[lib.Basis] = []
     reason = laboratory.defect
     for text in options["sets"]:
         parts = [part.strip() for part in text.split(",")]
         if not all(parts):
-            raise InputError(
-                f"found the set {quoted(text)}, expected polynomials with commas between them: 'x^2,y^2,1'"
+            raise lib.InputError(
+                f"found the set {lib.quoted(text)}, expected polynomials with commas between them: 'x^2,y^2,1'"
             )
-        functions = [parse_polynomial(part, file.variables, file.parameters) for part in parts]
+        functions = [lib.parse_polynomial(part, file.variables, file.parameters) for part in parts]
         for k, function in enumerate(functions):
             if function.is_zero():
-                raise InputError(
-                    f"found 0 as function {k + 1} of the set {quoted(text)}, expected polynomials that are not 0"
+                raise lib.InputError(
+                    f"found 0 as function {k + 1} of the set {lib.quoted(text)}, expected polynomials that are not 0"
                 )
             if function in functions[:k]:
-                raise InputError(f"found function {k + 1} twice in the set {quoted(text)}, expected different ones")
+                raise lib.InputError(
+                    f"found function {k + 1} twice in the set {lib.quoted(text)}, expected different ones"
+                )
         try:
             if not reason:
-                rows.append(hirota_kimura_basis(laboratory.maps, functions, parts))
-        except NoPoint as error:
+                rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, parts))
+        except lib.NoPoint as error:
             reason = str(error)
-    note = closing_note(next((row.period for row in rows if row.period), None), laboratory.eps, file.map)
+    note = lib.closing_note(next((row.period for row in rows if row.period), None), laboratory.eps, file.map)
     if options["as_json"]:
         print_json(
             {

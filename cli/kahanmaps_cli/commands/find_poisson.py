@@ -6,14 +6,15 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import load_system, system_options
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
 from kahanmaps_cli.terminal import tell
 
 
 @click.command("find-poisson")
-@system_options
+@opt.system_options
 @click.option(
     "--degree", type=click.IntRange(0, 20), metavar="D", default=2, show_default=True, help="Largest degree of entries."
 )
@@ -33,24 +34,20 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
-    from kahanmaps.algebra.text import parse_rational_function
-    from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
-
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options)
+        file = opt.load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         denominator = None
         if options["denominator"] is not None:
-            denominator = parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
-        found = find_poisson(
+            denominator = lib.parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
+        found = lib.find_poisson(
             file,
             options["degree"],
             symbols=symbols,
             eps=eps,
             denominator=denominator,
-            seconds=options["seconds"],
-            seed=options["seed"],
+            **opt.given(options, "seconds", "seed"),
             progress=progress,
         )
     print_search("find-poisson", found, options, [(one.name, one, f"{one.statement}; ") for one in found.tensors])

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system, output_options, seconds_option, system_options
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
@@ -34,14 +35,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the time over.
     """
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
-
     file = load_system(system, options)
     with Progress(quiet) as progress:
-        found = linear_symmetries(file.system, seconds=options["seconds"], progress=progress)
+        found = lib.linear_symmetries(file.system, seconds=options["seconds"], progress=progress)
     if as_json:
-        context = Settings().context([file], seconds=options["seconds"])
+        context = lib.Settings().context([file], seconds=options["seconds"])
         print_json({"command": "find-symmetry", **context, **found.to_json()})
     else:
         tell(f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved")

@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps_cli.options import (
-    Renamed,
-    eps_options,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
 
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-
 
 @click.command("heights")
-@system_options
-@eps_options
+@opt.system_options
+@opt.eps_options
 @click.option(
     "--random",
     "--starts",
     "count",
-    cls=Renamed,
+    cls=opt.Renamed,
     type=Whole(1),
     metavar="N",
     help="N starts drawn at random (default 3).",
@@ -50,9 +39,9 @@ if TYPE_CHECKING:
 @click.option(
     "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
-@seconds_option(30.0, "Stop after about so many seconds.")
-@seed_option
-@output_options
+@opt.seconds_option(30.0, "Stop after about so many seconds.")
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """How fast the heights of exact orbits of the map of SYSTEM grow, from several starts.
 
@@ -73,14 +62,12 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 all orbits that were decided agree, 2 usage error, 3 undecided, or the orbits disagree, or the time
     was over.
     """
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
-        from kahanmaps.invariants.heights import Growth
-
+    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         found = surveyed(file, eps, options, progress)
-        undecided = f"undecided: {found.text}" if found.kind is Growth.UNDECIDED else ""
+        undecided = f"undecided: {found.text}" if found.kind is lib.Growth.UNDECIDED else ""
         if not found.is_whole:
             undecided = "stopped early: the time was over before all orbits were finished"
         return Cell(found.text, lambda: _record(file, options, found), lambda: _print(file, found), undecided)
@@ -94,24 +81,19 @@ def require_heights(options: dict[str, Any]) -> None:
         raise click.UsageError("give --start X or --random N, not both")
 
 
-def surveyed(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> HeightSurvey:
+def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> lib.HeightSurvey:
     """The orbits that the options ask for."""
-    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
-
-    return height_survey(
+    return lib.height_survey(
         file.map,
         eps,
-        starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
-        steps=options["steps"],
-        max_digits=options["max_digits"],
-        seconds=options["seconds"],
+        starts=options["given"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
         structure=file.structure,
-        seed=options["seed"],
+        **opt.given(options, "steps", "max_digits", "seconds", "seed"),
         progress=progress,
     )
 
 
-def _print(file: SystemFile, found: HeightSurvey) -> None:
+def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     if file.map.has_time_step:
         each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
@@ -122,8 +104,8 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
     tell(str(found))
 
 
-def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
+def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey) -> dict[str, Any]:
     values = [str(value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits)]
     steps = [str(2 * value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits) if file.map.has_time_step]
-    asked = {name: options[name] for name in ("seed", "steps", "max_digits", "seconds")}
+    asked = opt.given(options, "seed", "steps", "max_digits", "seconds")
     return record_of("heights", file, "exact", eps=values, time_step=steps, **asked, **found.to_json())

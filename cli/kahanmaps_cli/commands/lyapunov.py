@@ -3,40 +3,29 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps_cli.ensemble_starts import drawn, read_starts
-from kahanmaps_cli.options import (
-    eps_of,
-    eps_options,
-    load_system,
-    output_options,
-    random_starts_options,
-    seconds_option,
-    system_options,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
+from kahanmaps_cli.ensemble_starts import asked_starts
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import on_terminal, print_table, tell
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.maps.floats.lyapunov import Lyapunov
 
 _MAX_STEPS = 10**9
 _DEFAULT_STARTS = 16
 
 
 @click.command("lyapunov")
-@system_options
-@random_starts_options
-@eps_options
+@opt.system_options
+@opt.random_starts_options
+@opt.eps_options
 @click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="How many steps to count.")
 @click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
-@seconds_option(60.0, "Time for all steps.")
-@output_options
+@opt.seconds_option(60.0, "Time for all steps.")
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Lyapunov exponents of float orbits of the map of SYSTEM, by the exact tangent map.
 
@@ -53,26 +42,17 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 all orbits went through, 2 usage error, 3 some ended early or the clock stopped all.
     """
-    from flint import fmpq
-
-    from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
-
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
     _require_sense(options, steps, transient)
-    file = load_system(system, options)
-    eps = eps_of(file, options)
-    if options["starts"] is not None:
-        starts = read_starts(options["starts"], file.variables, None)
-    else:
-        count = _DEFAULT_STARTS if options["count"] is None else options["count"]
-        box = 1 if options["box"] is None else options["box"]
-        starts = drawn(count, file.dim, box, options["seed"] or 0, None)
+    file = opt.load_system(system, options)
+    eps = opt.eps_of(file, options)
+    starts = asked_starts(file, options, count=_DEFAULT_STARTS)
     with Progress(quiet) as progress:
-        found = lyapunov_exponents(
+        found = lib.lyapunov_exponents(
             file.map,
             starts,
-            fmpq(1) if eps is None else eps,
+            lib.fmpq(1) if eps is None else eps,
             steps,
             transient=transient,
             seconds=options["seconds"],
@@ -98,10 +78,8 @@ def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
         )
 
 
-def _print(file: SystemFile, eps: Any, found: Lyapunov) -> None:
-    from kahanmaps.checks.settings import eps_record, eps_words
-
-    tell(f"# {file.name}{eps_words(eps_record(eps, file.map))}, double precision")
+def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
+    tell(f"# {file.name}{lib.eps_words(lib.eps_record(eps, file.map))}, double precision")
     tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
     tell(f"steps\t{found.steps} after {found.transient}")
     columns = {"per unit of time": found.mean} if file.map.has_time_step else {}
@@ -121,10 +99,7 @@ def _numbers(values: Any) -> list[float | None]:
     return [float(value) if isfinite(value) else None for value in values]
 
 
-def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes
-    from kahanmaps.checks.settings import eps_record
-
+def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.Lyapunov) -> dict[str, Any]:
     random = options["starts"] is None
     box = "1" if options["box"] is None else str(options["box"])
     return record_of(
@@ -132,12 +107,12 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov
         file,
         "float",
         variables=list(file.variables),
-        **eps_record(eps, file.map),
+        **lib.eps_record(eps, file.map),
         starts={"random": found.orbits, "box": box} if random else {"file": options["starts"]},
         seed=(options["seed"] or 0) if random else None,
         steps_asked=options["steps"],
         seconds=options["seconds"],
-        **attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
+        **lib.attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
         per_time=_numbers(found.mean),
         per_step=_numbers(found.mean * found.unit),
         spread=_numbers(found.spread),

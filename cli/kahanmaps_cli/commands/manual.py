@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from kahanmaps_cli import library as lib
+
 
 @click.command("manual")
 def command() -> None:
@@ -13,9 +15,8 @@ def command() -> None:
       kahanmaps manual | man -l -
       kahanmaps manual > kahanmaps.1
     """
-    from kahanmaps.version import __version__
     from kahanmaps_cli.main import SECTIONS, cli
     from kahanmaps_cli.manual_page import manual_page
 
     sections = {heading: list(commands) for heading, commands in SECTIONS.items()}
-    click.echo(manual_page(cli, sections, __version__), nl=False)
+    click.echo(manual_page(cli, sections, lib.__version__), nl=False)

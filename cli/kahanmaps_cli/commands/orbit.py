@@ -9,20 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from shutil import copyfileobj, get_terminal_size
 from tempfile import TemporaryFile
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import click
 
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.numbers import json_float, short_float
-from kahanmaps_cli.options import (
-    backward_option,
-    eps_of,
-    eps_options,
-    integral_option,
-    load_system,
-    quiet_option,
-    system_options,
-)
 from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer, meta_of
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.outputs import OutputFile
@@ -32,22 +25,19 @@ from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.streams import is_read
 
-if TYPE_CHECKING:
-    from kahanmaps.maps.orbits import OrbitEnd
-
 _FORMATS = ("text", "json", "jsonl", "csv", "npz", "npy")
 _TEXT = ("", ".txt", ".tsv", ".out", ".dat", ".log")  # endings of files of text
 _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 
 @click.command("orbit")
-@system_options
+@opt.system_options
 @click.option("--start", type=PointText(), required=True, metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
-@eps_options
+@opt.eps_options
 @click.option("--steps", type=int, metavar="N", help="How many steps to take.")
 @click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
 @click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
-@backward_option
+@opt.backward_option
 @click.option(
     "--arithmetic",
     type=Arithmetic(),
@@ -63,7 +53,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @click.option("--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="For ball:auto; default 15.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="What computes float orbits; numba needs [fast].")
-@integral_option(
+@opt.integral_option(
     "A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
     "the word known for all that theorems give (not in floats)."
 )
@@ -72,7 +62,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
-@quiet_option
+@opt.quiet_option
 def command(
     system: str | None,
     form: str | None,
@@ -115,10 +105,8 @@ def command(
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if at is not None and every != 1:
         raise click.UsageError("give --at N1,N2,... or --every K, not both")
-    from kahanmaps.maps.orbits import OrbitEnd
-
-    file = load_system(system, options)
-    eps = eps_of(file, options)
+    file = opt.load_system(system, options)
+    eps = opt.eps_of(file, options)
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"][0] != "float":
@@ -156,7 +144,7 @@ def command(
                     return 3  # the reader (head, say) has what it wanted, and the orbit may be long
             end = run.walk.end
         except OutputFull as full:
-            end = OrbitEnd("budget", full.steps, str(full))
+            end = lib.OrbitEnd("budget", full.steps, str(full))
         record = _end_record(end, run)
         writer.end(record)
     told = output is None and form == "text" and sys.stdout.isatty()  # the last line says how it ended
@@ -178,11 +166,11 @@ def _require_npy(options: dict[str, Any], output: str | None) -> None:
 
 def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
     """Float points, as fast as they come."""
-    from kahanmaps.maps.floats.fast import stream_orbit
-
     try:
         with interruptible(run.walk.interrupt), Progress(quiet) as progress:
-            end = stream_orbit(run.walk.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}"))
+            end = lib.stream_orbit(
+                run.walk.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}")
+            )
     except OSError as error:  # a full disk comes without a name
         error.filename = error.filename or output
         raise
@@ -196,7 +184,7 @@ def _stop() -> None:
     raise KeyboardInterrupt
 
 
-def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
+def _end_record(end: lib.OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     record: dict[str, Any] = {"status": end.status, "steps": end.steps, "message": end.message}
     if end.period is not None:
         record["period"] = end.period
@@ -238,10 +226,8 @@ def _form_from_name(output: str | None) -> str:
 
 @contextmanager
 def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
-    from kahanmaps.whole_files import sync, whole_file
-
     if output is not None and form == "npz":
-        with whole_file(output) as stream:
+        with lib.whole_file(output) as stream:
             yield stream
     elif output is not None:
         if form == "csv" and os.path.isdir(meta_of(output)):  # said before an older table is lost
@@ -249,7 +235,7 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
         try:
             with open(output, "w", encoding="utf-8", errors="backslashreplace") as stream:
                 yield stream
-                sync(stream)
+                lib.sync(stream)
         except OSError as error:  # a full disk comes without a name
             error.filename = error.filename or output
             raise

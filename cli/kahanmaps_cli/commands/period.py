@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, PointText
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json, record_of
 from kahanmaps_cli.terminal import tell
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.family.structure import Structure
-    from kahanmaps.maps.normal_form.periods import OrbitPeriod
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _WALK = "To walk instead: kahanmaps orbit ... --steps N says when the start comes back"
@@ -57,9 +53,6 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     Exit status: 0 found (or proved that there is none), 2 usage error, also where there is no normal form, 3 undecided,
     or the orbit comes to a point where it cannot be continued.
     """
-    from kahanmaps.errors import InputError
-    from kahanmaps.maps.normal_form.periods import period_of
-
     if (options["levels"] is None) == (options["start"] is None):
         raise click.UsageError("give --start X, or --levels N, one of the two")
     if options["levels"] is not None:
@@ -69,12 +62,12 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
     file = load_system(system, options)
     if not file.is_quadratic:
-        raise InputError(f"no period of {file.name} can be computed: {_structure(file)}. {_WALK}")
+        raise lib.InputError(f"no period of {file.name} can be computed: {_structure(file)}. {_WALK}")
     eps = the_eps(options["eps"], options["time_step"])
     _require_point(file, eps, options["start"], kind, prime)
     structure = _structure(file)
     if isinstance(structure, str):
-        raise InputError(
+        raise lib.InputError(
             f"no period of {file.name} can be computed: {structure}. Looked for a matrix A that makes it a member of "
             f"the commuting family with distinct roots of chi, and so a translation. {_WALK}"
         )
@@ -83,7 +76,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
             say(structure.text)
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
             say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
-    found = period_of(structure, eps, options["start"], prime if kind == "mod" else None)
+    found = lib.period_of(structure, eps, options["start"], prime if kind == "mod" else None)
     if as_json:
         print_json(_record(file, structure, eps, options, found))
     else:
@@ -96,31 +89,36 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     """The levels with a period; in the planes of a system if one is given."""
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.errors import InputError
-    from kahanmaps.maps.normal_form.division import PeriodicLevels, text_in_gamma
-    from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-
-    levels = PeriodicLevels(options["levels"])
+    levels = lib.PeriodicLevels(options["levels"])
     data: dict[str, Any] = {
         **envelope("period levels"),
         "period": levels.period,
-        "psi": text_in_gamma(levels.psi),
-        "primitive": text_in_gamma(levels.primitive),
-        "gamma": [format_number(gamma) for gamma in levels.gammas],
+        "psi": lib.text_in_gamma(levels.psi),
+        "primitive": lib.text_in_gamma(levels.primitive),
+        "gamma": [lib.format_number(gamma) for gamma in levels.gammas],
     }
     if system is not None or options["rhs"]:
         file = load_system(system, options)
         structure = _structure(file) if file.is_quadratic else "it is no Kahan map"
         if isinstance(structure, str):
-            raise InputError(f"no levels of {file.name} can be computed: {structure}")
+            raise lib.InputError(f"no levels of {file.name} can be computed: {structure}")
         eps = the_eps(options["eps"], options["time_step"])
-        data |= {"system": file.name, "eps": format_number(eps), "time_step": format_number(2 * eps), "planes": []}
+        data |= {
+            "system": file.name,
+            "eps": lib.format_number(eps),
+            "time_step": lib.format_number(2 * eps),
+            "planes": [],
+        }
         for part in structure.form.parts:
-            disc = PlanarBlock(*(part.h[3 - k, k] for k in range(4))).discriminant
+            disc = lib.PlanarBlock(*(part.h[3 - k, k] for k in range(4))).discriminant
             squares = levels.squares(disc, eps) if disc != 0 else ()
-            plane = {"root": format_number(part.root), "h": part.text, "D": part.D_text, "disc": format_number(disc)}
-            data["planes"].append({**plane, "squares": [format_number(square) for square in squares]})
+            plane = {
+                "root": lib.format_number(part.root),
+                "h": part.text,
+                "D": part.D_text,
+                "disc": lib.format_number(disc),
+            }
+            data["planes"].append({**plane, "squares": [lib.format_number(square) for square in squares]})
     if as_json:
         print_json(data)
         return 0
@@ -142,27 +140,22 @@ def _arithmetic(options: dict[str, Any]) -> str:
     return f"mod:{number}" if kind == "mod" else "exact"
 
 
-def _require_point(file: SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
+def _require_point(file: lib.SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
     """The same demands on eps, prime and start as orbits make, in the same words."""
-    from kahanmaps.algebra.fields import GF, QQ
-    from kahanmaps.maps.kahan import KahanMap
-
-    KahanMap(file.system, eps, GF(prime) if kind == "mod" else QQ).point(start)
+    lib.KahanMap(file.system, eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(start)
 
 
-def _structure(file: SystemFile) -> Structure | str:
+def _structure(file: lib.SystemFile) -> lib.Structure | str:
     """The normal form, or why there is none."""
-    from kahanmaps.family.structure import NoStructure
-
     structure = file.structure
-    return structure.reason if isinstance(structure, NoStructure) else structure
+    return structure.reason if isinstance(structure, lib.NoStructure) else structure
 
 
-def _message(found: OrbitPeriod) -> str:
+def _message(found: lib.OrbitPeriod) -> str:
     return found.text.splitlines()[0]
 
 
-def _print(file: SystemFile, eps: Any, arithmetic: str, found: OrbitPeriod) -> None:
+def _print(file: lib.SystemFile, eps: Any, arithmetic: str, found: lib.OrbitPeriod) -> None:
     tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
     tell(str(found))
 
@@ -172,11 +165,9 @@ def _text(number: int | None) -> str | None:
 
 
 def _record(
-    file: SystemFile, structure: Structure, eps: Any, options: dict[str, Any], found: OrbitPeriod
+    file: lib.SystemFile, structure: lib.Structure, eps: Any, options: dict[str, Any], found: lib.OrbitPeriod
 ) -> dict[str, Any]:
     """Numbers are text: periods exceed what readers of JSON hold exactly."""
-    from kahanmaps.algebra.plain import attributes, plain
-
     return record_of(
         "period",
         file,
@@ -184,12 +175,12 @@ def _record(
         structure=structure.text,
         eps=str(eps),
         time_step=str(2 * eps),
-        start=plain(options["start"]),
-        **attributes(found, "status", "meets_pole"),
+        start=lib.plain(options["start"]),
+        **lib.attributes(found, "status", "meets_pole"),
         period=_text(found.period),
         planes=[
             {
-                **attributes(plane, "name", "status", "meets_pole", "reason"),
+                **lib.attributes(plane, "name", "status", "meets_pole", "reason"),
                 "period": _text(plane.period),
                 "kind": plane.kind.name.lower(),
                 "kind_text": str(plane.kind),

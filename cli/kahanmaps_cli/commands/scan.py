@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import output_options
 from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
 from kahanmaps_cli.params import Seconds, Shard
@@ -15,9 +16,6 @@ from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.scan_run import ending, scan_options, scanned
 from kahanmaps_cli.terminal import tell
-
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.scan.result import Scan
 
 
 @click.command("scan")
@@ -87,18 +85,14 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     elif as_json:
         print_json(_record(found, options))
     else:
-        from kahanmaps.checks.settings import eps_record, eps_words
-
-        at = "" if "eps" in found.over else eps_words(eps_record(found.eps, found.file.map))
+        at = "" if "eps" in found.over else lib.eps_words(lib.eps_record(found.eps, found.file.map))
         tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
         tell(found.text)
     return ending(found, quiet)
 
 
-def _write(found: Scan, folder: str, quiet: bool) -> None:
+def _write(found: lib.Scan, folder: str, quiet: bool) -> None:
     """A system file for every component that has a rational member, in the place of those of an earlier scan."""
-    from kahanmaps.whole_files import write_whole
-
     known = [one for one in found.components if one.values is not None]
     name = file_name(found.file.name)
     paths = [Path(folder) / f"{name}-{k}.toml" for k in range(1, len(known) + 1)]
@@ -109,13 +103,11 @@ def _write(found: Scan, folder: str, quiet: bool) -> None:
     for path in earlier.difference(paths):
         path.unlink()
     for path, one in zip(paths, known, strict=True):
-        write_whole(str(path), found.member(one).to_toml().encode())
+        lib.write_whole(str(path), found.member(one).to_toml().encode())
     if not quiet:
         say(f"{folder}: {len(known)} system files")
 
 
-def _record(found: Scan, options: dict[str, Any]) -> dict[str, Any]:
-    from kahanmaps.checks.settings import eps_record
-
-    more = {**eps_record(found.eps, found.file.map), "seconds": options["seconds"], **found.to_json()}
+def _record(found: lib.Scan, options: dict[str, Any]) -> dict[str, Any]:
+    more = {**lib.eps_record(found.eps, found.file.map), "seconds": options["seconds"], **found.to_json()}
     return record_of("scan", found.file, "modulo primes", **more)

@@ -2,41 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from kahanmaps_cli.options import (
-    eps_options,
-    load_system,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import formula, tell
 
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.singular.outcomes import Hypersurface
-    from kahanmaps.laboratory.singular.singularities import SingularityRun
-
 
 @click.command("singularities")
-@system_options
-@eps_options
+@opt.system_options
+@opt.eps_options
 @click.option(
     "--steps",
     type=int,
     metavar="N",
     help="Steps to follow each hypersurface for (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
 )
-@seconds_option(60.0, "Time for each eps.")
-@seed_option
-@output_options
+@opt.seconds_option(60.0, "Time for each eps.")
+@opt.seed_option
+@opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Are the singularities of the map of SYSTEM confined, and after how many steps?
 
@@ -64,36 +52,28 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 done, 2 usage error, 3 undecided (stopped by the clock, or two points or two eps that differ).
     """
-    from kahanmaps.laboratory.singular.outcomes import UNDECIDED
-    from kahanmaps.laboratory.singular.singularities import default_eps, singularities, symbolic_denominator
+    from kahanmaps.laboratory.singular.singularities import default_eps
 
-    eps = the_eps(options["eps"], options["time_step"], required=False)
-    file = load_system(system, options)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    file = opt.load_system(system, options)
     with Progress(quiet) as progress:
         runs = [
-            singularities(
-                file.map,
-                value,
-                steps=options["steps"],
-                seed=options["seed"],
-                seconds=options["seconds"],
-                progress=progress,
-            )
+            lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "seconds"), progress=progress)
             for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))
         ]
     agree = len({run.shape for run in runs}) == 1
-    verdict = runs[0].verdict if agree else UNDECIDED
-    symbolic = symbolic_denominator(file.map) if eps is None else None
+    verdict = runs[0].verdict if agree else lib.UNDECIDED
+    symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
         print_json(_record(file, options, runs, symbolic, verdict))
     else:
         _print(file, runs, symbolic, runs[0].text if agree else verdict)
-    if verdict == UNDECIDED and not quiet:
+    if verdict == lib.UNDECIDED and not quiet:
         say(f"undecided: {_why(runs, agree)}")
-    return 3 if verdict == UNDECIDED else 0
+    return 3 if verdict == lib.UNDECIDED else 0
 
 
-def _why(runs: list[SingularityRun], agree: bool) -> str:
+def _why(runs: list[lib.SingularityRun], agree: bool) -> str:
     if any(run.stopped for run in runs):
         return "stopped by the clock: give more --seconds"
     if not agree:
@@ -101,7 +81,9 @@ def _why(runs: list[SingularityRun], agree: bool) -> str:
     return next(h.note for run in runs for h in run.hypersurfaces if h.note)
 
 
-def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str) -> None:
+def _print(
+    file: lib.SystemFile, runs: list[lib.SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str
+) -> None:
     name = file.map.denominator_name
     tell(f"# {file.name}, dimension {file.map.dim}" + (", eps is half the time step" if file.map.has_time_step else ""))
     if symbolic is not None:
@@ -115,30 +97,27 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
 
 
 def _record(
-    file: SystemFile,
+    file: lib.SystemFile,
     options: dict[str, Any],
-    runs: list[SingularityRun],
+    runs: list[lib.SingularityRun],
     symbolic: list[tuple[str, int]] | None,
     verdict: str,
 ) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes
-    from kahanmaps.laboratory.singular.singularities import steps_by_default
-
     return record_of(
         "singularities",
         file,
         "exact; series modulo primes",
         seed=options["seed"],
-        steps=options["steps"] or steps_by_default(file.map.dim),
+        steps=options["steps"] or lib.steps_by_default(file.map.dim),
         seconds=options["seconds"],
         verdict=verdict,
         symbolic_denominator=symbolic,
         runs=[
             {
-                **attributes(
+                **lib.attributes(
                     run, "verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text"
                 ),
-                **attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
+                **lib.attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
                 "eps": str(run.eps),
                 "time_step": str(2 * run.eps),
                 "maps_a_step": None if run.word is None else run.word.length,
@@ -149,15 +128,13 @@ def _record(
     )
 
 
-def _hypersurface(found: Hypersurface) -> dict[str, Any]:
-    from kahanmaps.algebra.plain import attributes
-
+def _hypersurface(found: lib.Hypersurface) -> dict[str, Any]:
     steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
     return {
-        **attributes(
+        **lib.attributes(
             found, "polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at"
         ),
-        **attributes(found, "followed", "settled_at", "note", "stage"),
+        **lib.attributes(found, "followed", "settled_at", "note", "stage"),
         **{name: [getattr(step, of) for step in found.steps] for name, of in steps.items()},
         "primes": [str(prime) for prime in found.primes],
     }

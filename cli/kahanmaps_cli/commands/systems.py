@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
 from kahanmaps_cli.render import envelope, print_json
@@ -30,23 +31,20 @@ def command(
       kahanmaps systems euler_top -p a1=2 --toml > my-top.toml
       kahanmaps systems lagrange_top --latex
     """
-    from kahanmaps.documents.catalog import load, titles
-    from kahanmaps.documents.families import FAMILIES
-
     if as_toml + as_latex + as_json > 1:
         raise click.UsageError("give --toml, --latex or --json, one of the three")
     if name is None:
         if as_toml or as_latex or parameters:
             raise click.UsageError("--toml, --latex and -p need the NAME of a system")
         if as_json:
-            systems = [_summary(load(key)) for key in titles()]
+            systems = [_summary(lib.load(key)) for key in lib.titles()]
             print_json({**envelope("systems"), "systems": systems})
             return
-        found = titles()
+        found = lib.titles()
         width = max(map(len, found))
         for key, (dim, title) in found.items():
             tell_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
-        for family in FAMILIES.values():
+        for family in lib.FAMILIES.values():
             tell_entry(f"{family.form:<{width}}   n  ", f"{family.title}, e.g. {family.example}", "bold")
         return
     file = load_reference(name, dict(parameters))
@@ -79,31 +77,24 @@ def _summary(file: Any) -> dict[str, Any]:
 
 
 def _equations(file: Any) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_rational_function
-    from kahanmaps.sources import source
-
     return {
         "variables": list(file.variables),
         **file.map.written(),
-        "integrals": {name: format_rational_function(function) for name, function in file.integrals.items()},
-        "density": format_rational_function(file.density) if file.density is not None else None,
+        "integrals": {name: lib.format_rational_function(function) for name, function in file.integrals.items()},
+        "density": lib.format_rational_function(file.density) if file.density is not None else None,
         "facts": list(file.catalog.get("facts", [])),
         "convention": file.catalog.get("convention", ""),
-        "sources": [source(key) for key in file.catalog.get("sources", [])],
+        "sources": [lib.source(key) for key in file.catalog.get("sources", [])],
     }
 
 
 def _known(file: Any) -> dict[str, Any]:
     """The structured facts, null where the file has none."""
-    from kahanmaps.documents.structured_facts import KEYS
-
-    return {key: file.document.get("catalog", {}).get(key) for key in KEYS}
+    return {key: file.document.get("catalog", {}).get(key) for key in lib.KEYS}
 
 
 def _known_lines(file: Any) -> list[str]:
     """The structured facts as lines for people."""
-    from kahanmaps.documents.structured_facts import relations
-
     known = _known(file)
     lines = []
     if known["verdict"]:
@@ -118,7 +109,7 @@ def _known_lines(file: Any) -> list[str]:
         lines.append(f"degrees of the iterates: {growth}")
     if known["codimension"] is not None:
         lines.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
-    for found in relations(file.catalog, file.variables):
+    for found in lib.relations(file.catalog, file.variables):
         count = "no relation" if not found.dimension else f"{found.dimension} relation{'s' * (found.dimension > 1)}"
         what = f"polynomials of {found.text}" if found.text.startswith("degree") else found.text
         lines.append(f"{count} along an orbit among: {what}")
@@ -127,31 +118,28 @@ def _known_lines(file: Any) -> list[str]:
 
 def _latex(file: Any) -> str:
     """The system or map as displayed formulas."""
-    from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
-    from kahanmaps.maps.kahan import Kahan
-
-    if isinstance(file.map, Kahan):  # with eps in its coefficients, if it is an adjusted one
-        names = [latex_name(name) for name in file.variables]
-        rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
+    if isinstance(file.map, lib.Kahan):  # with eps in its coefficients, if it is an adjusted one
+        names = [lib.latex_name(name) for name in file.variables]
+        rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
-        names = [latex_name(name) for name in file.variables]
-        rows = [rf"\tilde{{{x}}} &= {latex_rational_function(f)}" for x, f in zip(names, file.map.image, strict=True)]
+        names = [lib.latex_name(name) for name in file.variables]
+        rows = [
+            rf"\tilde{{{x}}} &= {lib.latex_rational_function(f)}" for x, f in zip(names, file.map.image, strict=True)
+        ]
     else:
-        rows = [f"{latex_polynomial(equation)} &= 0" for equation in file.map.equations]
+        rows = [f"{lib.latex_polynomial(equation)} &= 0" for equation in file.map.equations]
     lines = [r"\[", r"\left\{", r"\begin{aligned}", " \\\\\n".join(rows), r"\end{aligned}", r"\right.", r"\]"]
-    formulas = [("H", latex_polynomial(file.hamiltonian.H))] if file.hamiltonian is not None else []
+    formulas = [("H", lib.latex_polynomial(file.hamiltonian.H))] if file.hamiltonian is not None else []
     for name, integral in file.integrals.items():
-        formulas.append((latex_name(name) if name else "I", latex_rational_function(integral)))
+        formulas.append((lib.latex_name(name) if name else "I", lib.latex_rational_function(integral)))
     if file.density is not None:
-        formulas.append((latex_name("phi"), latex_rational_function(file.density)))
+        formulas.append((lib.latex_name("phi"), lib.latex_rational_function(file.density)))
     for name, text in formulas:
         lines += [r"\[", f"{name} = {text}", r"\]"]
     return "\n".join(lines)
 
 
 def _show(file: Any) -> None:
-    from kahanmaps.algebra.text import format_factored, format_polynomial
-
     facts = _equations(file)
     tell(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
@@ -159,11 +147,11 @@ def _show(file: Any) -> None:
     for line in str(file.map).split("\n"):
         tell(formula(line))
     if file.hamiltonian is not None:
-        tell(f"H = {formula(format_polynomial(file.hamiltonian.H))}")
+        tell(f"H = {formula(lib.format_polynomial(file.hamiltonian.H))}")
     for name, integral in file.integrals.items():
-        tell(f"integral {name} = {formula(format_factored(integral))}")
+        tell(f"integral {name} = {formula(lib.format_factored(integral))}")
     if file.density is not None:
-        tell(f"density phi = {formula(format_factored(file.density))}  (dx/phi is invariant)")
+        tell(f"density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
     known = _known_lines(file)
     if known:
         tell("for generic parameters and eps:" if file.parameters else "for generic eps:")

@@ -6,26 +6,18 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.options import (
-    eps_options,
-    evidence_options,
-    load_system,
-    output_options,
-    parameter_option,
-    system_argument,
-    the_eps,
-    verbose_option,
-)
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.verify_table import print_verification
 
 
 @click.command("verify")
-@system_argument
-@parameter_option
+@opt.system_argument
+@opt.parameter_option
 @draw_options
-@eps_options
+@opt.eps_options
 @click.option("--universal", is_flag=True, help="Not one member: everything at random over GF(p), for every member.")
 @click.option(
     "--beyond", is_flag=True, help="A table of what survives for other H, J, steps and A, with counterexamples."
@@ -48,10 +40,10 @@ from kahanmaps_cli.verify_table import print_verification
     help="Order in eps^2 of the series of the integrals.",
 )
 @click.option("--balls", "ball_bits", type=int, metavar="BITS", help="Also over complex balls, all roots enclosed.")
-@evidence_options
+@opt.evidence_options
 @click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown.")
-@verbose_option
-@output_options
+@opt.verbose_option
+@opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """Every statement of the paper of Petrera and Suris, put to the test for a member of its family.
 
@@ -73,11 +65,6 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
     Misprints are expected to be refuted and do not count.
     """
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.paper.survivors import survivors
-    from kahanmaps.paper.verifier import VerifyOptions
-    from kahanmaps.paper.verify import verify, verify_universal
-
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
     drawn = {name: options[name] for name in DRAWN}
@@ -93,13 +80,13 @@ def command(system: str | None, **options: Any) -> int:
     if system is None and options["parameters"]:
         raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
     with Progress(options["quiet"]) as progress:
-        settings = Settings(
-            eps=the_eps(options["eps"], options["time_step"], required=False),
+        settings = lib.Settings(
+            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
             seed=options["seed"],
             error_bits=options["error_bits"],
             progress=progress,
         )
-        what = VerifyOptions(
+        what = lib.VerifyOptions(
             options["sections"] or None,
             options["order"],
             options["ball_bits"],
@@ -107,13 +94,13 @@ def command(system: str | None, **options: Any) -> int:
             options["beyond"],
         )
         if options["beyond"] and not options["controls"]:
-            report = survivors(3 if drawn["m"] is None else drawn["m"], settings)
+            report = lib.survivors(3 if drawn["m"] is None else drawn["m"], settings)
         elif options["universal"] or options["beyond"]:
-            report = verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
+            report = lib.verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
             if system is not None:
-                file = load_system(system, {"parameters": options["parameters"]})
+                file = opt.load_system(system, {"parameters": options["parameters"]})
             else:
                 file = drawn_file(options)
-            report = verify(file, settings, what)
+            report = lib.verify(file, settings, what)
     return print_verification(report, options["as_json"], options["as_markdown"], options["verbose"], options["quiet"])

@@ -13,17 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
-from flint import fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
+from flint import acb, arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock, radical, without
 
 _SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
-_FLOAT = 50  # bits of a length
+_LEAST = arb(2) ** -50  # of the lengths at the roots, against the greatest
 _KARATSUBA = 8000  # bits from which on `_times` is faster
 
 
@@ -154,8 +154,8 @@ class ShortElements:
     def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
         self._algebra, self._bad, self._power = algebra, bad, bad**3
         found: Any = algebra.chi.complex_roots()
-        roots = [complex(float(root.real), float(root.imag)) for root, _ in found]
-        self._powers = [[root**k for k in range(algebra.degree)] for root in roots if root.imag >= 0]
+        # Balls: roots may be beyond the range of doubles.
+        self._powers = [[root**k for k in range(algebra.degree)] for root, _ in found if not root.imag < 0]
 
     def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
         """A value, not zero: short element and scale."""
@@ -216,12 +216,16 @@ class ShortElements:
         big = [[entry % part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)]
         big += [[part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
         lattice = fmpz_mat([row[degree:] for row in fmpz_mat(big).hnf().tolist()[degree:]])
-        scale = [2.0**60 * max(length / max(lengths), 2.0**-_FLOAT) for length in lengths]
-        table = [
-            [fmpz(int(s * x)) for powers, s in zip(self._powers, scale, strict=True) for x in _parts(powers, k)]
+        scale = [2.0**60 * max((length / max(lengths)).mid(), _LEAST) for length in lengths]
+        rounded: list[Any] = [
+            [
+                (s * x).mid().floor().unique_fmpz()
+                for p, s in zip(self._powers, scale, strict=True)
+                for x in _parts(p, k)
+            ]
             for k in range(degree)
         ]
-        _, change = (lattice * fmpz_mat(table)).lll(True)
+        _, change = (lattice * fmpz_mat(rounded)).lll(True)
         rows = (change * lattice).tolist()
         for signs in _signs(degree):
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
@@ -230,25 +234,26 @@ class ShortElements:
                 return short * fmpq(below, part)
         return None if below == 1 else self._algebra.convert(below)
 
-    def _lengths(self, integers: Sequence[fmpz]) -> list[float]:
-        """The absolute values at the roots, up to a common factor."""
-        shift = max(0, max(entry.bit_length() for entry in integers) - 2 * _FLOAT)
-        floats = [float(entry >> shift) for entry in integers]
-        smallest = max(map(abs, floats)) * 2.0**-_FLOAT
-        return [
-            max(smallest, abs(sum(c * power for c, power in zip(floats, powers, strict=True))))
-            for powers in self._powers
-        ]
+    def _lengths(self, integers: Sequence[fmpz]) -> list[arb]:
+        """About the absolute values at the roots."""
+        smallest = max(abs(entry) for entry in integers) * _LEAST
+        sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
+        return [max(smallest, abs(value).mid()) for value in sums]
 
 
 @lru_cache
 def _signs(count: int) -> list[tuple[int, ...]]:
-    """All vectors of -1, 0 and 1 but 0, up to sign, those with few entries first."""
-    found = sorted(product((0, 1, -1), repeat=count), key=lambda signs: (sum(map(abs, signs)), signs[::-1]))
-    return [signs for signs in found if next((s for s in signs if s), 0) > 0]
+    """Vectors of up to four 1 and -1, else 0, up to sign, those with few entries first."""
+    found = []
+    for entries in range(1, min(count, 4) + 1):
+        for places in combinations(range(count), entries):
+            for signs in product((1, -1), repeat=entries - 1):
+                chosen = dict(zip(places, (1, *signs), strict=True))
+                found.append(tuple(chosen.get(k, 0) for k in range(count)))
+    return found
 
 
-def _parts(powers: Sequence[complex], k: int) -> list[float]:
+def _parts(powers: Sequence[acb], k: int) -> list[arb]:
     """The k-th power of a root, as real and imaginary part unless the root is real."""
     return [powers[k].real] if powers[1].imag == 0 else [powers[k].real, powers[k].imag]
 
