@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
 from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from, two_variables
@@ -43,11 +44,6 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
 
     Exit status: 0 done, 2 usage error, 3 some points are missing (a map has no value there, or numbers are too long).
     """
-    from flint import fmpq
-
-    from kahanmaps.plots.draw_squares import draw_squares
-    from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, squares
-
     system, other = options["system"], options["other"]
     if is_inline(options) and system is not None and other is None:
         system, other = None, system  # the inline system is the first, the argument the second
@@ -57,16 +53,16 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
     file, second = load_pair(system, other, options)
     eps = eps_of(file if second is None or file.map.has_eps else second, options)
-    eps = fmpq(1) if eps is None else eps
+    eps = lib.fmpq(1) if eps is None else eps
     chosen = two_variables("--axes", options["axes"], file.variables)
     if second is None:
-        captions, pairs = list[str](), list(pairs_of_member(file))
+        captions, pairs = list[str](), list(lib.pairs_of_member(file))
     else:
         captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
-        pairs = [pair_of_systems(file, second, eps, options["eps2"])]
-    found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
+        pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
+    found = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
     below = goes_to_terminal(options)  # side by side, two panels of it are too coarse
-    figure = draw_squares(found, style_from(options), chosen, captions, below=below)
+    figure = lib.draw_squares(found, style_from(options), chosen, captions, below=below)
     talk = []
     for square in found:
         names = captions[0] if captions else " and ".join(square.pair.names)

@@ -7,11 +7,12 @@ import sys
 from functools import partial
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.errors import InputError
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.commands.heights import require_heights, surveyed
 from kahanmaps_cli.options import (
@@ -27,10 +28,6 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from
 from kahanmaps_cli.progress import Progress
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 _MAX_BYTES = 64_000_000
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
@@ -73,12 +70,9 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
     Exit status: 0 done, 2 usage error, 3 some system was stopped before a
     recurrence was found (the picture is written).
     """
-    from kahanmaps.plots.degree_records import degrees_of_record
-    from kahanmaps.plots.growth import draw_degrees
-
-    growths: dict[str, DegreeGrowth] = {}
+    growths: dict[str, lib.DegreeGrowth] = {}
     for path in options["records"]:
-        _add(growths, *degrees_of_record(read_record(path), path))
+        _add(growths, *lib.degrees_of_record(read_record(path), path))
     eps = the_eps(options["eps"], options["time_step"], required=False)
     inline = is_inline(options)
     asked: list[str | None] = list(options["systems"])
@@ -95,7 +89,7 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
         _add(growths, file.label, found)
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")
-    figure = draw_degrees(growths, style_from(options), scale=options["scale"])
+    figure = lib.draw_degrees(growths, style_from(options), scale=options["scale"])
     return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early else 0)
 
 
@@ -103,7 +97,7 @@ def _tell(progress: Progress, name: str, sentence: str) -> None:
     progress(f"{name}: {sentence}")
 
 
-def _add(growths: dict[str, DegreeGrowth], name: str, found: DegreeGrowth) -> None:
+def _add(growths: dict[str, lib.DegreeGrowth], name: str, found: lib.DegreeGrowth) -> None:
     """Two systems may have one name: the second is called name (2)."""
     names = chain([name], (f"{name} ({k})" for k in count(2)))
     growths[next(free for free in names if free not in growths)] = found
@@ -147,24 +141,21 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
     Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
     time was over before all orbits were finished (the picture is written).
     """
-    from kahanmaps.plots.growth import draw_heights
-    from kahanmaps.plots.height_curves import curves_of_record, height_curves
-
     require_heights(options)
-    file: SystemFile | None = None
+    file: lib.SystemFile | None = None
     digits = options["max_digits"]
     if options["record"] is not None:
         if options["system"] is not None or options["variables"] or options["rhs"]:
             raise click.UsageError("give a SYSTEM or --from FILE, not both")
         record = read_record(options["record"])
-        curves = curves_of_record(record, options["record"])
+        curves = lib.curves_of_record(record, options["record"])
         whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
     else:
         file = load_system(options["system"], options)
         eps = the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
-        curves, whole = height_curves(survey), survey.is_whole
-    figure = draw_heights(curves, style_from(options), scale=options["scale"])
+        curves, whole = lib.height_curves(survey), survey.is_whole
+    figure = lib.draw_heights(curves, style_from(options), scale=options["scale"])
     talk = []
     if short := sum(curve.status == "budget" for curve in curves):
         talk.append(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")

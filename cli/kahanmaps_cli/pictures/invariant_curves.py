@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, two_variables
 from kahanmaps_cli.progress import Progress
-
-if TYPE_CHECKING:
-    from kahanmaps.plots.invariant_curves import InvariantCurves
 
 
 @picture(
@@ -55,16 +53,14 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
 
     Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met a pole (the picture shows what came before).
     """
-    from kahanmaps.algebra.text import format_point
-    from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
-    from kahanmaps.plots.invariant_curves import find_invariant_curves
-
     file = load_system(options["system"], options)
     eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
     original = two_variables("--original", options["original"], file.variables)
-    found = find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
-    labels = [f"start {_short(format_point(start))}" for start in options["starts"]]
-    figure = draw_invariant_curves(found, style_from(options), options["projective"], options["flow"], original, labels)
+    found = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
+    labels = [f"start {_short(lib.format_point(start))}" for start in options["starts"]]
+    figure = lib.draw_invariant_curves(
+        found, style_from(options), options["projective"], options["flow"], original, labels
+    )
     is_whole = all(pole is None for pole in found.poles)
     return Drawn(figure, file, list(_told(found, options["projective"])), 0 if is_whole else 3)
 
@@ -73,12 +69,9 @@ def _short(text: str) -> str:
     return text if len(text) <= 30 else text[:30] + "..."
 
 
-def _told(found: InvariantCurves, projective: bool) -> Iterator[str]:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.plots.draw_invariant_curves import panels_of
-    from kahanmaps.plots.plane_views import view_of
+def _told(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:
 
-    eps, twice = _short(format_number(found.eps)), _short(format_number(2 * found.eps))
+    eps, twice = _short(lib.format_number(found.eps)), _short(lib.format_number(2 * found.eps))
     yield f"{found.structure}; eps = {eps} (time step 2 eps = {twice})"
     for k, pole in enumerate(found.poles, 1):
         if pole is not None:
@@ -91,8 +84,8 @@ def _told(found: InvariantCurves, projective: bool) -> Iterator[str]:
         return
     outside = [
         f"{view.outside} ({'' if column == 'uv' else column + ', '}lambda = {plane.root_text})"
-        for _, plane, column in panels_of(found)
-        if (view := view_of(plane, column)).outside
+        for _, plane, column in lib.panels_of(found)
+        if (view := lib.view_of(plane, column)).outside
     ]
     if outside:
         yield f"dots outside the windows: {', '.join(outside)}; --projective shows all of them"

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.scan_run import ending, names_of, primes_of, scan_options, scanned
@@ -34,15 +35,11 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     Exit status: 0 done, 2 usage error, 3 the time was over, 130 interrupted
     (the picture is written if something was found).
     """
-    from flint import fmpz
-
-    from kahanmaps.plots.scan import draw_scan
-
     window = window_from(options, 2)
     if window is not None and options["modulo"] is not None:
         raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
     modulo, primes = options["modulo"], primes_of(options["primes"])
-    if modulo is not None and not (modulo in primes if primes else fmpz(modulo).is_prime()):
+    if modulo is not None and not (modulo in primes if primes else lib.fmpz(modulo).is_prime()):
         raise click.UsageError(f"found --modulo {modulo}, expected one of the primes (--primes)")
     names = names_of(options)
     if len(names) != 2:
@@ -53,4 +50,4 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         return Drawn(
             None, talk=["there is no picture: nothing to be drawn was found before the scan ended"], status=status
         )
-    return Drawn(draw_scan(found, style_from(options), window=window, modulo=modulo), found.file, status=status)
+    return Drawn(lib.draw_scan(found, style_from(options), window=window, modulo=modulo), found.file, status=status)
