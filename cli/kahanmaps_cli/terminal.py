@@ -12,6 +12,7 @@ import re
 import shutil
 import sys
 from collections.abc import Sequence
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING, TextIO
 
 import click
@@ -30,6 +31,7 @@ NARROW = 60  # columns, below which there is no room for a table of texts
 _LABEL = 12
 _WORD_WIDTH = 10  # what words keep in a table that is too wide
 _BREAKABLE = re.compile(r"(?<=[*/,;])")
+_JOINED = "\0"  # a blank at which no line ends
 
 
 def on_terminal() -> bool:
@@ -189,35 +191,13 @@ def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]
     """
     room = max(8, width - len(rest))
     text = re.sub(rf"\d{{{room + 1},}}", lambda number: shorten(number[0], NUMBER_WIDTH), text)
-    words = re.sub(r" ([-+]) (?=\S)", r" \1" + "\0", text).split(" ")
-    lines = [first]
-    empty = True  # nothing but the margin on the last line
-    for word in words:
-        blank = "" if empty else " "
-        if len(lines[-1]) + len(blank) + len(word) <= width:
-            lines[-1] += blank + word
-        elif not word:  # a second blank, where the line ends anyway
-            continue
-        elif len(word) <= room:
-            lines.append(rest + word)
-        else:
-            if len(lines[-1]) + 8 > width:
-                lines.append(rest)
-                blank = ""
-            lines[-1] += blank
-            _fold(lines, word, width, rest)
-        empty = False
-    return [line.replace("\0", " ").rstrip() for line in lines]
+    text = re.sub(r" ([-+]) (?=\S)", r" \1" + _JOINED, text)
+    wrapper = _Wrapper(width, initial_indent=first, subsequent_indent=rest, replace_whitespace=False)
+    return [line.replace(_JOINED, " ").rstrip() for line in wrapper.wrap(text) or [first]]
 
 
-def _fold(lines: list[str], word: str, width: int, rest: str) -> None:
-    """Put a word that is longer than a line on the last line and on as many more as it needs."""
-    for piece in _BREAKABLE.split(word):
-        if len(lines[-1]) + len(piece) > width and len(piece) <= width - len(rest):
-            lines.append(rest)
-        while len(lines[-1]) + len(piece) > width:
-            room = width - len(lines[-1])
-            lines[-1] += piece[:room]
-            piece = piece[room:]
-            lines.append(rest)
-        lines[-1] += piece
+class _Wrapper(TextWrapper):
+    def _split(self, text: str) -> list[str]:
+        room = self.width - len(self.subsequent_indent)
+        words = (word for word in re.split("( +)", text) if word)
+        return [piece for word in words for piece in (_BREAKABLE.split(word) if len(word) > room else [word]) if piece]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
@@ -70,12 +70,7 @@ def evidence_rows(finding: Finding, room: Room = NOTEBOOK) -> list[tuple[str, st
 
 def because(evidence: Evidence, room: Room = NOTEBOOK) -> str:
     """What decided a claim: a sentence, and the hypotheses that were verified."""
-    hypotheses: Sequence[str] = evidence.data.get("hypotheses") or ()
-    if not hypotheses:
-        return _text(evidence.summary, room.text)
-    shown = "; ".join(hypotheses[: room.entries])
-    more = f"; and {len(hypotheses) - room.entries} more" if len(hypotheses) > room.entries else ""
-    return _text(f"{evidence.data['theorem']} applies: {shown}{more}", room.formula)
+    return _text(report_text.summary(evidence), room.formula if evidence.data.get("hypotheses") else room.text)
 
 
 def counts(findings: Iterable[Finding]) -> str:
@@ -154,18 +149,10 @@ def sections_table(findings: Iterable[Finding]) -> str:
 
 
 def _witness(witness: Witness, room: Room = NOTEBOOK) -> str:
-    def numbers(values: Sequence[str]) -> str:
-        shown = ", ".join(markup.shortened(value, room.number) for value in values[: room.entries])
-        return f"{shown}, … ({len(values)} numbers)" if len(values) > room.entries else shown
-
-    where = "" if witness.field == "QQ" else f" over {witness.field}"
-    eps = f", eps = {markup.shortened(witness.eps, room.number)}" if witness.eps else ""
-    lines = [f"x = ({numbers(witness.point)}){eps}{where}"]
-    lines += [f"{name} = ({numbers(vector)})" for name, vector in list(witness.vectors.items())[: room.entries]]
-    if len(witness.vectors) > room.entries:
-        lines.append(f"… and {len(witness.vectors) - room.entries} more vectors")
-    lines += [f"{witness.left_label} = {numbers(witness.left)}", f"{witness.right_label} = {numbers(witness.right)}"]
-    return "<br/>".join(markup.escape(markup.shortened(line, room.formula)) for line in lines)
+    lines = report_text.witness_lines(witness, room.number)
+    if (more := len(witness.vectors) - room.entries) > 0:
+        lines[room.entries + 1 : -2] = [f"… and {more} more vectors"]
+    return "<br/>".join(_text(line.strip().removeprefix("witness: "), room.formula) for line in lines)
 
 
 def _text(text: str, width: int = _TEXT) -> str:

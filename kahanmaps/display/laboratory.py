@@ -1,18 +1,26 @@
-"""How the results of the laboratory look in a notebook: bounded in size, nothing computed anew."""
+"""How the results of the laboratory look: the lines of their command for `print`, the same as a table in a notebook.
+
+What a result says is written once, as lines of cells (`lines_of`). `print` puts tabs between cells; a notebook makes a
+table of them, bounded in size, with formulas set and verdicts marked. Nothing is computed anew.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import singledispatch
+from itertools import islice
+from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.text import format_number
-from kahanmaps.display import laboratory_text as laboratory_text  # registers what `print` shows
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.checks.settings import eps_record, eps_words
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
-from kahanmaps.displayed import html_form
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.displayed import html_form, text_form
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.finite.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
@@ -22,16 +30,43 @@ from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
-from kahanmaps.laboratory.scan.result import Scan, growth_on
+from kahanmaps.laboratory.scan.result import Scan
+from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun
-from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
+from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import SIGNED, Symmetries
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.systems.quadratic import QuadraticSystem
 
-_ROWS = 20
-_FORMULAS = 5  # rows of which each has several formulas
-_STATEMENTS = 60
+_ROWS = 60  # of a table in a notebook
 _TEXT = 300
+_LENGTHS_SHOWN = 12
+WORDS = (
+    "proved: an identity of rational functions, or a theorem; supported: true at random points; explained: follows "
+    "from singularities that were measured; measured: modulo primes or along orbits, which is evidence"
+)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A cell that a notebook shows in another way than as its text: `html` makes it."""
+
+    text: str
+    html: Callable[[], str]
+
+    def __str__(self) -> str:
+        return self.text
+
+
+Line = Sequence[object]  # cells: `Shown`, or what str() makes a text of
+
+
+def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> Shown:
+    return Shown(text, lambda: formula(function, name, CHARACTERS))
+
+
+def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> Shown:
+    return _formula(format_polynomial(polynomial), polynomial, name)
 
 
 def eps_sentence(eps: fmpq | None, map_: BirationalMap | None = None) -> str:
@@ -42,8 +77,61 @@ def eps_sentence(eps: fmpq | None, map_: BirationalMap | None = None) -> str:
     return markup.eps_words() if eps is None else markup.eps_words(format_number(eps), format_number(2 * eps))
 
 
-def _words(*parts: str) -> str:
-    return ", ".join(filter(None, parts))
+@singledispatch
+def lines_of(found: object) -> Iterator[Line]:
+    """What a result says, line by line: the lines of its command below the heading."""
+    raise TypeError(f"no lines are known of a {type(found).__name__}")
+
+
+def result_text(found: object) -> str:
+    """The lines of a result, cells between tabs."""
+    return "\n".join("\t".join(map(str, line)) for line in lines_of(found))
+
+
+def result_html(found: Any, map_: BirationalMap | None = None) -> str:
+    """The lines of a result as a table; `map_` tells what eps is, where it is not Kahan's."""
+    rows = [[_cell(cell) for cell in line] for line in islice(lines_of(found), _ROWS + 1)]
+    more = "\n<p>… and more: print shows all</p>" if len(rows) > _ROWS else ""
+    title, beside = _TITLES[type(found)](found)
+    if map_ is not None:
+        beside = eps_sentence(found.eps, map_)
+    return markup.titled(title, (markup.table((), rows[:_ROWS]) if rows else "<p>none</p>") + more, beside)
+
+
+def _cell(cell: object) -> str:
+    if isinstance(cell, Shown):
+        return cell.html()
+    text = str(cell).strip().removeprefix("# ")
+    return markup.verdict(text) if text in markup.WORDS else _text(text)
+
+
+def _text(text: str, width: int = _TEXT) -> str:
+    return markup.escape(markup.shortened(text, width))
+
+
+# -- a whole analysis
+
+
+def analysis_title(found: Analysis) -> str:
+    """The system, its dimension and parameters, and for which eps the report is."""
+    step = eps_words(eps_record(found.eps, found.file.map))
+    values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
+    formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
+    return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"
+
+
+def analysis_head(found: Analysis) -> str:
+    """What stands above the sections: the title, the equations, what the words mean."""
+    return f"analyze: {analysis_title(found)}\n{found.file.map}\n{WORDS}"
+
+
+@text_form.register
+def analysis_text(found: Analysis) -> str:
+    """The whole report."""
+    lines = [analysis_head(found)]
+    for name, told in found.sections:
+        lines += ["", name, *(f"{line.status}\t{line.text}" for line in told)]
+    return "\n".join([*lines, "", "verdict", f"{found.conclusion.kind}\t{found.conclusion.sentence}"])
 
 
 @html_form.register
@@ -51,219 +139,250 @@ def analysis_html(found: Analysis) -> str:
     """The verdict first, then the statements."""
     final = found.conclusion
     statements = [(title, line) for title, lines in found.sections for line in lines]
-    rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_STATEMENTS]]
-    more = f"<p>… and {len(statements) - _STATEMENTS} more statements</p>" if len(statements) > _STATEMENTS else ""
+    rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_ROWS]]
+    more = f"<p>… and {len(statements) - _ROWS} more statements</p>" if len(statements) > _ROWS else ""
     inside = [
         f"<p>{map_html(found.file.map)}</p>",
         f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
         markup.table(["", "known how", ""], rows) + more,
     ]
-    more = _words(f"dimension {found.dim}", eps_sentence(found.eps, found.file.map))
-    return markup.titled(_name(found.file), "\n".join(inside), more)
+    beside = ", ".join(filter(None, (f"dimension {found.dim}", eps_sentence(found.eps, found.file.map))))
+    return markup.titled(markup.shortened(found.file.name), "\n".join(inside), beside)
 
 
-@html_form.register
-def integrals_html(search: IntegralSearch) -> str:
-    """The integrals with their verdicts, and how many there should be."""
-    rows = [
-        (formula(one.function, one.name, CHARACTERS), markup.verdict(one.verdict), _text(one.origin))
-        for one in search.integrals[:_FORMULAS]
-    ]
-    rows += [
-        (f"{one.name} = {_code(one.text)}", markup.verdict(one.verdict), _text(one.origin))
-        for one in search.in_iterates
-    ]
-    said = f"{search.found} found; {search.count_text}"
-    notes = _notes([_rest(search.integrals, _FORMULAS), search.note, search.reason])
-    inside = markup.table(["integral", "verdict", "found by"], rows) if rows else ""
-    more = eps_sentence(search.eps, search.file.map)
-    return markup.titled(f"integrals of {_name(search.file)}", f"{inside}\n<p>{said}</p>{notes}", more)
+# -- what is preserved
 
 
-@html_form.register
-def densities_html(search: DensitySearch) -> str:
-    """The densities phi with dx/phi invariant."""
-    rows = [(formula(one.function, "phi", CHARACTERS), markup.verdict(one.verdict)) for one in search.shown]
-    inside = markup.table(["dx/phi is invariant", "verdict"], rows) if rows else ""
-    notes = _notes([search.further, search.note, search.reason])
-    more = eps_sentence(search.eps, search.file.map)
-    return markup.titled(f"densities of {_name(search.file)}", inside + notes, more)
+@lines_of.register
+def _integrals(found: IntegralSearch) -> Iterator[Line]:
+    """Every formula with its verdict and what that rests on, then why there are no more."""
+    return _formulas([(one.name, one, "") for one in found.integrals], (found.note, found.reason))
 
 
-@html_form.register
-def poisson_html(search: PoissonSearch) -> str:
-    """The tensors by their brackets, and what is known of each."""
-    rows = []
-    for one in search.tensors[:_FORMULAS]:
-        brackets = list(one.tensor.brackets.items())[:_ROWS]
-        lines = [formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets]
-        rows.append(("<br/>".join(lines), markup.verdict(one.verdict), _text(one.statement)))
-    inside = markup.table(["brackets", "verdict", ""], rows) if rows else ""
-    inside += _notes([_rest(search.tensors, _FORMULAS), search.note, search.reason])
-    return markup.titled(f"Poisson tensors of {_name(search.file)}", inside, eps_sentence(search.eps, search.file.map))
+@lines_of.register
+def _densities(found: DensitySearch) -> Iterator[Line]:
+    """The formula with its verdict and what that rests on, then what more there is, or why there is none."""
+    return _formulas([("phi", one, "") for one in found.shown], (found.further, found.note, found.reason))
 
 
-@html_form.register
-def darboux_html(search: DarbouxSearch) -> str:
-    """The spaces of Darboux polynomials by cofactor."""
-    rows = [
-        (
-            _code(space.cofactor),
-            "<br/>".join(formula(P, characters=CHARACTERS) for P in space.polynomials[:4]),
-            markup.verdict(space.verdict),
-        )
-        for space in search.spaces[:_FORMULAS]
-    ]
-    inside = markup.table(["cofactor", "polynomials", "verdict"], rows) if rows else "<p>none</p>"
-    notes = _notes([_rest(search.spaces, _FORMULAS), search.reason])
-    more = _words(f"up to degree {search.degree}", eps_sentence(search.eps, search.file.map))
-    return markup.titled(f"Darboux polynomials of {_name(search.file)}", inside + notes, more)
+@lines_of.register
+def _tensors(found: PoissonSearch) -> Iterator[Line]:
+    """Every tensor with its verdict and what is known of it, then why there are no more."""
+    named = [(one.name, one, f"{one.statement}; ") for one in found.tensors]
+    return _formulas(named, (found.note, found.reason))
 
 
-@html_form.register
-def degrees_html(found: DegreeGrowth) -> str:
-    """The degrees of the iterates, and what they say."""
-    lines = [line.split("\t", 1) for line in found.text.split("\n")]
-    rows = [(word, _text(rest)) for word, rest in lines[:_ROWS]]
-    return markup.titled("degrees of the iterates", markup.definitions(rows), "measured, " + eps_sentence(found.eps))
+def _formulas(named: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> Iterator[Line]:
+    for name, one, what in named:
+        is_tensor = hasattr(one, "tensor")
+        yield name, one.verdict, _brackets(one) if is_tensor else _formula(one.text, one.function, name)
+        yield "", f"{what}{one.evidence.summary}"
+    yield from (("note", text) for text in notes if text)
 
 
-@html_form.register
-def heights_html(survey: HeightSurvey) -> str:
-    """The kind of growth of each orbit."""
-    rows = [
-        (
-            *([_text(format_number(one.eps))] if survey.has_eps else []),
-            _text(", ".join(map(format_number, one.start))),
-            _text(str(one.growth.kind)),
-            str(len(one.growth.heights)),
-            _text(one.growth.end.message),
-        )
-        for one in survey.orbits[:_ROWS]
-    ]
-    head = [*(["eps"] if survey.has_eps else []), "start", "growth", "heights", "ended"]
-    inside = markup.table(head, rows) + _notes([_rest(survey.orbits)])
-    step = "the time step is 2 eps" if survey.has_eps else ""
-    return markup.titled("heights of exact orbits", f"<p>{_text(survey.text)}</p>\n{inside}", step)
-
-
-@html_form.register
-def singularities_html(run: SingularityRun, map_: BirationalMap | None = None) -> str:
-    """Each contracted hypersurface and its outcome; `map_` tells what eps is, where it is not Kahan's."""
-    rows = [
-        (
-            _code(h.polynomial),
-            _text(h.status),
-            "" if h.contracted_at is None else str(h.contracted_at),
-            "" if h.confined_at is None else str(h.confined_at),
-        )
-        for h in run.hypersurfaces[:_ROWS]
-    ]
-    inside = markup.table(["hypersurface", "outcome", "contracted at step", "confined at step"], rows) if rows else ""
-    inside += _notes([_rest(run.hypersurfaces)])
-    return markup.titled(f"singularities: {run.text}", inside, eps_sentence(run.eps, map_))
-
-
-@html_form.register
-def symmetries_html(found: Symmetries) -> str:
-    """Symmetries and reversing symmetries."""
-    rows: list[tuple[str, str]] = [
-        ("infinitesimal", _text(f"({', '.join(one.rhs)})")) for one in found.infinitesimal[:_ROWS]
-    ]
-    if found.group_text:
-        rows.append(("group", f"{found.group_text}, generated by"))
-    others = found.others if found.group_of == SIGNED else []
-    rows += [(one.kind, _text(one.text)) for one in (*found.generators[:_ROWS], *others[:_ROWS])]
-    inside = (markup.definitions(rows) if rows else "<p>none but the identity</p>") + _notes(
-        [_rest(others), *found.undecided]
-    )
-    return markup.titled("affine symmetries of the map", inside, "proved, for every eps")
-
-
-@html_form.register
-def commuting_html(found: CommutingSystems) -> str:
-    """The systems whose Kahan maps commute."""
-    rows = [
-        (
-            equations_html(one.system, CHARACTERS // 4),
-            _text(one.trivial and f"g = {one.trivial}"),
-            markup.verdict(one.finding.verdict),
-        )
-        for one in sorted(found.solutions, key=lambda one: bool(one.trivial))[:_FORMULAS]
-    ]
-    rows += [
-        (
-            equations_html(family.base.system, CHARACTERS // 4),
-            f"and {len(family.directions)} directions",
-            markup.verdict(family.finding.verdict),
-        )
-        for family in found.families[:_FORMULAS]
-    ]
-    rest = [_rest(found.solutions, _FORMULAS), _rest(found.families, _FORMULAS)]
-    notes = _notes([*rest, "every g commutes" * found.every_g_commutes, *found.irrational, *found.undecided])
-    inside = markup.table(["g", "", "commutes"], rows) if rows else ""
-    return markup.titled("systems x' = g(x) whose Kahan maps commute", inside + notes, f"{found.shape} g, every eps")
-
-
-@html_form.register
-def census_html(census: Census) -> str:
-    """The counts of points and cycles."""
-    kind = "all points" if census.complete else "random points"
-    rows = [
-        ("points", f"{census.points} ({kind}: {census.looked_at} looked at)"),
-        ("on cycles", str(census.periodic)),
-        ("cycles", "not counted" if census.cycles is None else str(census.cycles)),
-        ("longest cycle", str(census.longest)),
-        ("lost, falling, transient, open", f"{census.lost}, {census.falling}, {census.transient}, {census.open}"),
-    ]
-    title = f"cycles on P^{census.dim} over GF({census.prime})"
-    return markup.titled(title, markup.definitions(rows), eps_sentence(census.eps))
-
-
-@html_form.register
-def scan_html(found: Scan) -> str:
-    """The conditions on the parameters by degrees, those with the slowest growth first."""
-    rows = [("in general", _text(", ".join(map(str, found.generic))), "")]
-    for degrees, some in found.classes[:_ROWS]:
-        where = "; ".join(one.text if one.is_confirmed else f"{one.text} (not confirmed)" for one in some)
-        growth = growth_on(some)
-        told = "" if growth is None else growth.kind_text
-        rows.append((_text(where), _text(", ".join(map(str, degrees))), _text(told)))
-    notes = _notes([_rest(found.classes), found.coverage])
-    more = _words(f"over {', '.join(found.over)}", eps_sentence(found.eps, found.file.map))
-    return markup.titled(
-        f"scan of {_name(found.file)}", markup.table(["where", "degrees", "growth"], rows) + notes, more
+def _brackets(one: Any) -> Shown:
+    brackets = islice(one.tensor.brackets.items(), _ROWS)
+    return Shown(
+        one.text, lambda: "<br/>".join(formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets)
     )
 
 
-@html_form.register
-def structures_html(found: ConstantStructures) -> str:
+@lines_of.register
+def _darboux(found: DarbouxSearch) -> Iterator[Line]:
+    """The law, the polynomials by cofactor, or that there are none."""
+    meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(found.cofactors) else ""
+    law = f"P(x~) = C P(x){meaning}; spaces spanned by products left out"
+    yield ("P' = K P, irreducible; integrals left out" if found.flow else law,)
+    for space in found.spaces:
+        yield (f"{'K' if found.flow else 'C'} = {space.cofactor}",)
+        yield from (("", space.verdict, _polynomial(P)) for P in space.polynomials)
+    if found.reason:
+        yield "note", found.reason
+    elif not found.spaces:
+        yield (f"none of degree up to {found.degree}",)
+
+
+@lines_of.register
+def _structures(found: ConstantStructures) -> Iterator[Line]:
     """The Hamiltonian form, or why there is none."""
     if found.hamiltonian is None:
-        word = markup.verdict("proved" if found.proved else "undecided")
-        return markup.titled("not Hamiltonian with a constant J", f"<p>{word}: {_text(found.reason)}</p>")
-    kind = "the standard J" if found.hamiltonian.is_standard else "a constant skew J"
-    rows = [("H", formula(found.hamiltonian.H, characters=CHARACTERS))]
-    rows += [("Casimir", formula(casimir, characters=CHARACTERS)) for casimir in found.casimirs[:_ROWS]]
-    return markup.titled(f"Hamiltonian with {kind}", markup.definitions(rows), "proved")
+        yield (f"not Hamiltonian with a constant J: {found.reason}",)
+        return
+    yield "H", _polynomial(found.hamiltonian.H)
+    yield "J", found.hamiltonian.J.tolist()
+    yield from (("Casimir", _polynomial(casimir)) for casimir in found.casimirs)
 
 
-def _name(file: SystemFile) -> str:
-    return markup.shortened(file.name)
+# -- growth and singularities
 
 
-def _notes(texts: Iterable[str]) -> str:
-    return "".join(f"\n<p>{_text(text)}</p>" for text in list(texts)[:_ROWS] if text)
+@lines_of.register
+def _growth(found: DegreeGrowth | Scan) -> Iterator[Line]:
+    """The lines that it has itself."""
+    return (line.split("\t") for line in found.text.split("\n"))
 
 
-def _rest(found: Sequence[object], shown: int = _ROWS) -> str:
-    """How many are not shown, empty where all are."""
-    return f"… and {len(found) - shown} more" if len(found) > shown else ""
+@lines_of.register
+def _heights(found: HeightSurvey) -> Iterator[Line]:
+    """A line for each orbit, and what they say together."""
+    for orbit in found.orbits:
+        point = ",".join(format_number(entry) for entry in orbit.start)
+        yield "orbit", *([f"eps {orbit.eps}"] if found.has_eps else []), f"start {point}", orbit.growth.text
+    yield "heights", found.text
 
 
-def _code(text: str) -> str:
-    return f"<code>{_text(text)}</code>"
+@lines_of.register
+def _census(census: Census) -> Iterator[Line]:
+    """The counts, and the longest cycles."""
+    yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}"
+    if census.is_undefined:
+        yield "map", "singular everywhere modulo this prime"
+    elif census.factor is None:
+        yield "map", f"forms of degree {census.degree}; a common factor was not looked for"
+    elif census.factor != "1":
+        yield "map", f"forms of degree {census.degree}, a common factor divided out"
+    yield "lost", census.lost
+    yield "falling", census.falling
+    if census.complete:
+        yield "transient", census.transient
+    else:
+        yield "open", f"{census.open} after {census.steps} steps"
+    yield "periodic", census.periodic
+    if census.cycles:
+        yield "cycles", f"{census.cycles}, longest {census.longest}, mean {census.mean:.2f}"
+        if census.at_infinity:
+            yield "at infinity", f"{sum(census.at_infinity.values())} of them"
+        if census.symmetric is not None:
+            yield "symmetric", f"{sum(census.symmetric.values())} of the others"
+    shown = list(census.lengths.items())[-_LENGTHS_SHOWN:]
+    if shown:
+        what = "length x cycles" if census.complete else "length x points"
+        more = "... " if len(census.lengths) > len(shown) else ""
+        yield what, more + " ".join(f"{length}x{n}" for length, n in shown)
 
 
-def _text(text: str, width: int = _TEXT) -> str:
-    return markup.escape(markup.shortened(text, width))
+@lines_of.register
+def _singularities(run: SingularityRun) -> Iterator[Line]:
+    """The denominator, and each hypersurface with its outcome."""
+    yield (f"# map of degree {run.map_degree}, {run.text}",)
+    if run.word is not None:
+        yield (f"# {run.word.text}",)
+    yield "denominator", run.denominator
+    for found in run.hypersurfaces:
+        kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
+        kind += " in all" if found.polynomial == "?" else ""
+        kind += "" if found.stage is None else f", of map {found.stage + 1}"
+        yield found.polynomial, kind, _outcome(found)
+        if found.steps:
+            ranks = " ".join(str(step.rank) for step in found.steps)
+            poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
+            yield f"  ranks {ranks}", f"poles {poles}"
+
+
+def _outcome(found: Hypersurface) -> str:
+    if found.status == "confined":
+        return f"contracted by step {found.contracted_at}, confined after {found.confined_at} steps"
+    if found.status == "not confined":
+        return f"contracted by step {found.contracted_at}, not confined within {found.followed} steps"
+    return found.status + (f": {found.note}" if found.note else "")
+
+
+# -- symmetries
+
+
+@lines_of.register
+def _symmetries(found: Symmetries) -> Iterator[Line]:
+    """One-parameter groups, a scaling, the finite group by its generators, and what was searched."""
+    for x in found.infinitesimal:
+        kind = "linear" if x.is_linear else "affine"
+        yield "one-parameter group", f"{kind}, the flow of ({', '.join(x.rhs)})"
+    if found.scaling is not None:
+        rhs = ", ".join(found.scaling.rhs)
+        yield "scaling", f"the flow of ({rhs}) by t takes the map at eps to that at e^-t eps"
+    if found.order is not None:
+        yield "group", found.group_text or "the identity alone"
+    elements = [("generator", t) for t in found.generators]
+    elements += [("besides", t) for t in found.others if found.group_of == SIGNED]
+    for name, t in elements:
+        yield name, f"{t.kind} {t.text}", *["obvious"] * t.obvious
+    yield from (("searched", sentence) for sentence in found.searched)
+    yield (f"# {'complete: every search came to its end' if found.complete else f'undecided: {found.undecided[0]}'}",)
+
+
+@lines_of.register
+def _commuting(found: CommutingSystems) -> Iterator[Line]:
+    """The g that commute other than 0, f and -f, each with g as options of any other command."""
+    if found.dimension is not None:
+        yield "bracket", f"the g with [f, g] = 0 have dimension {found.dimension}"
+    if found.every_g_commutes:
+        yield "proved", "f = 0 and its map is x -> x: every g commutes"
+    told: list[QuadraticSystem] = []
+    for g in found.nontrivial:
+        if g.system.scaled(-1) not in told:
+            told.append(g.system)
+            yield g.finding.verdict, "g and -g", _pasted(g, found.root)
+            yield "", g.finding.evidence.summary
+    for family in found.families:
+        letters = [f"t{k + 1}" for k in range(len(family.directions))]
+        base = "" if family.base.trivial == "0" else "base + "
+        total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
+        yield family.finding.verdict, "family", f"g = {base}{total} for all {', '.join(letters)}"
+        named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
+        yield from (("", name, _pasted(g, found.root)) for name, g in named)
+        yield "", family.finding.evidence.summary
+    if found.irrational:
+        yield "note", f"more solutions, not rational: {'; '.join(found.irrational)}"
+    if found.discarded:
+        yield "note", f"{found.discarded} solutions of the equations up to eps^{found.order} do not commute"
+    if found.every_g_commutes:
+        yield ("# complete: every g commutes",)
+    elif found.complete:
+        listed = bool(told or found.families or found.irrational)
+        but = "these, 0, f and -f" if listed else "0, f and -f"
+        yield (f"# complete: among the {found.kind_text} only {but} commute with f",)
+    else:
+        yield (f"# undecided: there may be more; {found.undecided[0]}",)
+
+
+def _pasted(g: CommutingField, root: str) -> Shown:
+    """The system as options of any other command, and B below it where g = B f; in a notebook its equations."""
+    texts = [f"--rhs='{text}'" for text in g.rhs]
+    text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
+    if root:
+        text = f"{text} -p '{g.system.symbols[0]}={root}'"
+    if g.B is not None:
+        rows = [", ".join(map(str, row)) for row in g.B.tolist()]
+        text += f"\n\tB = [{', '.join(f'[{row}]' for row in rows)}]"
+    return Shown(text, lambda: equations_html(g.system, CHARACTERS // 4))
+
+
+# -- titles
+
+
+def _about(what: str, found: Any, *beside: str) -> tuple[str, str]:
+    """A title with the name of the system, and what stands beside it, for which eps last."""
+    words = (*beside, eps_sentence(found.eps, found.file.map))
+    return f"{what} of {markup.shortened(found.file.name)}", "; ".join(filter(None, words))
+
+
+# What has a title here is shown by its lines: the title, and what stands beside it.
+_TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
+    IntegralSearch: lambda found: _about("integrals", found, f"{found.found} found; {found.count_text}"),
+    DensitySearch: lambda found: _about("densities", found, "dx/phi is invariant"),
+    PoissonSearch: lambda found: _about("Poisson tensors", found),
+    DarbouxSearch: lambda found: _about("Darboux polynomials", found, f"by cofactor, up to degree {found.degree}"),
+    ConstantStructures: lambda found: (
+        "Hamiltonian with a constant J" if found.hamiltonian else "not Hamiltonian with a constant J",
+        "proved" if found.proved or found.hamiltonian else "undecided",
+    ),
+    DegreeGrowth: lambda found: ("degrees of the iterates", f"measured, {eps_sentence(found.eps)}"),
+    Scan: lambda found: _about("scan", found, f"over {', '.join(found.over)}"),
+    HeightSurvey: lambda found: ("heights of exact orbits", "the time step is 2 eps" if found.has_eps else ""),
+    Census: lambda found: (f"cycles on P^{found.dim} over GF({found.prime})", eps_sentence(found.eps)),
+    SingularityRun: lambda found: (f"singularities: {found.text}", eps_sentence(found.eps)),
+    Symmetries: lambda found: ("affine symmetries of the map", "proved, for every eps"),
+    CommutingSystems: lambda found: ("systems x' = g(x) whose Kahan maps commute", f"{found.shape} g, every eps"),
+}
+for _kind in _TITLES:
+    text_form.register(_kind, result_text)
+    html_form.register(_kind, result_html)

@@ -14,9 +14,8 @@ from collections.abc import Sequence
 
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
-from kahanmaps.algebra.reading import factors_of, first_terms, terms_of
-from kahanmaps.algebra.text import shorter_factors, sides
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.reading import Notation, first_terms
 from kahanmaps.displayed import latex_form
 from kahanmaps.errors import InputError, counted
 
@@ -78,17 +77,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
     >>> print(latex_polynomial(parse_polynomial("x1^3/3 - eps^12*x1 + 1/2", ["x1", "eps"])))
     -\varepsilon^{12} x_1 + \frac{1}{3} x_1^3 + \frac{1}{2}
     """
-    names = names_of(polynomial)
-    order = sorted(range(len(names)), key=lambda k: names[k] != "eps")
-    ordered = [latex_name(names[k]) for k in order]
-    text = ""
-    for monomial, coefficient in terms_of(polynomial):
-        term = " ".join(factors_of(abs(coefficient), [monomial[k] for k in order], ordered, _power, latex_number))
-        if coefficient < 0:
-            text += f" - {term}" if text else f"-{term}"
-        else:
-            text += f" + {term}" if text else term
-    return text or "0"
+    return LATEX.polynomial(polynomial)
 
 
 @latex_form.register
@@ -96,40 +85,13 @@ def latex_rational_function(function: RationalFunction) -> str:
     r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction, in factors where they
     are shorter.
 
-    Both sides of a fraction start with a positive term. Common factors stay, as they do in `RationalFunction`.
-
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
     -\frac{x + 2}{2 \varepsilon^2 x - 2}
     >>> print(latex_rational_function(parse_rational_function("-2*(x + 1)^2*y/3", ["x", "y"])))
     -\frac{2 y \left(x + 1\right)^2}{3}
     """
-    found = shorter_factors(function)
-    if found is not None:
-        factors, constant = found
-        above, below = (
-            latex_polynomial(powers[0][0])
-            if number == 1 and [k for _, k in powers] == [1]
-            else " ".join([str(number)] * (number > 1 or not powers) + [_latex_power(g, k) for g, k in powers])
-            for number, powers in sides(factors, constant)
-        )
-        return ("-" if constant < 0 else "") + (above if below == "1" else rf"\frac{{{above}}}{{{below}}}")
-    sign, *parts = above_and_below(function)
-    above, below = map(latex_polynomial, parts)
-    return above if below == "1" else rf"{sign}\frac{{{above}}}{{{below}}}"
-
-
-def above_and_below(function: RationalFunction) -> tuple[str, fmpq_mpoly, fmpq_mpoly]:
-    """Sign, numerator and denominator of a fraction as they are written: without fractions, the first terms positive.
-
-    Polynomials have the denominator 1 and their own signs.
-    """
-    above, below = function.numerator, function.denominator
-    if function.is_polynomial or above.is_zero():
-        return "", above, above.context().constant(1)
-    factor = fmpq(common_denominator(above))
-    signs = [1 if part.coefficient(0) > 0 else -1 for part in (above, below)]
-    return "-" if signs[0] != signs[1] else "", above * (factor * signs[0]), below * (factor * signs[1])
+    return LATEX.rational(function)
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
@@ -161,16 +123,15 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
     return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
 
 
-def _latex_power(polynomial: fmpq_mpoly, exponent: int) -> str:
-    if len(polynomial) == 1:
-        return latex_polynomial(polynomial**exponent)
-    power = "" if exponent == 1 else f"^{_braced(str(exponent))}"
-    return rf"\left({latex_polynomial(polynomial)}\right){power}"
-
-
-def _power(name: str, exponent: int) -> str:
-    return f"{name}^{_braced(str(exponent))}"
-
-
 def _braced(digits: str) -> str:
     return digits if len(digits) == 1 else f"{{{digits}}}"
+
+
+LATEX = Notation(
+    name=latex_name,
+    number=latex_number,
+    power=lambda base, exponent: f"{base}^{_braced(str(exponent))}",
+    times=" ",
+    fraction=r"\frac{{{}}}{{{}}}".format,
+    enclosed=r"\left({}\right)".format,
+)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from kahanmaps.errors import printable
 
 # A mark, and a colour to be mixed with that of the text: with a contrast above 4.5 : 1 on white and on near black.
-_WORDS = {
+WORDS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
     "supported": ("≈", "#0e8fa8"),
@@ -84,7 +84,7 @@ def eps_words(eps: object = None, step: object = None) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """A table. `head` and `caption` are text, the cells of `rows` are HTML already.
+    """A table. `head` and `caption` are text, the cells of `rows` are HTML already; the last of a short row is wide.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
@@ -94,7 +94,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
     above = f"<caption>{escape(caption)}</caption>" if caption else ""
     names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in head)
     names = f"<thead><tr>{names}</tr></thead>" if names else ""
-    lines = ["<tr>" + "".join(f"<td {_LEFT}>{cell}</td>" for cell in row) + "</tr>" for row in rows]
+    held = [list(row) for row in rows]
+    width = max(map(len, (head, *held)))
+    lines = []
+    for *cells, last in held:
+        wide = f' colspan="{width - len(cells)}"' if len(cells) + 1 < width else ""
+        line = "".join(f"<td {_LEFT}>{cell}</td>" for cell in cells)
+        lines.append(f"<tr>{line}<td{wide} {_LEFT}>{last}</td></tr>")
     return "\n".join([f"<table>{above}{names}<tbody>", *lines, "</tbody></table>"])
 
 
@@ -125,9 +131,9 @@ def verdict(word: object) -> str:
     '<span class="verdict">note</span>'
     """
     text = str(word)
-    if text not in _WORDS:
+    if text not in WORDS:
         return f'<span class="verdict">{escape(text)}</span>'
-    mark, colour = _WORDS[text]
+    mark, colour = WORDS[text]
     style = f"color: color-mix(in srgb, currentColor 35%, {colour}); white-space: nowrap"
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 

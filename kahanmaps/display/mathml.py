@@ -14,10 +14,10 @@ from math import prod
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.reading import factors_of, first_terms, terms_of
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.reading import PLAIN, Notation, above_and_below, first_terms
 from kahanmaps.algebra.text import format_number, format_product, shorter_factors, sides
-from kahanmaps.display.latex import GREEK_NAMES, above_and_below
+from kahanmaps.display.latex import GREEK_NAMES
 from kahanmaps.display.markup import escape
 from kahanmaps.errors import InputError, counted
 
@@ -66,30 +66,18 @@ def mathml_polynomial(polynomial: fmpq_mpoly) -> str:
     >>> mathml_polynomial(parse_polynomial("x^2 - eps", ["x", "eps"]))
     '<mrow><msup><mi>x</mi><mn>2</mn></msup><mo form="infix">−</mo><mi>ε</mi></mrow>'
     """
-    return f"<mrow>{''.join(piece for piece, _ in _pieces(polynomial))}</mrow>"
+    return MATHML.polynomial(polynomial)
 
 
 def mathml_rational_function(function: RationalFunction) -> str:
     """A quotient of polynomials over Q as MathML, exact, without fractions inside the fraction, in factors where they
     are shorter.
 
-    Both sides of a fraction start with a positive term. Common factors stay, as they do in `RationalFunction`.
-
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> mathml_rational_function(parse_rational_function("x/y^2", ["x", "y"]))
     '<mfrac><mrow><mi>x</mi></mrow><mrow><msup><mi>y</mi><mn>2</mn></msup></mrow></mfrac>'
     """
-    found = shorter_factors(function)
-    if found is not None:
-        sign = "-" if found[1] < 0 else ""
-        above, below = (_product(number, powers) for number, powers in sides(*found))
-        is_whole = below == "<mrow><mn>1</mn></mrow>"
-    else:
-        sign, *parts = above_and_below(function)
-        above, below = map(mathml_polynomial, parts)
-        is_whole = parts[1].is_one()
-    whole = above if is_whole else f"<mfrac>{above}{below}</mfrac>"
-    return f"<mrow>{_MINUS}{whole}</mrow>" if sign else whole
+    return MATHML.rational(function)
 
 
 def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters: int | None = None) -> str:
@@ -154,19 +142,22 @@ def _sum(polynomial: fmpq_mpoly, characters: int | None = None) -> list[str]:
     left_out = len(polynomial) - len(shown)
     if left_out and not len(shown):
         return [f"<span>(a polynomial of {counted(len(polynomial), 'term')}, not shown)</span>"]
-    if not left_out and (len(shown) <= 1 or len(_plain(shown)) <= _ONE_PIECE):
-        return [_math(mathml_polynomial(shown), _plain(shown))]
-    found = [_math(f"<mrow>{piece}</mrow>", text) for piece, text in _pieces(shown)]
+    if not left_out and (len(shown) <= 1 or len(PLAIN.polynomial(shown)) <= _ONE_PIECE):
+        return [_math(mathml_polynomial(shown), PLAIN.polynomial(shown))]
+    found = [
+        _math(f"<mrow>{piece}</mrow>", text)
+        for piece, text in zip(MATHML.terms(shown), PLAIN.terms(shown), strict=True)
+    ]
     return [*found, f"<span>+ … ({counted(len(polynomial), 'term')})</span>"] if left_out else found
 
 
 def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
     """The elements of a fraction, one if it is short, else with a slash; in factors, if all of it is shown."""
-    sign, above, below = above_and_below(function)
+    is_negative, above, below = above_and_below(function)
     fits = characters is None or all(len(first_terms(part, characters)) == len(part) for part in (above, below))
     found = shorter_factors(function) if fits else None
     if found is not None:
-        sign, plain = "-" if found[1] < 0 else "", format_product(*found)
+        is_negative, plain = found[1] < 0, format_product(*found)
         over, under = sides(*found)
         top, bottom, is_whole = _factors(*over), _factors(*under), under == (1, [])
         if len(under[1]) + (under[0] > 1) > 1:
@@ -174,12 +165,12 @@ def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
     elif below.is_one():
         return _sum(above, characters)
     else:
-        plain = f"{sign}({_plain(above)})/({_plain(below)})"
+        plain = f"{'-' * is_negative}({PLAIN.polynomial(above)})/({PLAIN.polynomial(below)})"
         top, bottom, is_whole = _bracketed(above, characters), _bracketed(below, characters), False
     if fits and max(map(len, plain.split("/"))) <= _ONE_PIECE + len("()"):
         # Without a style of its own a fraction within a line is set in the small letters of an index.
         return [_math(f'<mstyle displaystyle="true">{mathml_rational_function(function)}</mstyle>', plain)]
-    if sign:
+    if is_negative:
         top[0] = _math(_MINUS, "-") + top[0]
     return top if is_whole else [*top, _math("<mo>/</mo>", "/"), *bottom]
 
@@ -196,23 +187,6 @@ def _factors(number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> list[str]
     return [element for part in parts for element in part]
 
 
-def _product(number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
-    """One side of a product as one row."""
-    if number == 1 and [k for _, k in powers] == [1]:
-        return mathml_polynomial(powers[0][0])
-    variables = [g**k for g, k in powers if len(g) == 1]
-    parts = [mathml_polynomial(prod(variables[1:], start=variables[0] * number))] if variables else []
-    if not variables and (number > 1 or not powers):
-        parts = [f"<mn>{number}</mn>"]
-    for g, k in powers:
-        if len(g) > 1:
-            base = f'<mrow><mo stretchy="false">(</mo>{mathml_polynomial(g)}<mo stretchy="false">)</mo></mrow>'
-            parts.append(base if k == 1 else _raised(base, f"<mn>{k}</mn>"))
-    if len(parts) == 1 and variables:
-        return parts[0]
-    return f"<mrow>{_TIMES.join(parts)}</mrow>"
-
-
 def _bracketed(polynomial: fmpq_mpoly, characters: int | None, power: int = 1) -> list[str]:
     return _enclosed(_sum(polynomial, characters), power)
 
@@ -226,28 +200,14 @@ def _enclosed(inside: list[str], power: int = 1) -> list[str]:
     return inside
 
 
-def _plain(polynomial: fmpq_mpoly) -> str:
-    return " ".join(text for _, text in _pieces(polynomial))
-
-
-def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
-    """Each term with its sign: as MathML, and as plain text."""
-    names = names_of(polynomial)
-    order = sorted(range(len(names)), key=lambda k: names[k] != "eps")
-    ordered = [mathml_name(names[k]) for k in order]
-    plain = [names[k] for k in order]
-    found: list[tuple[str, str]] = []
-    for monomial, coefficient in terms_of(polynomial):
-        exponents, size = [monomial[k] for k in order], abs(coefficient)
-        sign = "−" if coefficient < 0 else "+" if found else ""
-        form = "infix" if found else "prefix"
-        mark = f'<mo form="{form}">{sign}</mo>' if sign else ""
-        text = {"−": "- ", "+": "+ ", "": ""}[sign] if found else "-" * bool(sign)
-        marked = factors_of(size, exponents, ordered, lambda base, n: _raised(base, f"<mn>{n}</mn>"), mathml_number)
-        found.append(
-            (
-                mark + _TIMES.join(marked),
-                text + "*".join(factors_of(size, exponents, plain, "{}^{}".format, format_number)),
-            )
-        )
-    return found or [("<mn>0</mn>", "0")]
+MATHML = Notation(
+    name=mathml_name,
+    number=mathml_number,
+    power=lambda base, exponent: _raised(base, f"<mn>{exponent}</mn>"),
+    signs=(_MINUS, '<mo form="infix">+</mo>', '<mo form="infix">−</mo>'),
+    gap="",
+    times=_TIMES,
+    fraction="<mfrac>{}{}</mfrac>".format,
+    enclosed='<mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>'.format,
+    row="<mrow>{}</mrow>".format,
+)

@@ -37,7 +37,7 @@ def verdict_text(finding: Finding) -> str:
 def details(finding: Finding, told: set[str], width: int | None = None) -> list[str]:
     """What stands below a claim; `told` are the hypotheses that the reader has seen already."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
-    lines.append(_summary(finding.evidence, told))
+    lines.append(summary(finding.evidence, told))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
     if finding.witness is not None:
         lines += witness_lines(finding.witness, width)
@@ -46,13 +46,14 @@ def details(finding: Finding, told: set[str], width: int | None = None) -> list[
     return [line if width is None else shorten(line, 1200) for line in lines]
 
 
-def _summary(evidence: Evidence, told: set[str]) -> str:
-    """The sentence of the evidence; a hypothesis is spelt out once in a report."""
+def summary(evidence: Evidence, told: set[str] | None = None) -> str:
+    """The sentence of the evidence; a hypothesis is spelt out once in a report, of which `told` remembers it."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary
-    new = [text for text in hypotheses if text not in told]
-    told.update(new)
+    new = [text for text in hypotheses if text not in (told or ())]
+    if told is not None:
+        told.update(new)
     rest = len(hypotheses) - len(new)
     above = f"{rest} hypotheses as above" if rest > 1 else "1 hypothesis as above" if rest else ""
     return f"{evidence.data['theorem']} applies: {'; '.join(new + [above] * bool(above))}"

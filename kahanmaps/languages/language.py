@@ -14,8 +14,8 @@ from importlib.resources import files
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.reading import factors_of
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.reading import Notation
 
 LANGUAGES = ("sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
 
@@ -152,16 +152,14 @@ class Language:
 
         `safe` maps the names of its ring to those of the language.
         """
-        names = [safe[name] for name in names_of(polynomial)]
-        terms: list[str] = []
-        for monomial, coefficient in polynomial.terms():
-            factors = factors_of(abs(coefficient), monomial, names, self._power, self.rational)
-            terms.append((" - " if coefficient < 0 else " + ") + "*".join(factors))
+        signs = ("-", " + ", " - ")
+        written = Notation(safe.__getitem__, self.rational, self._power, signs, gap="", eps_first=False)
+        terms = written.terms(polynomial)
         parts = ["".join(terms[k : k + _TERMS_TOGETHER]) for k in range(0, len(terms), _TERMS_TOGETHER)]
-        parts = ["-" + part[3:] if part.startswith(" - ") else part[3:] for part in parts]
+        parts = ["-" + part[3:] if part.startswith(" - ") else part.removeprefix(" + ") for part in parts]
         if len(parts) > 1:
             return " + ".join(f"({part})" for part in parts)
-        return parts[0] if parts else self.rational(fmpq(0))
+        return parts[0]
 
     def expression(self, function: RationalFunction | fmpq_mpoly, safe: Mapping[str, str]) -> str:
         """A polynomial or a quotient of two as an expression, exactly, on several lines where it is long.

@@ -6,7 +6,8 @@ import re
 from collections.abc import Sequence
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.display.latex import above_and_below, latex_name, latex_polynomial, latex_rational_function
+from kahanmaps.algebra.reading import above_and_below
+from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.writer import header
 
@@ -134,9 +135,13 @@ def _quotient(left: str, function: RationalFunction) -> list[tuple[str, str]]:
     whole = latex_rational_function(function)
     if len(whole) <= _LINE or function.is_polynomial:
         return [(left, whole)]
-    sign, above, below = above_and_below(function)
+    is_negative, above, below = above_and_below(function)
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
-    return [(left, rf"{sign}\frac{{{P}}}{{{Q}}}"), (P, latex_polynomial(above)), (Q, latex_polynomial(below))]
+    return [
+        (left, rf"{'-' * is_negative}\frac{{{P}}}{{{Q}}}"),
+        (P, latex_polynomial(above)),
+        (Q, latex_polynomial(below)),
+    ]
 
 
 def _aligned(rows: Sequence[tuple[str, str]]) -> str:

@@ -154,12 +154,11 @@ def _draw_plane(
     for orbit in plane.orbits:
         if orbit.cubic is None:
             continue
-        for rows in orbit.cubic.arcs():
-            axes.plot(*view.arc(rows, orbit.cubic.length), color=_CURVE, linewidth=0.9, zorder=1)
+        for rows in view.curves(orbit.cubic):
+            axes.plot(*rows.T, color=_CURVE, linewidth=0.9, zorder=1)
         if flow:
-            for rows in orbit.cubic.flow_arcs(float(orbit.u[0]), float(orbit.v[0])):
-                dashed = (0, (4, 3))
-                axes.plot(*view.arc(rows, orbit.cubic.length), color=_FLOW, linewidth=0.5, linestyle=dashed, zorder=1.1)
+            for rows in view.curves(orbit.cubic.flow_through(float(orbit.u[0]), float(orbit.v[0]))):
+                axes.plot(*rows.T, color=_FLOW, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
     for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
         normals = None if orbit.cubic is None else _normals(orbit.cubic, x[:_NUMBERED], y[:_NUMBERED], view.stretch)
         pen.orbit(axes, *view.place(x, y), number, normals)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.numerals import is_name
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
@@ -17,34 +15,10 @@ from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.plots.figures import label_of, plain
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 _LONGEST = 30
-
-
-@dataclass(frozen=True, eq=False)
-class Expression:
-    """A rational function of the variables and eps, with eps inserted; `name` is what the user calls it."""
-
-    name: str
-    function: RationalFunction
-    eps: fmpq
-
-    @property
-    def label(self) -> str:
-        """What a picture calls it."""
-        return label_of(self.name) if is_name(self.name) else plain(self.name)
-
-    def at(self, start: Sequence[fmpq]) -> fmpq | None:
-        """The exact value at a rational point, None where it has none."""
-        value: fmpq | None = self.function.value(QQ, [*start, self.eps])
-        return value
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """The values at points (count, dim) in doubles, NaN where there is none."""
-        return PointFunction(self.name, self.function, to_float(self.eps))(points)
 
 
 class OfTheImage:
@@ -90,7 +64,7 @@ class OfTheImage:
         return values
 
 
-WatchedFunction = Expression | OfTheImage
+WatchedFunction = PointFunction | OfTheImage
 
 
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
@@ -104,7 +78,7 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     ['I1', 'I2', 'modified H', 'H~_1', 'H']
     """
     found: dict[str, WatchedFunction] = {
-        name: Expression(name, function, eps) for name, function in file.integrals.items()
+        name: PointFunction(name, function, eps) for name, function in file.integrals.items()
     }
     hamiltonian = file.hamiltonian
     if hamiltonian is not None and eps != 0:
@@ -115,7 +89,7 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
                 integral = CommutantIntegral(hamiltonian, file.member.A, power, letter)
                 found[integral.name] = OfTheImage(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
     if hamiltonian is not None and "H" not in found:
-        found["H"] = Expression("H", _as_function(hamiltonian, hamiltonian.H), eps)
+        found["H"] = PointFunction("H", _as_function(hamiltonian, hamiltonian.H), eps)
     return found
 
 
@@ -151,7 +125,7 @@ def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, s
             found.append(every[text])
         else:
             function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
-            found.append(Expression(name or text[:_LONGEST], function, eps))
+            found.append(PointFunction(name or text[:_LONGEST], function, eps))
     names = [function.name for function in found]
     for name in names:
         if names.count(name) > 1:

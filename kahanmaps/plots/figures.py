@@ -16,6 +16,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
@@ -30,12 +31,10 @@ from kahanmaps.whole_files import write_whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.layout_engine import LayoutEngine
 
 FORMATS = ("pdf", "svg", "png")
 # More points than this are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
 RASTERISE_ABOVE = 20_000
-_PASSES = 5  # of the layout: the second may change nothing, and the third does
 _LETTER = 0.5  # the width of a letter on average, in its height
 _LONGEST = 40  # digits of a number
 _HANDLE = 5.0  # of a legend, the line or mark with the space around it, in heights of a letter
@@ -57,10 +56,12 @@ def drawing(style: Style) -> Iterator[None]:
     """
     require_matplotlib()
     import matplotlib as mpl
+    import matplotlib.style
 
     with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(style.settings())
+        mpl.rcdefaults()  # nothing of a user's matplotlibrc gets through
+        with as_file(files("kahanmaps.plots") / "pictures.mplstyle") as path:
+            mpl.style.use([path, style.settings()])
         yield
 
 
@@ -68,24 +69,7 @@ def new_figure(style: Style, aspect: float = 0.75) -> Figure:
     """An empty figure in the size of the style; `aspect` is height over width where the style has no height."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=style.inches(aspect), layout=_settled_layout())
-
-
-def _settled_layout() -> LayoutEngine:
-    """The constrained layout of matplotlib, repeated where axes have fixed proportions.
-
-    Such axes are smaller than the place they have, and their titles fit into what is left of it: how much room they
-    need is known only when the place has been cut to size. After one pass titles of two lines were cut off.
-    """
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-    class Settled(ConstrainedLayoutEngine):
-        def execute(self, fig: Figure) -> None:
-            is_fixed = any(axes.get_box_aspect() is not None or axes.get_aspect() != "auto" for axes in fig.axes)
-            for _ in range(_PASSES if is_fixed else 1):
-                super().execute(fig)
-
-    return Settled()
+    return Figure(figsize=style.inches(aspect), layout="compressed")
 
 
 def label_of(name: str) -> str:

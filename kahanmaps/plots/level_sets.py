@@ -6,7 +6,7 @@ the curve by Newton's method.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from kahanmaps.plots.windows import Window
 
 MAX_LEVELS = 200
 GRID = 301  # lines each way
-_NEWTON = 4
+_NEWTON = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +58,6 @@ def level_curves(
     >>> bool(np.allclose((circle.pieces[0][0] ** 2).sum(axis=1), 1, rtol=1e-12))
     True
     """
-    require_matplotlib()
-    from contourpy import contour_generator
-
     if len(plane) != 2 or len(window) != 2:
         raise InputError("level curves are for pictures of two variables")
     further = sorted(function.used() - set(plane))
@@ -72,18 +69,49 @@ def level_curves(
         )
     if len(levels) > MAX_LEVELS:
         raise InputError(f"found {len(levels)} levels, expected at most {MAX_LEVELS}: choose some of them")
-    (x0, x1), (y0, y1) = window
-    xs, ys = np.linspace(x0, x1, GRID), np.linspace(y0, y1, GRID)
-    above, below = function.parts(_in_plane(np.stack(np.meshgrid(xs, ys), axis=-1), plane, dim))
+
+    def sides(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return function.parts(_in_plane(points, plane, dim))
+
+    above, below = sides(_grid(window)[-1])
     found = []
     for level in levels:
+
+        def value(points: FloatArray, level: float = level) -> FloatArray:
+            over, under = sides(points)
+            return over - level * under
+
         with np.errstate(all="ignore"):
-            values = above - level * below
-        if not np.isfinite(values).all():
-            values = np.ma.masked_invalid(values)
-        lines = contour_generator(xs, ys, values).lines(0.0)
-        found.append(tuple(_moved_onto(function, level, np.asarray(line), plane, dim, window) for line in lines))
+            found.append(zero_curves(value, window, above - level * below))
     return LevelCurves(function.label, tuple(levels), tuple(found))
+
+
+def zero_curves(
+    value: Callable[[FloatArray], FloatArray], window: Window, on_grid: FloatArray | None = None
+) -> tuple[FloatArray, ...]:
+    """The curves in a window on which a function of points (..., 2) is 0: pieces, arrays (n, 2) of vertices.
+
+    They are found on a grid, `on_grid` the values there if they are known, and each vertex is moved onto the curve.
+
+    >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
+    >>> bool(np.allclose((circle**2).sum(axis=1), 1, rtol=1e-12))
+    True
+    """
+    require_matplotlib()
+    from contourpy import contour_generator
+
+    xs, ys, points = _grid(window)
+    with np.errstate(all="ignore"):
+        values = value(points) if on_grid is None else on_grid
+    if not np.isfinite(values).all():
+        values = np.ma.masked_invalid(values)
+    lines = contour_generator(xs, ys, values).lines(0.0)
+    return tuple(_moved_onto(value, np.asarray(line), window) for line in lines)
+
+
+def _grid(window: Window) -> tuple[FloatArray, FloatArray, FloatArray]:
+    xs, ys = (np.linspace(low, high, GRID) for low, high in window)
+    return xs, ys, np.stack(np.meshgrid(xs, ys), axis=-1)
 
 
 def _in_plane(points: FloatArray, plane: Sequence[int], dim: int) -> FloatArray:
@@ -92,16 +120,9 @@ def _in_plane(points: FloatArray, plane: Sequence[int], dim: int) -> FloatArray:
     return full
 
 
-def _moved_onto(
-    function: PointFunction, level: float, line: FloatArray, plane: Sequence[int], dim: int, window: Window
-) -> FloatArray:
-    """The vertices moved by Newton's method along the gradient of N - level D, by less than a mesh of the grid."""
+def _moved_onto(value: Callable[[FloatArray], FloatArray], line: FloatArray, window: Window) -> FloatArray:
+    """The vertices moved by Newton's method along the gradient, by less than a mesh of the grid."""
     mesh = np.array([(high - low) / (GRID - 1) for low, high in window])
-
-    def value(points: FloatArray) -> FloatArray:
-        above, below = function.parts(_in_plane(points, plane, dim))
-        return above - level * below
-
     with np.errstate(all="ignore"):
         moved = line.copy()
         for _ in range(_NEWTON):

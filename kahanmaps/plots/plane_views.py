@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kahanmaps.plots.invariant_curves import InvariantPlane
-from kahanmaps.plots.plane_cubics import Floats
+from kahanmaps.plots.level_sets import zero_curves
+from kahanmaps.plots.plane_cubics import Floats, PlaneCubic
 from kahanmaps.plots.symmetric_planes import THREE_LINES
 from kahanmaps.plots.windows import outside, window_of
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 Cloud = tuple[Floats, Floats]
 
 _SHARE = 0.85  # of the dots: orbits come close to infinity again and again
+_CUT = 0.7390851  # a direction in which no nice form is zero
 _MARGIN = 0.08  # of the width, on either side, for the numbers beside the dots
 
 
@@ -65,14 +67,10 @@ class Rectangle:
         """Where points are drawn."""
         return x, y
 
-    def arc(self, rows: Floats, length: float) -> Cloud:
-        """Where an arc of a PlaneCubic is drawn; what is far outside, at the end of its ray, for viewers' sake."""
-        furthest = 50 * (max(self.half) + max(map(abs, self.centre)))
-        radius = np.hypot(rows[:, 0], rows[:, 1])
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            distance = np.where(rows[:, 2] > 0, radius * length / rows[:, 2], np.inf)
-        shrunk = np.minimum(distance, furthest) / np.where(radius > 0, radius, 1)
-        return rows[:, 0] * shrunk, rows[:, 1] * shrunk
+    def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
+        """The pieces (n, 2) of a curve, as they are drawn."""
+        ranges = tuple((middle - half, middle + half) for middle, half in zip(self.centre, self.half, strict=True))
+        return zero_curves(cubic.value, ranges)
 
 
 @dataclass(frozen=True)
@@ -110,11 +108,13 @@ class Disc:
         radius = np.hypot(np.hypot(x, y), 1)
         return x / radius, y / radius
 
-    def arc(self, rows: Floats, length: float) -> Cloud:
-        """Where an arc of a PlaneCubic is drawn."""
-        scaled = rows * np.array([length, length, self.length])
-        scaled = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
-        return scaled[:, 0], scaled[:, 1]
+    def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
+        """The pieces (n, 2) of a curve, as they are drawn, from the rim to itself or closed."""
+        turn = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
+        pieces = zero_curves(lambda angles: cubic.value_in_space(angles, self.length), turn)
+        return tuple(
+            np.sin(rows[:, 1:]) * np.stack([np.cos(rows[:, 0]), np.sin(rows[:, 0])], axis=1) for rows in pieces
+        )
 
 
 def _rows(cloud: Cloud) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.numerals import is_name
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.text import parse_rational_function
@@ -17,6 +18,7 @@ from kahanmaps.maps.floats.doubles import FloatArray, to_float
 from kahanmaps.maps.floats.fast import FLOATS
 from kahanmaps.plots.figures import label_of, plain
 
+ZERO = fmpq(0)
 _SHORT = 60  # characters of a formula that fits along an axis
 
 
@@ -24,7 +26,7 @@ _SHORT = 60  # characters of a formula that fits along an axis
 class PointFunction:
     """A rational function of the variables and eps (in this order), in doubles.
 
-    `name` is what the user calls it, `eps` the paper's epsilon (half the time step) that is inserted.
+    `name` is what the user calls it, `eps` the paper's epsilon, exact (half the time step), that is inserted.
 
     >>> radius = point_function("x^2 + y^2", ["x", "y"])
     >>> radius(np.array([[3.0, 4.0], [np.nan, 0.0]]))
@@ -33,7 +35,7 @@ class PointFunction:
 
     name: str
     function: RationalFunction
-    eps: float = 0.0
+    eps: fmpq = ZERO
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """The values at points (..., dim): an array (...), NaN at poles and where the value is no finite number."""
@@ -44,6 +46,11 @@ class PointFunction:
         with np.errstate(all="ignore"):
             values = above / below
         return np.where(np.isfinite(values), values, np.nan)
+
+    def at(self, point: Sequence[fmpq]) -> fmpq | None:
+        """The exact value at a rational point, None where it has none."""
+        value: fmpq | None = self.function.value(QQ, [*point, self.eps])
+        return value
 
     def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Numerator and denominator at points (..., dim)."""
@@ -79,7 +86,7 @@ class PointFunction:
         return f"${formula}$" if len(formula) <= _SHORT and "mathrm" not in formula else plain(self.name)
 
     def _value(self, polynomial: fmpq_mpoly, points: FloatArray) -> FloatArray:
-        coordinates = [*np.moveaxis(points, -1, 0), self.eps]
+        coordinates = [*np.moveaxis(points, -1, 0), to_float(self.eps)]
         value = np.asarray(evaluate(polynomial, FLOATS, coordinates), dtype=np.float64)
         filled: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
         filled[np.isnan(points).any(axis=-1)] = np.nan  # constants too: where there is no point there is no value
@@ -111,4 +118,4 @@ def point_function(
     uses_eps = any(int(part.degrees()[-1]) > 0 for part in (function.numerator, function.denominator))
     if uses_eps and eps is None:
         raise InputError(f"{text}: found eps in it, and no value of eps: give --eps")
-    return PointFunction(text, function, 0.0 if eps is None else to_float(eps))
+    return PointFunction(text, function, ZERO if eps is None else eps)

@@ -61,7 +61,7 @@ def portrait_of(
     found: Trajectories,
     axes: Sequence[PointFunction | str],
     *,
-    colour: PointFunction | WatchedFunction | str = ORBIT,
+    colour: WatchedFunction | str = ORBIT,
     window: Window | None = None,
     euler: Trajectories | None = None,
     join: bool = False,

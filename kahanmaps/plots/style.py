@@ -75,34 +75,10 @@ class Style:
         return min(self.font_size, max(6.0, self.font_size - 2))
 
     def settings(self) -> dict[str, Any]:
-        """The settings of matplotlib for this style; nothing of a user's matplotlibrc gets through."""
-        small = self.small
-        return {
-            "font.family": "STIXGeneral",
-            "font.size": self.font_size,
-            "mathtext.fontset": "stix",
-            "axes.titlesize": self.font_size,
-            "axes.labelsize": self.font_size,
-            "axes.linewidth": 0.6,
-            "axes.formatter.use_mathtext": True,
-            "axes.formatter.limits": (-3, 4),
-            "xtick.labelsize": small,
-            "ytick.labelsize": small,
-            "xtick.major.width": 0.6,
-            "ytick.major.width": 0.6,
-            "xtick.direction": "in",
-            "ytick.direction": "in",
-            "legend.fontsize": small,
-            "legend.frameon": False,
-            "lines.linewidth": 1.0,
-            "lines.markersize": 3.0,
-            "image.cmap": COLOUR_MAP,
-            "savefig.dpi": self.dpi,
-            "pdf.fonttype": 42,  # letters stay letters, for editors and for searching
-            "svg.fonttype": "path",
-            "svg.hashsalt": "kahanmaps",  # names inside an SVG are the same in every run
-            "text.parse_math": True,
-        }
+        """The settings of matplotlib for this style beyond those of pictures.mplstyle."""
+        sizes = {"axes.titlesize": self.font_size, "axes.labelsize": self.font_size, "font.size": self.font_size}
+        small = dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), self.small)
+        return {**sizes, **small, "image.cmap": COLOUR_MAP, "savefig.dpi": self.dpi}
 
 
 def _require(what: str, value: float, least: float, most: float) -> None:

@@ -43,97 +43,81 @@ def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) ->
     if columns < 20 or rows < 8:
         raise InputError(f"found {columns} columns and {rows} rows, expected at least 20 and 8 for a picture")
     with drawing(style):
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.text import Text
-
-        # A cell is 2 by 4 pixels; a font of 4 pixels, one row high and about a cell wide, makes the layout leave room.
+        # A cell is 2 by 4 pixels, and so large is every letter: the layout makes room for the characters themselves.
         figure.set_dpi(72)
         figure.set_size_inches(2 * columns / 72, 4 * rows / 72)
         _coarsen(figure)
-        canvas = FigureCanvasAgg(figure)
-        _lay_out(canvas, columns, rows)
-        texts = [placed for text in _visible(figure, Text) for placed in _placed(text, columns, rows)]
-        figure.set_layout_engine("none")
-        for text in figure.findobj(Text):
-            text.set_visible(False)
-        canvas.draw()
-        pixels = np.asarray(canvas.buffer_rgba())[: 4 * rows, : 2 * columns, :3].astype(int)
+        canvas = _canvas(figure)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message="constrained_layout not applied", category=UserWarning)
+            try:
+                canvas.draw()
+                every = [axes for axes in figure.axes if axes.get_visible()]  # side by side: none inside others
+                panels = [axes for axes in every if axes.get_label() != "<colorbar>"]
+                enough = len(panels) < 2 or all(axes.bbox.height >= 4 * _LEAST_ROWS for axes in panels)
+            except UserWarning:
+                enough = False
+    if not enough:
+        raise InputError(
+            f"found {columns} columns and {rows} rows, expected more for this picture: make the terminal larger, "
+            "or write a file with -o"
+        )
+    pixels = np.asarray(canvas.buffer_rgba())[: 4 * rows, : 2 * columns, :3].astype(int)
     cells = _braille(pixels, columns, rows)
-    for row, column, content in texts:
+    for content, x, y, text in canvas.renderer.written:
+        row, column = _place(content, x, y, text, columns, rows)
         for k, character in enumerate(content):
             if 0 <= row < rows and 0 <= column + k < columns:
                 cells[row][column + k] = Cell(character, None)
     return cells
 
 
-def _lay_out(canvas: Any, columns: int, rows: int) -> None:
-    """Draw once, so that everything has its place. Raises InputError where there is too little room."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)  # the terminal has them
-        warnings.filterwarnings("error", message="constrained_layout not applied", category=UserWarning)
-        try:
-            canvas.draw()
-            every = [axes for axes in canvas.figure.axes if axes.get_visible()]  # side by side: none inside others
-            panels = [axes for axes in every if axes.get_label() != "<colorbar>"]
-            enough = len(panels) < 2 or all(axes.bbox.height >= 4 * _LEAST_ROWS for axes in panels)
-        except UserWarning:
-            enough = False
-    if not enough:
-        raise InputError(
-            f"found {columns} columns and {rows} rows, expected more for this picture: make the terminal larger, "
-            "or write a file with -o"
-        )
+def _canvas(figure: Figure) -> Any:
+    """Where all but the texts is drawn; these are held as they are written, two pixels a character and four high."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
+
+    class Renderer(RendererAgg):  # type: ignore[misc]  # matplotlib has no types here
+        def __init__(self, width: float, height: float, dpi: float) -> None:
+            super().__init__(width, height, dpi)
+            self.written: list[tuple[str, float, float, Any]] = []
+
+        def get_text_width_height_descent(self, s: str, prop: Any, ismath: Any) -> tuple[float, float, float]:
+            return 2.0 * len(_content(s, ismath)), 4.0, 1.0
+
+        def draw_text(  # matplotlib sets how it is called
+            self, gc: Any, x: float, y: float, s: str, prop: Any, angle: float, ismath: Any = False, mtext: Any = None
+        ) -> None:
+            content = _content(s, ismath)
+            if angle and mtext is not None:  # it is written lying, around the middle of the place it has
+                box = mtext.get_window_extent(self)
+                x, y = (box.x0 + box.x1) / 2 - len(content), self.height - (box.y0 + box.y1) / 2 + 1
+            self.written.append((content, x, y, mtext))
+
+    class Canvas(FigureCanvasAgg):  # type: ignore[misc]
+        renderer: Any = None
+
+        def get_renderer(self) -> Any:
+            width, height = self.figure.bbox.size
+            self.renderer = self.renderer or Renderer(width, height, self.figure.dpi)
+            return self.renderer
+
+    return Canvas(figure)
 
 
-def _visible(figure: Figure, kind: Any) -> list[Any]:
-    hidden = _off_scale(figure)
-    found = []
-    for text in figure.findobj(kind):
-        if text.get_visible() and text.get_text().strip() and id(text) not in hidden:
-            box = text.get_window_extent()
-            if box.width and figure.bbox.overlaps(box):
-                found.append(text)
-    return found
+def _content(text: str, is_formula: Any) -> str:
+    return " ".join(readable(text if is_formula else text.replace("$", r"\$")).split())
 
 
-def _off_scale(figure: Figure) -> set[int]:
-    """The labels of ticks outside the limits of their axis, which matplotlib keeps but does not draw."""
-    off = set()
-    for axes in figure.axes:
-        if hasattr(axes, "zaxis"):
-            continue
-        for axis in (axes.xaxis, axes.yaxis):
-            scale = axis.get_transform()  # on a logarithmic scale what is near to 0 is far away
-            low, high = sorted(scale.transform(np.asarray(axis.get_view_interval(), dtype=float)))
-            slack = 1e-9 * (high - low)
-            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-                at = scale.transform(np.array([float(tick.get_loc())]))[0]
-                if not low - slack <= at <= high + slack:
-                    off |= {id(tick.label1), id(tick.label2)}
-    return off
-
-
-def _placed(text: Any, columns: int, rows: int) -> list[tuple[int, int, str]]:
-    """Row, column and content of a text, line by line."""
+def _place(content: str, x: float, y: float, text: Any, columns: int, rows: int) -> tuple[int, int]:
+    """Row and column of a text whose line begins at this pixel, inside the picture as far as that is possible."""
     from matplotlib.text import Annotation
 
-    box = text.get_window_extent()
-    lines = [" ".join(readable(line).split())[:columns] for line in text.get_text().split("\n")]
-    middle_row = rows - 1 - int((box.y0 + box.y1) / 8)
-    found = []
-    for k, content in enumerate(lines):
-        middle = (box.x0 + box.x1) / 4
-        anchor = {"left": box.x0 / 2, "right": box.x1 / 2 - len(content)}.get(
-            text.get_horizontalalignment(), middle - len(content) / 2
-        )
-        column = min(max(0, round(anchor)), columns - len(content))
-        row = middle_row + k - (len(lines) - 1) // 2
-        if isinstance(text, Annotation) and text.axes is not None and text.xycoords == "data":
-            panel = text.axes.bbox  # the names of points stay inside, where they cover no numbers
-            row = min(max(row, rows - int(panel.y1 / 4)), rows - 2 - int(panel.y0 / 4))
-            column = min(max(column, 1 + int(panel.x0 / 2)), max(0, int(panel.x1 / 2) - len(content)))
-        found.append((min(max(0, row), rows - 1), column, content))
-    return found
+    row, column = int((y - 1) / 4), round(x / 2)
+    if isinstance(text, Annotation) and text.axes is not None and text.xycoords == "data":
+        panel = text.axes.bbox  # the names of points stay inside, where they cover no numbers
+        row = min(max(row, rows - int(panel.y1 / 4)), rows - 2 - int(panel.y0 / 4))
+        column = min(max(column, 1 + int(panel.x0 / 2)), max(0, int(panel.x1 / 2) - len(content)))
+    return min(max(0, row), rows - 1), min(max(0, column), max(0, columns - len(content)))
 
 
 def readable(text: str) -> str:
@@ -167,7 +151,7 @@ def _coarsen(figure: Figure) -> None:
 
     for text in figure.findobj(Text):
         text.set_fontsize(4)
-        text.set_fontfamily("monospace")
+        text.set_path_effects([])  # they would draw the letters
     for line in figure.findobj(Line2D):
         line.set_antialiased(False)
         line.set_linewidth(min(line.get_linewidth(), 0.8))
@@ -184,7 +168,7 @@ def _coarsen(figure: Figure) -> None:
         _close_up(legend)
     _put_labels_above(figure)
     for axes in figure.axes:
-        axes.tick_params(which="both", length=0, pad=2)
+        axes.tick_params(which="both", length=0, pad=3)
         for spine in axes.spines.values():
             spine.set_color(_FRAME)
             spine.set_linewidth(0.5)
@@ -198,7 +182,7 @@ def _put_labels_above(figure: Figure) -> None:
             continue
         side: Any = axes.yaxis.get_label_position()  # left or right
         before = axes.get_title(loc=side)
-        axes.set_title(f"{before}  {label}" if before else label, loc=side, fontsize=4, family="monospace", pad=2)
+        axes.set_title(f"{before}  {label}" if before else label, loc=side, fontsize=4, pad=2)
         axes.set_ylabel("")
 
 

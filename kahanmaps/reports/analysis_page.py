@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from kahanmaps.algebra.text import format_number
 from kahanmaps.display import markup
-from kahanmaps.display.laboratory import eps_sentence, heights_html, singularities_html
+from kahanmaps.display.laboratory import eps_sentence, result_html
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import equations_html
 from kahanmaps.errors import counted
@@ -108,7 +108,7 @@ def _more(found: Analysis, name: str, pictures: Pictures) -> list[str]:
         return [
             markup.details(
                 f"Hypersurfaces{f' at eps = {format_number(run.eps)}' if found.file.map.has_eps else ''}",
-                wide(singularities_html(run, found.file.map)),
+                wide(result_html(run, found.file.map)),
             )
             for run in found.singularities
         ]
@@ -141,5 +141,5 @@ def _heights(found: Analysis, pictures: Pictures) -> list[str]:
     caption = "Heights of exact orbits, and the growth that was fitted."
     return [
         pictures.draw("heights", caption, alt, lambda style: draw_heights(survey, style)),
-        markup.details("Orbits whose heights were measured", wide(heights_html(survey))),
+        markup.details("Orbits whose heights were measured", wide(result_html(survey))),
     ]

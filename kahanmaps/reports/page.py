@@ -13,7 +13,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.checks import Room
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.pictures import Pictures
-from kahanmaps.reports.stylesheet import STYLESHEET, font_face
+from kahanmaps.reports.stylesheet import font_face, stylesheet
 
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
 ROOM = Room(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
@@ -54,7 +54,7 @@ def page(
 <meta name="generator" content="kahanmaps {recipe.version}"/>
 <link rel="icon" href="data:,"/>
 <title>{name}</title>
-<style>{font}{STYLESHEET}</style>
+<style>{font}{stylesheet()}</style>
 </head>
 <body>
 <header>

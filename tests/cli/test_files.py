@@ -33,7 +33,7 @@ from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli.ensemble_starts import read_starts
 from kahanmaps_cli.main import main
 from kahanmaps_cli.outputs import OutputFile, OutputFolder
-from kahanmaps_cli.pictures.records import read_record
+from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.pictures.stored import read_orbits
 
 needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")

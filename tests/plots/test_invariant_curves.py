@@ -250,8 +250,7 @@ def test_dots_and_curve_agree_in_the_disc(curves):
     plane = curves("m = 2").planes[0]
     orbit, disc = plane.orbits[0], Disc.of(plane)
     x, y = disc.place(orbit.u, orbit.v)
-    arcs = [np.stack(disc.arc(rows, orbit.cubic.length), axis=1) for rows in orbit.cubic.arcs()]
-    vertices = np.concatenate(arcs)
+    vertices = np.concatenate(disc.curves(orbit.cubic))
     # neighbouring vertices are at most 0.02 apart
     assert max(np.linalg.norm(vertices - point, axis=1).min() for point in np.stack([x, y], axis=1)) < 0.02
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import batch, commute, degrees, drift, heights, invariant_curves, portrait, recipe, scan
+from kahanmaps_cli.pictures import batch, commute, drift, growth, invariant_curves, portrait, recipe, scan
 
 
 @click.group("plot", cls=SuggestingGroup)
@@ -22,5 +22,15 @@ def command() -> None:
     """
 
 
-for _module in (portrait, invariant_curves, drift, heights, degrees, scan, commute, batch, recipe):
-    command.add_command(_module.command)
+for _command in (
+    portrait.command,
+    invariant_curves.command,
+    drift.command,
+    growth.heights,
+    growth.degrees,
+    scan.command,
+    commute.command,
+    batch.command,
+    recipe.command,
+):
+    command.add_command(_command)

@@ -129,13 +129,8 @@ def _is_given(context: click.Context, name: str) -> bool:
 
 
 def _option_name(name: str) -> str:
-    return {
-        "source": "--from",
-        "sections": "--section",
-        "values": "--value",
-        "variables": "--vars",
-        "parameters": "-p",
-    }.get(name, "--" + name.replace("_", "-"))
+    command = click.get_current_context().command
+    return next(parameter.opts[0] for parameter in command.params if parameter.name == name)
 
 
 def _write(html: str, options: dict[str, Any]) -> None:

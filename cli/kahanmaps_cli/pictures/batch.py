@@ -3,39 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.core import ParameterSource
 
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.progress import Progress, say
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from kahanmaps.experiments.records import Row
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from
+from kahanmaps_cli.progress import Progress
 
 _TOLD = 1000  # rows between words of progress
 
 
-@click.command("batch", cls=PictureCommand)
-@click.argument("database", required=False, type=click.Path(dir_okay=False), metavar="[DB]")
-@click.option(
-    "--db",
-    type=click.Path(dir_okay=False),
-    envvar="KAHANMAPS_DB",
-    metavar="FILE",
-    help="The database of results, instead of DB (or set KAHANMAPS_DB).",
+@picture(
+    "batch",
+    click.argument("database", required=False, type=click.Path(dir_okay=False), metavar="[DB]"),
+    click.option(
+        "--db",
+        type=click.Path(dir_okay=False),
+        envvar="KAHANMAPS_DB",
+        metavar="FILE",
+        help="The database of results, instead of DB (or set KAHANMAPS_DB).",
+    ),
+    click.option("--by", metavar="NAME,...", help="Group by these, e.g. m,eps (default: experiment)."),
+    click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number. Repeatable."),
+    click.option("--x", metavar="NAME", help="With --y: a dot for each task, along this axis ..."),
+    click.option("--y", metavar="NAME", help="... and at the height of this number; --by NAME colours them."),
+    click.option("--scale", type=click.Choice(["linear", "log"]), help="Of the numbers (default: by their range)."),
+    click.option("-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable."),
 )
-@click.option("--by", metavar="NAME,...", help="Group by these, e.g. m,eps (default: experiment).")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number. Repeatable.")
-@click.option("--x", metavar="NAME", help="With --y: a dot for each task, along this axis ...")
-@click.option("--y", metavar="NAME", help="... and at the height of this number; --by NAME colours them.")
-@click.option("--scale", type=click.Choice(["linear", "log"]), help="Of the numbers (default: by their range).")
-@click.option("-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable.")
-@picture_options
-def command(database: str | None, db: str | None, **options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """Results of a batch: counts, distributions, or one number against another.
 
     \b
@@ -50,9 +47,7 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
 
     Exit status: 0 done, 2 usage error, or there is no task to draw.
     """
-    from kahanmaps.experiments.store import Store
-
-    require_output(options)
+    database, db = options["database"], options["db"]
     source = click.get_current_context().get_parameter_source("db")
     if database is not None and source is ParameterSource.COMMANDLINE:
         raise click.UsageError("give DB or --db FILE, not both")
@@ -64,54 +59,44 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
         raise click.UsageError("give --x NAME and --y NAME, both or none")
     if options["x"] is not None and (options["values"] or len(by) > 1):
         raise click.UsageError("found --x with --value or several names in --by, expected at most one name in --by")
-    with Store.open(path, readonly=True) as store, Progress(options["quiet"]) as progress:
+    with lib.Store.open(path, readonly=True) as store:
         rows = _told(store.rows(list(options["only"]) or None, missing=True), path, progress)
-        figure, talk = _pairs(rows, by, options) if options["x"] is not None else _groups(rows, by, options)
-    deliver(figure, options)
-    if not options["quiet"]:
-        for sentence in talk:
-            say(sentence)
-    return 0
+        return (_groups if options["x"] is None else _pairs)(rows, by, options)
 
 
-def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure, list[str]]:
-    from kahanmaps.errors import counted
-    from kahanmaps.experiments.summary import summarise
-    from kahanmaps.plots.batch import draw_batch, groups_beyond
+def _groups(rows: Iterable[lib.Row], by: list[str], options: dict[str, Any]) -> Drawn:
 
     values = list(dict.fromkeys(options["values"]))
-    summary = summarise(rows, by or ["experiment"], values)
+    summary = lib.summarise(rows, by or ["experiment"], values)
     missing = sum(group.missing for group in summary.groups)
     talk = [f"{missing} tasks have no result yet"] if missing and values else []
     for name in values:
-        if beyond := groups_beyond(summary, name):
-            talk.append(f"{name}: {counted(beyond, 'group')} with numbers beyond the range of machine floats (1.8e308)")
-    return draw_batch(summary, values, style_from(options), scale=options["scale"]), talk
+        if beyond := lib.groups_beyond(summary, name):
+            talk.append(
+                f"{name}: {lib.counted(beyond, 'group')} with numbers beyond the range of machine floats (1.8e308)"
+            )
+    return Drawn(lib.draw_batch(summary, values, style_from(options), scale=options["scale"]), talk=talk)
 
 
-def _pairs(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure, list[str]]:
-    from kahanmaps.experiments.columns import value_pairs
-    from kahanmaps.plots.batch import clipped, draw_pairs
+def _pairs(rows: Iterable[lib.Row], by: list[str], options: dict[str, Any]) -> Drawn:
 
-    pairs = value_pairs(rows, options["x"], options["y"], by[0] if by else None)
+    pairs = lib.value_pairs(rows, options["x"], options["y"], by[0] if by else None)
     talk = []
     if pairs.missing:
         talk.append(f"{pairs.missing} tasks have no result yet")
     if pairs.left_out:
         talk.append(f"{pairs.left_out} results have no {options['x']} or no number {options['y']}: left out")
-    if clipped(pairs):
-        talk.append(f"{clipped(pairs)} numbers are beyond the range of machine floats (1.8e308): left out")
-    return draw_pairs(pairs, style_from(options), scale=options["scale"]), talk
+    if lib.clipped(pairs):
+        talk.append(f"{lib.clipped(pairs)} numbers are beyond the range of machine floats (1.8e308): left out")
+    return Drawn(lib.draw_pairs(pairs, style_from(options), scale=options["scale"]), talk=talk)
 
 
-def _told(rows: Iterable[Row], path: str, progress: Progress) -> Iterator[Row]:
+def _told(rows: Iterable[lib.Row], path: str, progress: Progress) -> Iterator[lib.Row]:
     """Rows as they come, with a word of progress now and then. Raises InputError where there is none."""
-    from kahanmaps.errors import InputError
-
     count = 0
     for count, row in enumerate(rows, 1):
         if count % _TOLD == 0:
             progress(f"{count} tasks read")
         yield row
     if not count:
-        raise InputError(f"found no task in {path}, expected at least one to draw")
+        raise lib.InputError(f"found no task in {path}, expected at least one to draw")

@@ -6,33 +6,27 @@ from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
-from kahanmaps_cli.pictures.output import (
-    PictureCommand,
-    deliver,
-    goes_to_terminal,
-    picture_options,
-    require_output,
-    style_from,
-)
-from kahanmaps_cli.pictures.variables import two_variables
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from, two_variables
+from kahanmaps_cli.progress import Progress
 
 
-@click.command("commute", cls=PictureCommand)
-@click.argument("system", required=False)
-@click.argument("other", required=False)
-@inline_options
-@click.option("--start", type=PointText(), metavar="X", required=True, help="The point x.")
-@eps_options
-@click.option("--eps2", type=ExactNumber(), metavar="E", help="Another eps for the map of OTHER.")
-@click.option(
-    "--steps", type=int, metavar="N", default=1, show_default=True, help="Steps of each map: a lattice, up to 12."
+@picture(
+    "commute",
+    click.argument("system", required=False),
+    click.argument("other", required=False),
+    inline_options,
+    click.option("--start", type=PointText(), metavar="X", required=True, help="The point x."),
+    eps_options,
+    click.option("--eps2", type=ExactNumber(), metavar="E", help="Another eps for the map of OTHER."),
+    click.option(
+        "--steps", type=int, metavar="N", default=1, show_default=True, help="Steps of each map: a lattice, up to 12."
+    ),
+    click.option("--axes", "axes", metavar="X,Y", help="The two variables shown (default: where squares are widest)."),
 )
-@click.option("--axes", "axes", metavar="X,Y", help="The two variables shown (default: where squares are widest).")
-@picture_options
-def command(system: str | None, other: str | None, **options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The square x, Phi_f x, Phi_g x: do its two fourth corners coincide?
 
     \b
@@ -50,39 +44,30 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
 
     Exit status: 0 done, 2 usage error, 3 some points are missing (a map has no value there, or numbers are too long).
     """
-    require_output(options)
-    from flint import fmpq
-
-    from kahanmaps.plots.draw_squares import draw_squares
-    from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, squares
-
+    system, other = options["system"], options["other"]
     if is_inline(options) and system is not None and other is None:
         system, other = None, system  # the inline system is the first, the argument the second
     if system == other == "-":
         raise click.UsageError("found - twice, but standard input holds one system only")
     if options["eps2"] is not None and other is None:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
-    with Progress(options["quiet"]) as progress:
-        file, second = load_pair(system, other, options)
-        eps = eps_of(file if second is None or file.map.has_eps else second, options)
-        eps = fmpq(1) if eps is None else eps
-        chosen = two_variables("--axes", options["axes"], file.variables)
-        if second is None:
-            captions = list[str]()
-            pairs = list(pairs_of_member(file))
-        else:
-            captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
-            pairs = [pair_of_systems(file, second, eps, options["eps2"])]
-        found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-        below = goes_to_terminal(options)  # side by side, two panels of it are too coarse
-        figure = draw_squares(found, style_from(options), chosen, captions, below=below)
-    if not options["quiet"]:
-        for square in found:
-            names = captions[0] if captions else " and ".join(square.pair.names)
-            say(f"{names}: {square.verdict}")
-            if square.pair.note:
-                say(f"  {square.pair.note}")
-            if square.stopped:
-                say(f"  points are missing: {square.stopped}")
-    deliver(figure, options, file if second is None else None)
-    return 3 if any(square.stopped for square in found) else 0
+    file, second = load_pair(system, other, options)
+    eps = eps_of(file if second is None or file.map.has_eps else second, options)
+    eps = lib.fmpq(1) if eps is None else eps
+    chosen = two_variables("--axes", options["axes"], file.variables)
+    if second is None:
+        captions, pairs = list[str](), list(lib.pairs_of_member(file))
+    else:
+        captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
+        pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
+    found = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
+    below = goes_to_terminal(options)  # side by side, two panels of it are too coarse
+    figure = lib.draw_squares(found, style_from(options), chosen, captions, below=below)
+    talk = []
+    for square in found:
+        names = captions[0] if captions else " and ".join(square.pair.names)
+        talk.append(f"{names}: {square.verdict}")
+        talk += [f"  {square.pair.note}"] * bool(square.pair.note)
+        talk += [f"  points are missing: {square.stopped}"] * bool(square.stopped)
+    is_partial = any(square.stopped for square in found)
+    return Drawn(figure, file if second is None else None, talk, 3 if is_partial else 0)

@@ -2,45 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.progress import Progress, say
-
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.plots.drift import DriftSurvey
-    from kahanmaps.plots.drift_functions import WatchedFunction
+from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from
+from kahanmaps_cli.progress import Progress
 
 _WIDE = 24.0  # centimetres: in a terminal panels stand side by side, for its lines are few
 _LONGEST = 160  # characters of a start that is told
 _SHOWN = 3  # known integrals, unless more are asked for
 
 
-@click.command("drift", cls=PictureCommand)
-@system_options
-@click.option("--start", type=PointText(), metavar="X", help="Where orbits start (default: a random small point).")
-@eps_options
-@click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="Steps of each orbit.")
-@integral_option("An expression in the variables and eps, a known one by name, or 'known' for all of these.")
-@click.option(
-    "--method",
-    "methods",
-    type=click.Choice(["generic", "normal-form", "rk4", "midpoint"]),
-    multiple=True,
-    help="Repeatable (default: all that there are).",
+@picture(
+    "drift",
+    system_options,
+    click.option("--start", type=PointText(), metavar="X", help="Where orbits start (default: a random small point)."),
+    eps_options,
+    click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="Steps of each orbit."),
+    integral_option("An expression in the variables and eps, a known one by name, or 'known' for all of these."),
+    click.option(
+        "--method",
+        "methods",
+        type=click.Choice(["generic", "normal-form", "rk4", "midpoint"]),
+        multiple=True,
+        help="Repeatable (default: all that there are).",
+    ),
+    click.option(
+        "--scale",
+        type=click.Choice(["loglog", "semilog"]),
+        default="loglog",
+        show_default=True,
+        help="Axes of the errors.",
+    ),
+    seed_option,
 )
-@click.option(
-    "--scale", type=click.Choice(["loglog", "semilog"]), default="loglog", show_default=True, help="Axes of the errors."
-)
-@seed_option
-@picture_options
-def command(system: str | None, **options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """How far integrals drift along float orbits: Kahan, RK4, implicit midpoint.
 
     \b
@@ -58,90 +60,74 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 done, 2 usage error, 3 some orbit ended early (the picture is
     written).
     """
-    from kahanmaps.plots.draw_drift import draw_drift
-
-    require_output(options)
-    file = load_system(system, options)
+    file = load_system(options["system"], options)
     rounded = file.rounded
-    _ = rounded.system  # it is compared with methods for vector fields
+    system = rounded.system  # it is compared with methods for vector fields
     eps = the_eps(options["eps"], options["time_step"])
-    survey = _surveyed(rounded, eps, options)
-    style = style_from(options)
-    if options["size"] is None and options["output"] == "-" and options["kind"] in (None, "text"):
-        style = replace(style, width=_WIDE, height=0.56 * _WIDE)
-    deliver(draw_drift(survey, style, scale=options["scale"]), options, file)
-    early = [method for method, end in survey.ends.items() if not end.is_whole]
-    if not options["quiet"]:
-        _tell(survey, early)
-    return 3 if early else 0
-
-
-def _surveyed(file: SystemFile, eps: Any, options: dict[str, Any]) -> DriftSurvey:
-    from kahanmaps.errors import InputError
-    from kahanmaps.family.structure import NoStructure
-    from kahanmaps.plots.drift import METHODS, small_start, survey_drift
-
     if eps == 0:
-        raise InputError("found eps = 0, expected another number: nothing moves")
-    functions = _functions(file, eps, options)
-    structure = file.structure
-    form = None
-    if isinstance(structure, NoStructure):
-        reason = structure.reason
-    elif structure.T is not None:
-        reason = "in machine numbers only J = [[0, I], [-I, 0]] has one"
-    else:
-        form, reason = structure.form, ""
-    methods = options["methods"] or [name for name in METHODS if name != "normal-form" or form is not None]
+        raise lib.InputError("found eps = 0, expected another number: nothing moves")
+    talk: list[str] = []
+    functions = _functions(rounded, eps, options, talk)
+    form, reason = _form(rounded)
+    methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
     if "normal-form" in methods and form is None:
-        raise InputError(f"the method normal-form needs a normal form, and there is none: {reason}")
-    start = options["start"] or small_start(file.system, eps, options["seed"])
-    with Progress(options["quiet"]) as progress:
-        return survey_drift(
-            file.system,
-            eps,
-            start,
-            options["steps"],
-            functions,
-            list(dict.fromkeys(methods)),
-            form=form,
-            linear_bins=options["scale"] == "semilog",
-            progress=progress,
-        )
+        raise lib.InputError(f"the method normal-form needs a normal form, and there is none: {reason}")
+    start = options["start"] or lib.small_start(system, eps, options["seed"])
+    survey = lib.survey_drift(
+        system,
+        eps,
+        start,
+        options["steps"],
+        functions,
+        list(dict.fromkeys(methods)),
+        form=form,
+        linear_bins=options["scale"] == "semilog",
+        progress=progress,
+    )
+    style = style_from(options)
+    if options["size"] is None and options["output"] == "-" and goes_to_terminal(options):
+        style = replace(style, width=_WIDE, height=0.56 * _WIDE)
+    early = not all(end.is_whole for end in survey.ends.values())
+    figure = lib.draw_drift(survey, style, scale=options["scale"])
+    return Drawn(figure, file, [*talk, *_told(survey)], 3 if early else 0)
 
 
-def _functions(file: SystemFile, eps: Any, options: dict[str, Any]) -> list[WatchedFunction]:
-    from kahanmaps.plots.drift_functions import asked_functions, known_functions
+def _form(file: lib.SystemFile) -> tuple[lib.NormalForm | None, str]:
+    """The normal form that machine numbers can step in, or why there is none."""
+    structure = file.structure
+    if isinstance(structure, lib.NoStructure):
+        return None, structure.reason
+    if structure.T is not None:
+        return None, "in machine numbers only J = [[0, I], [-I, 0]] has one"
+    return structure.form, ""
+
+
+def _functions(file: lib.SystemFile, eps: Any, options: dict[str, Any], talk: list[str]) -> list[lib.WatchedFunction]:
 
     if options["integrals"]:
-        return asked_functions(file, eps, options["integrals"])
-    known = known_functions(file, eps)
+        return lib.asked_functions(file, eps, options["integrals"])
+    known = lib.known_functions(file, eps)
     own = [function for function in known if function.name != "H"]
-    if len(own) > _SHOWN and not options["quiet"]:
-        say(f"shown: {_SHOWN} of {len(own)} known integrals; --integral NAME shows others")
+    if len(own) > _SHOWN:
+        talk.append(f"shown: {_SHOWN} of {len(own)} known integrals; --integral NAME shows others")
     return own[:_SHOWN] + [function for function in known if function.name == "H"]
 
 
-def _tell(survey: DriftSurvey, early: list[str]) -> None:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.errors import counted
-    from kahanmaps.plots.draw_drift import clipped_from
-    from kahanmaps.plots.drift import METHODS
+def _told(survey: lib.DriftSurvey) -> Iterator[str]:
 
-    point = ",".join(format_number(entry) for entry in survey.start)
+    point = ",".join(lib.format_number(entry) for entry in survey.start)
     point = point if len(point) <= _LONGEST else point[:_LONGEST] + "..."
-    say(f"start {point}, eps = {survey.eps} (time step 2 eps = {2 * survey.eps})")
+    yield f"start {point}, eps = {survey.eps} (time step 2 eps = {2 * survey.eps})"
     for name, is_relative in survey.relative.items():
         if not is_relative:
-            say(f"{name}: absolute errors, for it is 0 at the start")
+            yield f"{name}: absolute errors, for it is 0 at the start"
     for curve in survey.curves:
         if curve.undefined:
-            missing = counted(curve.undefined, "step")
-            say(f"{curve.function} along {METHODS[curve.method]}: no value at {missing}, left out")
-    for name in survey.labels:
-        limit = clipped_from(survey, name)
-        over = [curve.method for curve in survey.curves if curve.function == name and (curve.errors > limit).any()]
-        for method in over:
-            say(f"{name} along {METHODS[method]}: errors above {limit:.0e} are an arrow at the top")
-    for method in early:
-        say(f"{METHODS[method]} ended early: {survey.ends[method].message}")
+            missing = lib.counted(curve.undefined, "step")
+            yield f"{curve.function} along {lib.METHODS[curve.method]}: no value at {missing}, left out"
+        if (curve.errors > (limit := lib.clipped_from(survey, curve.function))).any():
+            what = f"{curve.function} along {lib.METHODS[curve.method]}"
+            yield f"{what}: errors above {limit:.0e} are an arrow at the top"
+    for method, end in survey.ends.items():
+        if not end.is_whole:
+            yield f"{lib.METHODS[method]} ended early: {end.message}"

@@ -2,38 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.pictures.variables import two_variables
-from kahanmaps_cli.progress import Progress, say
-
-if TYPE_CHECKING:
-    from kahanmaps.plots.invariant_curves import InvariantCurves
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from, two_variables
+from kahanmaps_cli.progress import Progress
 
 
-@click.command("invariant-curves", cls=PictureCommand)
-@system_options
-@click.option(
-    "--start",
-    "starts",
-    type=PointText(),
-    metavar="X",
-    multiple=True,
-    required=True,
-    help="Start of an orbit. Repeatable.",
+@picture(
+    "invariant-curves",
+    system_options,
+    click.option(
+        "--start",
+        "starts",
+        type=PointText(),
+        metavar="X",
+        multiple=True,
+        required=True,
+        help="Start of an orbit. Repeatable.",
+    ),
+    eps_options,
+    click.option("--steps", type=int, metavar="N", default=120, show_default=True, help="Steps of each orbit."),
+    click.option("--original", metavar="X,Y", help="A first panel with the orbit in these two variables."),
+    click.option("--projective", is_flag=True, help="All of each plane as a disc, infinity as its rim."),
+    click.option("--flow", is_flag=True, help="Dashed: the level curves of the differential equation."),
 )
-@eps_options
-@click.option("--steps", type=int, metavar="N", default=120, show_default=True, help="Steps of each orbit.")
-@click.option("--original", metavar="X,Y", help="A first panel with the orbit in these two variables.")
-@click.option("--projective", is_flag=True, help="All of each plane as a disc, infinity as its rim.")
-@click.option("--flow", is_flag=True, help="Dashed: the level curves of the differential equation.")
-@picture_options
-def command(**options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The curves that carry the orbits of a member of the commuting family, plane by plane.
 
     \b
@@ -54,50 +53,39 @@ def command(**options: Any) -> int:
 
     Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met a pole (the picture shows what came before).
     """
-    require_output(options)
-    from kahanmaps.algebra.text import format_point
-    from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
-    from kahanmaps.plots.invariant_curves import find_invariant_curves
-
-    with Progress(options["quiet"]) as progress:
-        file = load_system(options["system"], options)
-        eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
-        original = two_variables("--original", options["original"], file.variables)
-        found = find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
-        labels = [f"start {_short(format_point(start))}" for start in options["starts"]]
-        figure = draw_invariant_curves(
-            found, style_from(options), options["projective"], options["flow"], original, labels
-        )
-    if not options["quiet"]:
-        _tell(found, options["projective"])
-    deliver(figure, options, file)
-    return 0 if all(pole is None for pole in found.poles) else 3
+    file = load_system(options["system"], options)
+    eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
+    original = two_variables("--original", options["original"], file.variables)
+    found = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
+    labels = [f"start {_short(lib.format_point(start))}" for start in options["starts"]]
+    figure = lib.draw_invariant_curves(
+        found, style_from(options), options["projective"], options["flow"], original, labels
+    )
+    is_whole = all(pole is None for pole in found.poles)
+    return Drawn(figure, file, list(_told(found, options["projective"])), 0 if is_whole else 3)
 
 
 def _short(text: str) -> str:
     return text if len(text) <= 30 else text[:30] + "..."
 
 
-def _tell(found: InvariantCurves, projective: bool) -> None:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.plots.draw_invariant_curves import panels_of
-    from kahanmaps.plots.plane_views import view_of
+def _told(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:
 
-    eps, twice = _short(format_number(found.eps)), _short(format_number(2 * found.eps))
-    say(f"{found.structure}; eps = {eps} (time step 2 eps = {twice})")
+    eps, twice = _short(lib.format_number(found.eps)), _short(lib.format_number(2 * found.eps))
+    yield f"{found.structure}; eps = {eps} (time step 2 eps = {twice})"
     for k, pole in enumerate(found.poles, 1):
         if pole is not None:
             which = f"start {k}: " if len(found.poles) > 1 else ""
-            say(f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96")
+            yield f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96"
     for plane in found.planes:
         if plane.shape == "0":
-            say(f"lambda = {plane.root_text}: h = 0, nothing moves in this plane")
+            yield f"lambda = {plane.root_text}: h = 0, nothing moves in this plane"
     if projective:
         return
     outside = [
         f"{view.outside} ({'' if column == 'uv' else column + ', '}lambda = {plane.root_text})"
-        for _, plane, column in panels_of(found)
-        if (view := view_of(plane, column)).outside
+        for _, plane, column in lib.panels_of(found)
+        if (view := lib.view_of(plane, column)).outside
     ]
     if outside:
-        say(f"dots outside the windows: {', '.join(outside)}; --projective shows all of them")
+        yield f"dots outside the windows: {', '.join(outside)}; --projective shows all of them"

@@ -7,24 +7,24 @@ import re
 import shutil
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import update_wrapper
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from kahanmaps.errors import printable
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.params import OptionType
-from kahanmaps_cli.progress import as_typed, say
+from kahanmaps_cli.params import OptionType, PointText
+from kahanmaps_cli.progress import Progress, as_typed, say
 from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.plots.style import Style
-    from kahanmaps.plots.terminal import Cell
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"
@@ -76,24 +76,12 @@ picture_options: Callable[[F], F] = stack(
 )
 
 
-def style_from(options: dict[str, Any]) -> Style:
+def style_from(options: dict[str, Any]) -> lib.Style:
     """The style that the options ask for."""
-    from kahanmaps.plots.style import Style
-
     given = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
     if options["size"] is not None:
         given["width"], given["height"] = options["size"]
-    return Style(**given)
-
-
-def require_output(options: dict[str, Any]) -> None:
-    """Refuse, before anything is computed, a picture of no known kind."""
-    from kahanmaps.plots.figures import format_of, require_matplotlib
-
-    require_matplotlib()
-    style_from(options)
-    if options["output"] != "-" and options["kind"] != "text":
-        format_of(options["output"], options["kind"])
+    return lib.Style(**given)
 
 
 def goes_to_terminal(options: dict[str, Any]) -> bool:
@@ -101,34 +89,99 @@ def goes_to_terminal(options: dict[str, Any]) -> bool:
     return options["kind"] == "text" or (options["kind"] is None and options["output"] == "-")
 
 
-def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
+@dataclass(frozen=True)
+class Drawn:
+    """A picture for `picture` to deliver; None where nothing was found that could be drawn.
+
+    `file` is the system for its recipe, `talk` are sentences for standard error, `status` is the exit status.
+    """
+
+    figure: Figure | None
+    file: lib.SystemFile | None = None
+    talk: Sequence[str] = ()
+    status: int = 0
+
+
+Draw = Callable[[dict[str, Any], Progress], Drawn]
+
+
+def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click.Command]:
+    """A command `kahanmaps plot NAME` with these options and those of all pictures, from what draws by their values."""
+
+    def made(draw: Draw) -> click.Command:
+        def command(**options: Any) -> int:
+            """Draw, talk, and deliver."""
+            lib.require_matplotlib()  # and a picture of no known kind is refused before anything is computed
+            style_from(options)
+            if options["output"] != "-" and options["kind"] != "text":
+                lib.format_of(options["output"], options["kind"])
+            with Progress(options["quiet"]) as progress:
+                drawn = draw(options, progress)
+            if not options["quiet"]:
+                for sentence in drawn.talk:
+                    say(sentence)
+            if drawn.figure is not None:
+                _deliver(drawn.figure, options, drawn.file)
+            return drawn.status
+
+        update_wrapper(command, draw)
+        return click.command(name, cls=PictureCommand)(stack(*options, picture_options)(command))
+
+    return made
+
+
+def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
+    """The option --window."""
+    return click.option("--window", type=PointText(), metavar=numbers, help="The part that is shown.")
+
+
+def window_from(options: dict[str, Any], axes: int) -> lib.Window | None:
+    """The window that --window asks for, in so many axes."""
+    return None if options["window"] is None else lib.require_window(lib.to_floats(options["window"]).tolist(), axes)
+
+
+def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> tuple[int, int] | None:
+    """The numbers of two variables that the text X,Y of an option names; None for none."""
+    if text is None:
+        return None
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or any(name not in variables for name in names):
+        raise click.UsageError(
+            f"found {option} {text[:60]}, expected two of the variables {', '.join(variables)}, as X,Y"
+        )
+    if names[0] == names[1] and len(variables) > 1:
+        raise click.UsageError(f"found {option} {text[:60]}, expected two different variables")
+    return variables.index(names[0]), variables.index(names[1])
+
+
+def _deliver(figure: Figure, options: dict[str, Any], file: lib.SystemFile | None) -> None:
     """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
-    from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain, wrapped
-    from kahanmaps.plots.recipe import Recipe
-    from kahanmaps.whole_files import write_whole
+    from kahanmaps.plots.figures import plain
 
     style = style_from(options)
     path, kind = options["output"], options["kind"]
     if options["title"]:
-        with drawing(style):
+        with lib.drawing(style):
             size = style.font_size + 1
             figure.suptitle(
-                plain(wrapped(printable(options["title"]), 72 * figure.get_size_inches()[0], size)), fontsize=size
+                plain(lib.wrapped(printable(options["title"]), 72 * figure.get_size_inches()[0], size)), fontsize=size
             )
     if goes_to_terminal(options):
         _draw_in_terminal(figure, style, path)
         return
-    kind = format_of(path, kind)
+    kind = lib.format_of(path, kind)
     with warnings.catch_warnings(record=True) as found:
         warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
-        content = picture_bytes(figure, kind, style, Recipe(command_line(), "" if file is None else file.to_toml()))
+        content = lib.picture_bytes(
+            figure, kind, style, lib.Recipe(command_line(), "" if file is None else file.to_toml())
+        )
     if found and not options["quiet"]:
         say("the fonts lack some letters of the texts: they are drawn as boxes")
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
         return
-    write_whole(path, content)
+    lib.write_whole(path, content)
     if not options["quiet"]:
         width, height = figure.get_size_inches() * 2.54
         say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
@@ -141,19 +194,16 @@ def command_line() -> str:
     return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
 
 
-def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
-    from kahanmaps.errors import InputError
-    from kahanmaps.plots.terminal import draw_in_characters
-    from kahanmaps.whole_files import write_whole
+def _draw_in_terminal(figure: Figure, style: lib.Style, path: str) -> None:
 
     window = shutil.get_terminal_size()
     columns = max(20, window.columns - 1)
     width, height = figure.get_size_inches()
     rows = max(8, min(window.lines - 2, round(columns / 2 * height / width), _MOST_ROWS))
     try:
-        cells = draw_in_characters(figure, columns, rows, style)
-    except InputError:  # several panels do not fit into a small window, and there they are scrolled
-        cells = draw_in_characters(figure, columns, _MOST_ROWS, style)
+        cells = lib.draw_in_characters(figure, columns, rows, style)
+    except lib.InputError:  # several panels do not fit into a small window, and there they are scrolled
+        cells = lib.draw_in_characters(figure, columns, _MOST_ROWS, style)
     if path == "-" and is_coloured():
         _print_in_colour(cells)
         return
@@ -161,10 +211,10 @@ def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
     if path == "-":
         click.echo(text, nl=False)
     else:
-        write_whole(path, text.encode())
+        lib.write_whole(path, text.encode())
 
 
-def _print_in_colour(cells: list[list[Cell]]) -> None:
+def _print_in_colour(cells: list[list[lib.Cell]]) -> None:
     from rich.console import Console
     from rich.text import Text
 

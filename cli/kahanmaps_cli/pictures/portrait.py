@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps.errors import counted
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import (
     backward_option,
     eps_of,
@@ -19,67 +20,73 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
 from kahanmaps_cli.pictures.portrait_orbits import Orbits
 from kahanmaps_cli.pictures.stored import read_orbits
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.progress import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from kahanmaps.plots.level_sets import LevelCurves
-    from kahanmaps.plots.windows import Window
 
 _MAX_STEPS = 10**9
 _STEPS, _STEPS_ON_A_LINE, _DENSITY_STEPS = 1000, 100, 100_000
 _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "euler")
 
 
-@click.command("portrait", cls=PictureCommand)
-@system_options
-@eps_options
-@click.option("--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits.")
-@random_starts_options
-@click.option(
-    "--steps",
-    type=int,
-    metavar="N",
-    help="Steps of each orbit (default 1000; of one variable 100; with --density 100000).",
+@picture(
+    "portrait",
+    system_options,
+    eps_options,
+    click.option(
+        "--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits."
+    ),
+    random_starts_options,
+    click.option(
+        "--steps",
+        type=int,
+        metavar="N",
+        help="Steps of each orbit (default 1000; of one variable 100; with --density 100000).",
+    ),
+    backward_option,
+    click.option(
+        "--from",
+        "stored",
+        type=click.Path(exists=True, dir_okay=False),
+        metavar="FILE",
+        help="Draw the orbits in a .npy, .npz, .jsonl or .csv file that orbit or ensemble wrote; SYSTEM may be left "
+        "out.",
+    ),
+    click.option(
+        "--axes", metavar="A,B[,C]", help="Two or three variables or expressions; step is the number of the step."
+    ),
+    click.option("--3d", "space", is_flag=True, help="Three axes, chosen by themselves."),
+    click.option(
+        "--colour-by",
+        "--color-by",
+        "colour",
+        default="orbit",
+        show_default=True,
+        metavar="F",
+        help="orbit, step, an integral (or H) by its name, or an expression.",
+    ),
+    click.option(
+        "--lines", is_flag=True, help="Join the points of each orbit: neighbours on a curve, or one step and the next."
+    ),
+    click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes."),
+    click.option(
+        "--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts."
+    ),
+    click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them."),
+    click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below."),
+    click.option(
+        "--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines."
+    ),
+    click.option("--no-field", is_flag=True, help="No arrows, equilibria and separatrices of a planar system."),
+    window_option(),
+    click.option("--equal", is_flag=True, help="The same unit of length along both axes."),
 )
-@backward_option
-@click.option(
-    "--from",
-    "stored",
-    type=click.Path(exists=True, dir_okay=False),
-    metavar="FILE",
-    help="Draw the orbits in a .npy, .npz, .jsonl or .csv file that orbit or ensemble wrote; SYSTEM may be left out.",
-)
-@click.option(
-    "--axes", metavar="A,B[,C]", help="Two or three variables or expressions; step is the number of the step."
-)
-@click.option("--3d", "space", is_flag=True, help="Three axes, chosen by themselves.")
-@click.option(
-    "--colour-by",
-    "--color-by",
-    "colour",
-    default="orbit",
-    show_default=True,
-    metavar="F",
-    help="orbit, step, an integral (or H) by its name, or an expression.",
-)
-@click.option(
-    "--lines", is_flag=True, help="Join the points of each orbit: neighbours on a curve, or one step and the next."
-)
-@click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes.")
-@click.option("--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts.")
-@click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them.")
-@click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below.")
-@click.option("--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines.")
-@click.option("--no-field", is_flag=True, help="No arrows, equilibria and separatrices of a planar system.")
-@click.option("--window", type=PointText(), metavar="X0,X1,Y0,Y1", help="The part that is shown.")
-@click.option("--equal", is_flag=True, help="The same unit of length along both axes.")
-@picture_options
-def command(system: str | None, **options: Any) -> int:
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The phase portrait of SYSTEM: float orbits of its map, projected.
 
     \b
@@ -102,17 +109,12 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
-    require_output(options)
-    style_from(options)
+    system = options["system"]
     _require_sense(system, options)
     orbits = _stored(system, options) if options["stored"] else _walked(system, options)
-    with Progress(options["quiet"]) as progress:
-        figure = (_density if options["density"] else _portrait)(orbits, options, progress)
-    if orbits.walked is not None and not options["quiet"]:
-        for line in (*orbits.told(), *orbits.notes):
-            say(line)
-    deliver(figure, options, orbits.file)
-    return 130 if orbits.interrupted else 3 if orbits.ended else 0
+    figure = (_density if options["density"] else _portrait)(orbits, options, progress)
+    talk = () if orbits.walked is None else (*orbits.told(), *orbits.notes)
+    return Drawn(figure, orbits.file, talk, 130 if orbits.interrupted else 3 if orbits.ended else 0)
 
 
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:
@@ -148,8 +150,6 @@ def _word(name: str) -> str:
 
 
 def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
-    from kahanmaps.algebra.text import parse_number
-    from kahanmaps.errors import InputError, printable
 
     file = None
     if system is not None or is_inline(options):
@@ -161,21 +161,19 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     told = stored.header.get("eps")
     try:
         if eps is None and isinstance(told, str):
-            eps = parse_number(told)
-        return Orbits.of_file(stored, file, eps, printable(str(stored.header.get("system", options["stored"]))))
-    except InputError as error:
-        raise InputError(f"{options['stored']}: {error}") from error
+            eps = lib.parse_number(told)
+        return Orbits.of_file(stored, file, eps, lib.printable(str(stored.header.get("system", options["stored"]))))
+    except lib.InputError as error:
+        raise lib.InputError(f"{options['stored']}: {error}") from error
 
 
 def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
-    from flint import fmpq
 
-    from kahanmaps.maps.floats.doubles import to_floats
     from kahanmaps_cli.ensemble_starts import drawn, read_starts
 
     file = load_system(system, options)
     eps = eps_of(file, options)
-    file.map.at(fmpq(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
+    file.map.at(lib.fmpq(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
     starts: Any = None
     if options["start"]:
         wrong = next((x for x in options["start"] if len(x) != file.dim), None)
@@ -183,7 +181,7 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
             raise click.UsageError(
                 f"found a start with {len(wrong)} coordinates, expected {file.dim}: {', '.join(file.variables)}"
             )
-        starts = to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
+        starts = lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
     elif options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, None)
     elif options["count"] is not None:
@@ -197,26 +195,16 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
     return Orbits.to_walk(file, eps, starts, steps, backward=options["backward"], axes=options["axes"])
 
 
-def _window(options: dict[str, Any], axes: int) -> Window | None:
-    from kahanmaps.maps.floats.doubles import to_floats
-    from kahanmaps.plots.windows import require_window
-
-    return None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), axes)
-
-
 def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Figure:
     from dataclasses import replace
-
-    from kahanmaps.plots.draw_portrait import draw_portrait
-    from kahanmaps.plots.portrait import portrait_of
 
     colour = options["colour"] if options["colour"] in ("orbit", "step") else orbits.colouring(options["colour"])
     levels = None if options["levels"] is None else orbits.function(options["levels"])
     found = orbits.walk(progress)
     axes = orbits.axes_from(options["axes"], 3 if options["space"] else 2)
-    window = _window(options, len(axes))
+    window = window_from(options, len(axes))
     euler = orbits.euler() if options["euler"] else None
-    shown = portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
+    shown = lib.portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
     shown = replace(shown, flow=orbits.flow(axes, shown.window, options))
     chords = sum(one is None for one in shown.joined)
     if chords:
@@ -231,40 +219,35 @@ def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fi
     if shown.undefined:
         orbits.notes.append(f"{shown.undefined} of {count} points are left out: an axis or the colour has a pole there")
     note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
-    return draw_portrait(shown, style_from(options), lines=options["lines"], equal=options["equal"], note=note)
+    return lib.draw_portrait(shown, style_from(options), lines=options["lines"], equal=options["equal"], note=note)
 
 
-def _levels(orbits: Orbits, function: Any, axes: Sequence[Any], at: Any, window: Window) -> LevelCurves:
-    from kahanmaps.errors import InputError
-    from kahanmaps.maps.floats.doubles import to_floats
-    from kahanmaps.plots.level_sets import level_curves, levels_through
+def _levels(orbits: Orbits, function: Any, axes: Sequence[Any], at: Any, window: lib.Window) -> lib.LevelCurves:
 
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if len(plane) != 2 or len(axes) != 2:
-        raise InputError("level curves are drawn in the plane of two variables: take --axes X,Y with two of them")
-    values = levels_through(function, orbits.starts) if at is None else to_floats(at).tolist()
-    found = level_curves(function, plane, len(orbits.variables), values, window)
+        raise lib.InputError("level curves are drawn in the plane of two variables: take --axes X,Y with two of them")
+    values = lib.levels_through(function, orbits.starts) if at is None else lib.to_floats(at).tolist()
+    found = lib.level_curves(function, plane, len(orbits.variables), values, window)
     if found.missing:
         orbits.notes.append(f"{found.missing} of {len(values)} levels of {function.name} have no curve in the window")
     return found
 
 
 def _density(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Figure:
-    from kahanmaps.plots.draw_portrait import cells_for, draw_density
-    from kahanmaps.plots.windows import window_of
 
     pilot = orbits.pilot()
     axes: Any = orbits.axes_from(options["axes"], 2, pilot)
     if len(axes) != 2 or any(isinstance(axis, str) for axis in axes):
         raise click.UsageError("--density counts points in a plane: it takes two axes, and step is not one")
-    window = _window(options, 2)
+    window = window_from(options, 2)
     if window is None:
         import numpy as np
 
         points, starts = (np.stack([axis(x) for axis in axes], axis=-1) for x in (pilot, orbits.starts))
-        window = window_of(points, starts)
+        window = lib.window_of(points, starts)
     style = style_from(options)
-    found = orbits.count(axes, window, cells_for(style), progress)
+    found = orbits.count(axes, window, lib.cells_for(style), progress)
     orbits.note_outside(found.outside, found.points)
     note = f"{found.outside} points outside" if found.outside and options["window"] is None else ""
-    return draw_density(found, style, equal=options["equal"], note=note)
+    return lib.draw_density(found, style, equal=options["equal"], note=note)

@@ -7,19 +7,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from kahanmaps.errors import InputError, counted
+from kahanmaps.errors import counted
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.maps.floats.doubles import FloatArray
-    from kahanmaps.plots.density import Density
-    from kahanmaps.plots.drift_functions import WatchedFunction
-    from kahanmaps.plots.flow import Flow
-    from kahanmaps.plots.point_functions import PointFunction
-    from kahanmaps.plots.trajectories import Trajectories
-    from kahanmaps.plots.windows import Window
-    from kahanmaps.systems.quadratic import QuadraticSystem
     from kahanmaps_cli.pictures.stored import Stored
 
 _PILOT = 4_000_000  # coordinates, from which the axes and the window of a density are chosen
@@ -27,12 +19,10 @@ _PILOT = 4_000_000  # coordinates, from which the axes and the window of a densi
 Told = Callable[[str], None]
 
 
-def _field_of(file: SystemFile) -> QuadraticSystem | None:
+def _field_of(file: lib.SystemFile) -> lib.QuadraticSystem | None:
     """The vector field whose Kahan map it is, a rational number in the place of an algebraic one; else None."""
-    from kahanmaps.maps.kahan import Kahan
-
     map_ = file.map.rounded
-    return map_.system if isinstance(map_, Kahan) and not map_.system.symbols else None
+    return map_.system if isinstance(map_, lib.Kahan) and not map_.system.symbols else None
 
 
 @dataclass(eq=False)
@@ -41,9 +31,9 @@ class Orbits:
 
     name: str
     variables: tuple[str, ...]
-    file: SystemFile | None
+    file: lib.SystemFile | None
     eps: Any
-    starts: FloatArray
+    starts: lib.FloatArray
     stored: Stored | None = None
     ensemble: Any = None
     form: Any = None
@@ -56,7 +46,7 @@ class Orbits:
     walked: int | None = None
 
     @classmethod
-    def of_file(cls, stored: Stored, file: SystemFile | None, eps: Any, name: str) -> Orbits:
+    def of_file(cls, stored: Stored, file: lib.SystemFile | None, eps: Any, name: str) -> Orbits:
         """Orbits of a file."""
         import numpy as np
 
@@ -65,15 +55,10 @@ class Orbits:
 
     @classmethod
     def to_walk(
-        cls, file: SystemFile, eps: Any, starts: Any, steps: int, *, backward: bool, axes: str | None
+        cls, file: lib.SystemFile, eps: Any, starts: Any, steps: int, *, backward: bool, axes: str | None
     ) -> Orbits:
         """Orbits that are to be walked, from `starts` or where those are None from chosen ones."""
-        from flint import fmpq
 
-        from kahanmaps.errors import InputError
-        from kahanmaps.family.structure import NoStructure
-        from kahanmaps.plots.automatic_starts import automatic_starts
-        from kahanmaps.plots.trajectories import ensemble_for
         from kahanmaps_cli.ensemble_run import structure_for
 
         chosen = starts is None
@@ -83,14 +68,16 @@ class Orbits:
             plane = [*plane, *(k for k in range(file.dim) if k not in plane)][:2]
             field = _field_of(file)
             if field is None:
-                raise InputError(
+                raise lib.InputError(
                     f"found no starts for {file.map.kind}, expected --start X, --starts FILE or --random N: they are "
                     "chosen around the fixed points of a vector field only"
                 )
-            starts = automatic_starts(field, eps, plane, backward=backward)
+            starts = lib.automatic_starts(field, eps, plane, backward=backward)
         structure = structure_for(file, None)
-        form = None if isinstance(structure, NoStructure) else structure.form
-        ensemble = ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
+        form = None if isinstance(structure, lib.NoStructure) else structure.form
+        ensemble = lib.ensemble_for(
+            file.map, lib.fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form
+        )
         return cls(
             file.label,
             file.variables,
@@ -115,39 +102,31 @@ class Orbits:
         """Whether the numbers of the steps are not known, only their order."""
         return self.stored is not None and not self.stored.header
 
-    def function(self, text: str) -> PointFunction:
+    def function(self, text: str) -> lib.PointFunction:
         """An integral of the system's file or H by its name, or an expression."""
-        from kahanmaps.plots.drift_functions import Expression
-        from kahanmaps.plots.point_functions import point_function
-
-        named = {name: known.function for name, known in self._known().items() if isinstance(known, Expression)}
+        named = {name: known.function for name, known in self._known().items() if isinstance(known, lib.PointFunction)}
         parameters = {} if self.file is None else self.file.rounded.parameters
-        return point_function(text.strip(), self.variables, self.eps, parameters, named)
+        return lib.point_function(text.strip(), self.variables, self.eps, parameters, named)
 
-    def colouring(self, text: str) -> PointFunction | WatchedFunction:
+    def colouring(self, text: str) -> lib.WatchedFunction:
         """The same, and integrals that theorems give, in which the image of the point occurs."""
         known = self._known().get(text.strip())
         return self.function(text) if known is None else known
 
-    def _known(self) -> Mapping[str, WatchedFunction]:
-        from flint import fmpq
-
-        from kahanmaps.plots.drift_functions import functions_of
+    def _known(self) -> Mapping[str, lib.WatchedFunction]:
 
         if self.file is None:
             return {}
-        return functions_of(self.file.rounded, fmpq(0) if self.eps is None else self.eps)
+        return lib.functions_of(self.file.rounded, lib.fmpq(0) if self.eps is None else self.eps)
 
-    def walk(self, progress: Told) -> Trajectories:
+    def walk(self, progress: Told) -> lib.Trajectories:
         """All points."""
         import numpy as np
 
-        from kahanmaps.plots.trajectories import Trajectories, require_points, walked
-
         if self.stored is not None:
             points = self.stored.points
-            require_points(*points.shape)
-            found = Trajectories(self.variables, np.array(points, dtype=np.float64), self.stored.steps, self.ended)
+            lib.require_points(*points.shape)
+            found = lib.Trajectories(self.variables, np.array(points, dtype=np.float64), self.stored.steps, self.ended)
         else:
 
             def told(step: int) -> None:
@@ -156,17 +135,15 @@ class Orbits:
                     self.ensemble.interrupt()
 
             with interruptible(self.interrupt):
-                found = walked(self.ensemble, self.steps, told)
+                found = lib.walked(self.ensemble, self.steps, told)
             self.ended, self.interrupted = found.ended, found.interrupted
         self._points = found.points
         self.walked = len(found.points) - 1
         return found
 
-    def pilot(self) -> FloatArray:
+    def pilot(self) -> lib.FloatArray:
         """Some points of a long walk, (points, dim): its beginning, or records all over a file."""
         import numpy as np
-
-        from kahanmaps.plots.trajectories import ensemble_for
 
         if self.stored is not None:
             points = self.stored.points
@@ -175,53 +152,48 @@ class Orbits:
         else:
             steps = max(1, min(self.steps, _PILOT // self.starts.size))
             system = self.ensemble.system
-            ensemble = ensemble_for(system, self.eps, self.starts, steps, backward=self.backward, form=self.form)
+            ensemble = lib.ensemble_for(system, self.eps, self.starts, steps, backward=self.backward, form=self.form)
             self._points = np.concatenate(list(ensemble.records(steps, 1)))
-        flat: FloatArray = self._points.reshape(-1, len(self.variables))
+        flat: lib.FloatArray = self._points.reshape(-1, len(self.variables))
         return flat
 
     def axes_from(
-        self, text: str | None, count: int, points: FloatArray | None = None
-    ) -> tuple[PointFunction | str, ...]:
+        self, text: str | None, count: int, points: lib.FloatArray | None = None
+    ) -> tuple[lib.PointFunction | str, ...]:
         """The axes that were asked for, or the `count` variables whose points fill most (said in the notes)."""
-        from kahanmaps.plots.windows import fullest_axes
-
         if text is not None:
             pieces = [piece.strip() for piece in text.split(",")]
             if len(pieces) not in (2, 3) or not all(pieces):
-                raise InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
+                raise lib.InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
             if len(set(pieces)) < len(pieces):
-                raise InputError(f"found --axes {text[:60]}, expected different ones")
+                raise lib.InputError(f"found --axes {text[:60]}, expected different ones")
             return tuple(
                 "step" if piece == "step" and "step" not in self.variables else self.function(piece) for piece in pieces
             )
         dim = len(self.variables)
         if dim < count and not (dim == 1 and count == 2):
-            raise InputError(f"found {dim} variables, expected at least {count} for that many axes")
+            raise lib.InputError(f"found {dim} variables, expected at least {count} for that many axes")
         if dim == 1:
             return "step", self.function(self.variables[0])
         flat = self._points.reshape(-1, dim) if points is None else points
-        chosen = [self.variables[k] for k in fullest_axes(flat, count)]
+        chosen = [self.variables[k] for k in lib.fullest_axes(flat, count)]
         if dim > count:
             self.notes.append(f"axes {', '.join(chosen)}: their points fill most of the picture (--axes chooses)")
         return tuple(self.function(name) for name in chosen)
 
-    def euler(self) -> Trajectories:
+    def euler(self) -> lib.Trajectories:
         """Explicit Euler from the same starts."""
-        from kahanmaps.plots.trajectories import euler_orbits
-
         assert self.file is not None
         system = _field_of(self.file) or self.file.system  # which says why there is none
-        found = euler_orbits(system, -self.eps if self.backward else self.eps, self.starts, self.steps)
+        found = lib.euler_orbits(system, -self.eps if self.backward else self.eps, self.starts, self.steps)
         for reason, count in found.ended.items():
             self.notes.append(f"explicit Euler: {counted(count, 'orbit')} {reason}")
         return found
 
-    def count(self, axes: Sequence[PointFunction], window: Window, shape: tuple[int, int], progress: Told) -> Density:
+    def count(
+        self, axes: Sequence[lib.PointFunction], window: lib.Window, shape: tuple[int, int], progress: Told
+    ) -> lib.Density:
         """The points of all orbits counted in cells."""
-        from kahanmaps.plots.density import density_of
-        from kahanmaps.plots.trajectories import ended_early, portions_of
-
         began = time.monotonic()
 
         def told(points: int) -> None:
@@ -229,51 +201,53 @@ class Orbits:
             progress(f"{points:.3g} of {total:.3g} points, {rate:.2g} a second")
 
         if self.stored is not None:
-            portions, total = portions_of(self.stored.points), self.stored.points.shape[0] * self.stored.points.shape[1]
+            portions, total = (
+                lib.portions_of(self.stored.points),
+                self.stored.points.shape[0] * self.stored.points.shape[1],
+            )
         else:
             portions, total = self.ensemble.records(self.steps, 1), self.ensemble.n * (self.steps + 1)
         with interruptible(self.interrupt):
-            found = density_of(self._while_wanted(portions), axes, window, shape, told)
+            found = lib.density_of(self._while_wanted(portions), axes, window, shape, told)
         if self.stored is not None:
             self.walked = len(self.stored.points) - 1
         else:
-            self.ended = ended_early(self.ensemble)
+            self.ended = lib.ended_early(self.ensemble)
             self.walked = self.ensemble.step
             self.interrupted = self.walked < self.steps
         return found
 
-    def _while_wanted(self, portions: Iterator[FloatArray]) -> Iterator[FloatArray]:
+    def _while_wanted(self, portions: Iterator[lib.FloatArray]) -> Iterator[lib.FloatArray]:
         for portion in portions:
             yield portion
             if self.interrupted:
                 return
 
-    def flow(self, axes: Sequence[PointFunction | str], window: Window, options: Mapping[str, Any]) -> Flow | None:
+    def flow(
+        self, axes: Sequence[lib.PointFunction | str], window: lib.Window, options: Mapping[str, Any]
+    ) -> lib.Flow | None:
         """What is drawn of the differential equation; None where the map has none or it is not wanted."""
         from dataclasses import replace
 
         import numpy as np
 
-        from kahanmaps.plots.flow import plane_flow, solutions
-        from kahanmaps.plots.windows import window_of
-
         system = None if self.file is None else _field_of(self.file)
         if system is None:
             if options["flow"]:
-                raise InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
+                raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
             return None
         functions = [axis for axis in axes if not isinstance(axis, str)]
         variables = [axis.variable for axis in functions if axis.variable is not None]
         in_plane = len(axes) == 2 and not options["no_field"]
-        found = plane_flow(system, variables if in_plane else [], window)
+        found = lib.plane_flow(system, variables if in_plane else [], window)
         if options["levels"] or options["euler"]:  # arrows among many grey lines tell nothing
             found = replace(found, places=found.places[:0], arrows=found.arrows[:0])
         if options["flow"]:
             if len(functions) < len(axes):
-                raise InputError("--flow draws curves in phase space: it does not go with the axis step")
-            box = window_of(self._points.reshape(-1, len(self.variables)), self.starts)
+                raise lib.InputError("--flow draws curves in phase space: it does not go with the axis step")
+            box = lib.window_of(self._points.reshape(-1, len(self.variables)), self.starts)
             time = float(2 * self.eps * self.steps) * (-1 if self.backward else 1) if self.steps else None
-            curves = solutions(system, self.starts, box, time)
+            curves = lib.solutions(system, self.starts, box, time)
             found = replace(found, solutions=tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves))
         return found
 

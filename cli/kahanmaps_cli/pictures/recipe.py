@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import echo
 
@@ -21,9 +22,7 @@ def command(picture: str, show_system: bool, as_json: bool) -> None:
 
     The system is kept as well, so that the picture can be remade where its system file has changed or was typed in.
     """
-    from kahanmaps.plots.recipe import read_recipe
-
-    recipe = read_recipe(picture)
+    recipe = lib.read_recipe(picture)
     if as_json:
         print_json({"command": recipe.command, "system": recipe.system or None, "version": recipe.version})
     elif show_system:

@@ -6,18 +6,19 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.progress import say
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
+from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.scan_run import ending, names_of, primes_of, scan_options, scanned
 
 
-@click.command("scan", cls=PictureCommand)
-@scan_options
-@click.option("--window", type=PointText(), metavar="A0,A1,B0,B1", help="The part that is shown.")
-@click.option("--modulo", type=int, metavar="P", help="The slow members modulo P, one of the primes, instead.")
-@picture_options
-def command(system: str | None, **options: Any) -> int:
+@picture(
+    "scan",
+    scan_options,
+    window_option("A0,A1,B0,B1"),
+    click.option("--modulo", type=int, metavar="P", help="The slow members modulo P, one of the primes, instead."),
+)
+def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The plane of two parameters: where degrees grow more slowly.
 
     \b
@@ -34,27 +35,19 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 done, 2 usage error, 3 the time was over, 130 interrupted
     (the picture is written if something was found).
     """
-    from flint import fmpz
-
-    from kahanmaps.maps.floats.fast import to_floats
-    from kahanmaps.plots.scan import draw_scan
-    from kahanmaps.plots.windows import require_window
-
-    require_output(options)
-    window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
+    window = window_from(options, 2)
     if window is not None and options["modulo"] is not None:
         raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
     modulo, primes = options["modulo"], primes_of(options["primes"])
-    if modulo is not None and not (modulo in primes if primes else fmpz(modulo).is_prime()):
+    if modulo is not None and not (modulo in primes if primes else lib.fmpz(modulo).is_prime()):
         raise click.UsageError(f"found --modulo {modulo}, expected one of the primes (--primes)")
     names = names_of(options)
     if len(names) != 2:
         raise click.UsageError(f"found --over {','.join(names)}, expected two parameters: a plane is drawn")
-    found = scanned(system, options["quiet"], options)
-    seen = found.components or any(one.prime == options["modulo"] for one in found.sweeps)
-    if found.ended != "complete" and not seen:
-        if not options["quiet"]:
-            say("there is no picture: nothing to be drawn was found before the scan ended")
-        return ending(found, options["quiet"])
-    deliver(draw_scan(found, style_from(options), window=window, modulo=options["modulo"]), options, found.file)
-    return ending(found, options["quiet"])
+    found = scanned(options["system"], options["quiet"], options)
+    status = ending(found, options["quiet"])
+    if found.ended != "complete" and not (found.components or any(one.prime == modulo for one in found.sweeps)):
+        return Drawn(
+            None, talk=["there is no picture: nothing to be drawn was found before the scan ended"], status=status
+        )
+    return Drawn(lib.draw_scan(found, style_from(options), window=window, modulo=modulo), found.file, status=status)

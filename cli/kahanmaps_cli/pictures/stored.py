@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from kahanmaps.errors import InputError
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.orbit_formats import meta_of
-
-if TYPE_CHECKING:
-    from kahanmaps.maps.floats.doubles import FloatArray
 
 _ENDINGS = (".npy", ".npz", ".jsonl", ".csv")
 _MAX_POINTS = 4_000_000  # of a file that has to be read as text
@@ -33,7 +31,7 @@ class Stored:
     """Points (records, orbits, dim), their steps, and what the file says: `header` is empty for .npy."""
 
     variables: tuple[str, ...]
-    points: FloatArray
+    points: lib.FloatArray
     steps: Any
     header: dict[str, Any]
     end: dict[str, Any]
@@ -171,10 +169,9 @@ def _stored(steps: Sequence[Any], x: Any, header: dict[str, Any], end: dict[str,
 
 
 def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
-    from kahanmaps.algebra.numerals import check_names
 
     names = tuple(str(name) for name in header["variables"])
-    check_names(names)
+    lib.check_names(names)
     if width and len(names) != width:
         raise ValueError(f"{len(names)} names for {width} columns")
     return names
@@ -182,31 +179,24 @@ def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
 
 def _reader(header: dict[str, Any]) -> Callable[[str], float]:
     """What reads the numbers of an orbit; those over a number field are read at the real root that is meant."""
-    from kahanmaps.algebra.fields import QQ
-    from kahanmaps.algebra.polynomials import evaluate
-    from kahanmaps.algebra.roots import parse_root
-    from kahanmaps.algebra.text import parse_polynomial
-
-    root = next((parse_root(str(text)) for text in header.get("algebraic", {}).values()), None)
+    root = next((lib.parse_root(str(text)) for text in header.get("algebraic", {}).values()), None)
     if root is None or header.get("arithmetic") != "exact":
         return _number
     rounded = cache(root.rounded)
 
     def number(text: str) -> float:
         bits = 1 << max(256, 8 * len(text)).bit_length()  # more than can be lost where conjugates are far away
-        return _number(str(evaluate(parse_polynomial(text, ["t"]), QQ, [rounded(bits)])))
+        return _number(str(lib.evaluate(lib.parse_polynomial(text, ["t"]), lib.QQ, [rounded(bits)])))
 
     return number
 
 
 def _number(text: str) -> float:
     """An integer, a decimal, p/q of any length, or the middle of a ball."""
-    from flint import fmpz
-
     middle = text.partition(" +/- ")[0].strip("[] ")
     above, slash, below = middle.partition("/")
     try:
-        value = int(fmpz(above)) / int(fmpz(below)) if slash else float(middle)
+        value = int(lib.fmpz(above)) / int(lib.fmpz(below)) if slash else float(middle)
     except OverflowError:
         value = inf
     if not isfinite(value):

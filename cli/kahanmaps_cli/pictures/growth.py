@@ -1,0 +1,184 @@
+"""kahanmaps plot degrees, kahanmaps plot heights: results computed now, or read from what --json wrote."""
+
+from __future__ import annotations
+
+import json
+import sys
+from functools import partial
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kahanmaps.errors import InputError
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.commands.degrees import is_done, measured
+from kahanmaps_cli.commands.heights import require_heights, surveyed
+from kahanmaps_cli.options import (
+    eps_options,
+    inline_options,
+    is_inline,
+    load_system,
+    seconds_option,
+    seed_option,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.params import PointText, Whole
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from
+from kahanmaps_cli.progress import Progress
+
+_MAX_BYTES = 64_000_000
+# Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
+_EARLY = ("singular",)
+
+_scale_option = click.option(
+    "--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given."
+)
+
+
+@picture(
+    "degrees",
+    click.argument("systems", nargs=-1, metavar="[SYSTEM]..."),
+    inline_options,
+    click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
+    eps_options,
+    seconds_option(10.0, "Stop each system after about so many."),
+    click.option(
+        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
+    ),
+    click.option(
+        "--max-degree", type=int, metavar="N", default=20_000, show_default=True, help="Work out no larger degree."
+    ),
+    seed_option,
+    _scale_option,
+)
+def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
+    """Degrees of the iterates of maps, with the recurrence they satisfy.
+
+    \b
+      kahanmaps plot degrees euler_top
+      kahanmaps plot degrees euler_top lotka_volterra weierstrass -o degrees.pdf
+      kahanmaps plot degrees weierstrass --eps 1/10 --scale loglog -o degrees.svg
+      kahanmaps degrees euler_top --json | kahanmaps plot degrees --from -
+
+    Marks are measured degrees (docs: kahanmaps degrees --help), a solid line is
+    the recurrence they satisfy. Dots join degrees for which none was checked:
+    what the legend says of their growth is then estimated.
+
+    Exit status: 0 done, 2 usage error, 3 some system was stopped before a
+    recurrence was found (the picture is written).
+    """
+    growths: dict[str, lib.DegreeGrowth] = {}
+    for path in options["records"]:
+        _add(growths, *lib.degrees_of_record(read_record(path), path))
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    inline = is_inline(options)
+    asked: list[str | None] = list(options["systems"])
+    if inline or not (asked or growths):
+        asked.append(None)
+    if inline and len(asked) > 1:
+        raise click.UsageError("give SYSTEMs or an inline one, not both")
+    if len(asked) > 1 and options["parameters"]:
+        raise click.UsageError("-p is for one system: write several as files, or draw --from records")
+    files = [load_system(name, options) for name in asked]
+    early: list[str] = []
+    for file in files:
+        found = measured(file, eps, options, partial(_tell, progress, file.label))
+        _add(growths, file.label, found)
+        if not is_done(found, None):
+            early.append(f"{file.label}: stopped early: {found.message}")
+    figure = lib.draw_degrees(growths, style_from(options), scale=options["scale"])
+    return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early else 0)
+
+
+def _tell(progress: Progress, name: str, sentence: str) -> None:
+    progress(f"{name}: {sentence}")
+
+
+def _add(growths: dict[str, lib.DegreeGrowth], name: str, found: lib.DegreeGrowth) -> None:
+    """Two systems may have one name: the second is called name (2)."""
+    names = chain([name], (f"{name} ({k})" for k in count(2)))
+    growths[next(free for free in names if free not in growths)] = found
+
+
+@picture(
+    "heights",
+    system_options,
+    click.option("--from", "record", metavar="FILE", help="Written by heights --json, instead of SYSTEM."),
+    eps_options,
+    click.option("--random", "count", type=Whole(1), metavar="N", help="N starts drawn at random (default 3)."),
+    click.option(
+        "--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable."
+    ),
+    click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit."),
+    click.option(
+        "--max-digits",
+        type=Whole(1),
+        metavar="N",
+        default=20_000,
+        show_default=True,
+        help="Digit budget of each orbit.",
+    ),
+    seconds_option(30.0, "Stop after about so many seconds."),
+    seed_option,
+    _scale_option,
+)
+def heights(options: dict[str, Any], progress: Progress) -> Drawn:
+    """Heights of exact orbits against the step: how fast the numbers grow.
+
+    \b
+      kahanmaps plot heights weierstrass
+      kahanmaps plot heights weierstrass --eps 1/10 --random 5 -o heights.pdf
+      kahanmaps plot heights lotka_volterra --scale log -o heights.svg
+      kahanmaps heights weierstrass --json | kahanmaps plot heights --from -
+
+    The height is the bit length of the largest integer that a point needs; a
+    colour is an eps, a curve an orbit, a line the growth that was fitted.
+    Records hold heights at the steps 0, 1, 2, 4, 8, ... only.
+
+    Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
+    time was over before all orbits were finished (the picture is written).
+    """
+    require_heights(options)
+    file: lib.SystemFile | None = None
+    digits = options["max_digits"]
+    if options["record"] is not None:
+        if options["system"] is not None or options["variables"] or options["rhs"]:
+            raise click.UsageError("give a SYSTEM or --from FILE, not both")
+        record = read_record(options["record"])
+        curves = lib.curves_of_record(record, options["record"])
+        whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
+    else:
+        file = load_system(options["system"], options)
+        eps = the_eps(options["eps"], options["time_step"], required=False)
+        survey = surveyed(file, eps, options, progress)
+        curves, whole = lib.height_curves(survey), survey.is_whole
+    figure = lib.draw_heights(curves, style_from(options), scale=options["scale"])
+    talk = []
+    if short := sum(curve.status == "budget" for curve in curves):
+        talk.append(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")
+    if early := sum(curve.status in _EARLY for curve in curves):
+        talk.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
+    if not whole:
+        talk.append("stopped early: the time was over before all orbits were finished")
+    return Drawn(figure, file, talk, 3 if early or not whole else 0)
+
+
+def read_record(path: str) -> Any:
+    """The JSON object in a file, `-` for standard input. Raises InputError where there is none."""
+    try:
+        if path == "-":
+            content = sys.stdin.buffer.read(_MAX_BYTES + 1)
+        else:
+            with Path(path).open("rb") as file:
+                content = file.read(_MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    if len(content) > _MAX_BYTES:
+        raise InputError(f"{path}: found more than {_MAX_BYTES // 10**6} MB, expected one record")
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: found no JSON ({error}), expected an object written by --json") from error
