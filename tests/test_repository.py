@@ -102,3 +102,7 @@ def test_every_test_that_is_left_to_the_thorough_runs_exists():
     for line in (ROOT / "tests" / "thorough.txt").read_text(encoding="utf-8").splitlines():
         path, name = line.split("[")[0].split("::")
         assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), line
+
+
+def test_of_a_test_whose_cases_are_left_to_the_thorough_runs_others_run_each_day(wrongly_left):
+    assert wrongly_left == []
