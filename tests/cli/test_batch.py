@@ -90,8 +90,8 @@ def test_a_batch_runs_and_says_where_the_results_are(batch):
     assert Path("study.db").exists()
 
 
+@pytest.mark.usefixtures("space")
 def test_the_second_run_has_nothing_to_do(batch):
-    batch("run", SPACE)
     done = batch("run", SPACE)
     assert done.status == 0
     assert done.err == "nothing to do: every task has a result in study.db\n"
