@@ -176,7 +176,7 @@ def _measure_lines(found: Findings) -> list[Statement]:
             times = f"any function of {_listed(names)}" if names else "any integral"
             lines.append(Statement(NOTE, f"so is dx/phi for this phi times {times}"))
     else:
-        lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
+        lines.append(Statement(MEASURED if search.none_there else UNDECIDED, search.reason))
     if search.turning is not None:
         text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.turning.text}"
         lines.append(Statement(str(search.turning.verdict), text))

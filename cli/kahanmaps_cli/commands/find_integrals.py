@@ -164,7 +164,7 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     from kahanmaps.laboratory.laboratory import Laboratory
     from kahanmaps.laboratory.modular_points import NoPoint
     from kahanmaps.laboratory.preserve.hirota_kimura import Basis, hirota_kimura_basis
-    from kahanmaps.laboratory.preserve.integrals import closing_note
+    from kahanmaps.laboratory.preserve.results import closing_note
 
     if options["symbolic"]:
         raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
