@@ -521,7 +521,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
 ):
     tried = []
 
-    def walk(equation, point, direction, precision, functions):
+    def walk(equation, point, direction, precision, tangents, functions):
         tried.append(precision)
         yield SimpleNamespace(name="first", common=0)
         if precision < 64:
@@ -529,6 +529,6 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
         yield SimpleNamespace(name="t", common=1)
         yield SimpleNamespace(name="last", common=0)
 
-    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk_along", walk)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk", walk)
     run, whole = walked((), (), (), (), steps, **{"end": math.inf, **options})
     assert ([step.name for step in run], whole, tried) == found

@@ -20,7 +20,6 @@ from kahanmaps.laboratory.singular.jets import (
     image_of,
     orders_of,
     walk,
-    walk_along,
 )
 from kahanmaps.laboratory.singular.orders import AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
@@ -194,11 +193,7 @@ def walked(
     while True:
         run: list[Step] = []
         try:
-            if tangents:
-                taken = walk(equations, point, direction, tangents, precision)
-            else:
-                taken = walk_along(equations, point, direction, precision, functions)
-            for step in islice(taken, steps):
+            for step in islice(walk(equations, point, direction, precision, tangents, functions), steps):
                 run.append(step)
                 if time.monotonic() > end:
                     return run, len(run) == steps

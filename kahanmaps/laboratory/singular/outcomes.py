@@ -32,6 +32,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
 _MOST_WITH_TANGENTS = 1024
+_FEW_TERMS = 64  # of series that tell points apart
 _TRIES = 40
 _LINES = 6  # on which critical points are looked for, and more while some have no point
 _POINTS = 2  # each modulo a prime of its own
@@ -234,9 +235,10 @@ def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limit
 
 def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool) -> list[Hypersurface]:
     found: dict[tuple[Any, ...], Hypersurface] = {}
+    alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
     degrees: dict[int, int] = {}
     for line in range(4 * _LINES):
-        if line >= _LINES and set(degrees) <= {key[0] for key in found}:
+        if limits.is_over or (line >= _LINES and set(degrees) <= {key[0] for key in found}):
             break
         field = random_prime_field(rng)
         try:
@@ -250,6 +252,14 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
+            direction = [rng.randrange(field.prime) for _ in critical.point]
+            run, _ = walked(equations, critical.point, direction, [], limits.shown, limits.end, most=_FEW_TERMS)
+            orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
+            known = alike.setdefault(orders, [])
+            if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
+                primes = dict.fromkeys((*found[known[0]].primes, field.prime))
+                found[known[0]] = replace(found[known[0]], primes=tuple(primes))
+                continue
             try:
                 outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
             except NotGeneric:
@@ -257,6 +267,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             except PrecisionTooLow:
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
+            known.append(key)
             one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(outcome))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
