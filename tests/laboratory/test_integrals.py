@@ -367,7 +367,7 @@ def test_on_the_line_orbits_that_show_nothing_show_that_there_is_no_integral():
 
 
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.preserve.interpolated.repeat", lambda *_: None)
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.search.repeat", lambda *_: None)
     found = find_integrals(load("euler_top"))
     assert (found.integrals, found.codimension, found.reason) == (
         (),

@@ -32,7 +32,6 @@ from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
-from kahanmaps.laboratory.preserve.interpolated import bases_of
 from kahanmaps.laboratory.preserve.iterates import (
     IntegralInIterates,
     gradient_of,
@@ -41,7 +40,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
-from kahanmaps.laboratory.preserve.search import AFFINE, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.search import AFFINE, bases_of, may_be_conjugate, repeat, search
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")

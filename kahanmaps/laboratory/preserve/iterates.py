@@ -39,9 +39,8 @@ from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, 
 from kahanmaps.laboratory.preserve.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.branches import pattern
 from kahanmaps.laboratory.preserve.identities import judged
-from kahanmaps.laboratory.preserve.interpolated import bases_of
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
-from kahanmaps.laboratory.preserve.search import Found, Step
+from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 

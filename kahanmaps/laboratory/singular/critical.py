@@ -154,4 +154,5 @@ def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product = op
     """The last minor of L at X, whose coordinates are polynomials: up to its sign det M."""
     zero = X[0] * 0
     rows = equation.rows(equation.monomials(X, times), zero)
-    return kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
+    minor: nmod_poly = kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
+    return minor
