@@ -30,7 +30,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import Range, orders_at, walked
+from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
 from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, Hypersurface
@@ -144,7 +144,7 @@ class _Curve:
     """A curve through a point of a line where a form vanishes, and what is tracked along it.
 
     `across` is another random vector, for surfaces. `excess` are the exponents of the forms in the common factor of the
-    minors of the equation, which is no part of the map. Curves end at a time of the monotonic clock.
+    minors of the equation, which is no part of the map. Curves are followed within the limits.
     """
 
     equation: Equation
@@ -155,7 +155,11 @@ class _Curve:
     functions: tuple[Function, ...]
     excess: tuple[int, ...]
     forms: _Forms
-    end: float
+    limits: Range
+
+    def course(self, tracked: AlongCurves) -> Course:
+        """The curve as it is followed."""
+        return Course([self.equation], self.point, self.direction, self.limits, tracked)
 
     @property
     def prime(self) -> int:
@@ -178,7 +182,7 @@ class _Curve:
 
         Raises Untold where there is no first step.
         """
-        run = walked([self.equation], self.point, self.direction, [], _FIRST, self.end, functions=self.functions)[0]
+        run = self.course(self).steps(_FIRST)[0]
         if not run:
             raise Untold("the time was over, or a curve touches a hypersurface in too high an order")
         is_contracted = image_of([self.inverse], run[0].limit) is None
@@ -307,14 +311,14 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             functions = tuple(form_order(form, field) for form in forms.all)
         except BadPrime:
             continue
-        degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits.end, rng)
+        degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits, rng)
         for curve in curves:
             kinds.setdefault(curve.key, []).append(curve)
         # A hypersurface that splits over an extension has points modulo some primes only.
         if line >= _LEAST_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
             kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
-                return degree, _resolved(kinds, forms, degree, zeros, limits)
+                return degree, _resolved(kinds, forms, degree, zeros)
             except Untold:
                 continue  # a hypersurface without points modulo the primes so far
     if limits.is_over or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
@@ -322,12 +326,10 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
     }
-    return degree, _followed(followed, [0] * len(kinds), range(len(forms.all)), limits)
+    return degree, _followed(followed, [0] * len(kinds), range(len(forms.all)))
 
 
-def _resolved(
-    kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int, limits: Range
-) -> list[Hypersurface]:
+def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
     """The contracted hypersurfaces with their degrees and orders. Raises Untold."""
     keys = list(kinds)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
@@ -354,21 +356,18 @@ def _resolved(
         raise Untold("not all hypersurfaces were met")
     # Orders on hypersurfaces that are not contracted have no part in what follows.
     chosen = [k for k, key in enumerate(keys) if key[0]]
-    return _followed(followed, [int(size) for size in sizes.entries()], chosen, limits)
+    return _followed(followed, [int(size) for size in sizes.entries()], chosen)
 
 
 def _followed(
-    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int], limits: Range
+    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
     """The contracted hypersurfaces with the orders in these columns, at points modulo two primes. Raises Untold."""
     found = []
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, along) for curve, along in pairs}
-            orders = [
-                orders_at([curve.equation], curve.point, curve.direction, along, (_FIRST, limits.reach), limits)
-                for curve, along in list(by_prime.values())[:2]
-            ]
+            orders = [curve.course(along).orders(_FIRST) for curve, along in list(by_prime.values())[:2]]
             if len(orders) < 2 or orders[0].known != orders[1].known:
                 raise Untold("two points tell different things")
             found.append(_hypersurface(key, size, tuple(by_prime)[:2], orders[0].of(columns)))
@@ -376,20 +375,9 @@ def _followed(
 
 
 def _hypersurface(key: tuple[Any, ...], degree: int, primes: tuple[int, ...], orders: Orders) -> Hypersurface:
-    return Hypersurface(
-        "Z" if key[2] else "?",
-        degree,
-        any(key[1]),
-        1,
-        CONFINED if any(row[0] for row in orders.rows) else NOT_CONFINED,
-        1,
-        None,
-        (),
-        primes,
-        followed=orders.followed,
-        settled_at=orders.settled_at if orders.is_settled else None,
-        orders=orders,
-    )
+    status = CONFINED if any(row[0] for row in orders.rows) else NOT_CONFINED
+    known = Hypersurface("Z" if key[2] else "?", degree, any(key[1]), 1, status, 1, primes=primes, orders=orders)
+    return replace(known, followed=orders.followed, settled_at=orders.settled_at if orders.is_settled else None)
 
 
 def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
@@ -404,7 +392,7 @@ def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
 
 
 def _on_line(
-    map_: StepOver, forms: _Forms, functions: tuple[Function, ...], end: float, rng: random.Random
+    map_: StepOver, forms: _Forms, functions: tuple[Function, ...], limits: Range, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
     """The degree of the map on a random line, the number of points over the closure where forms vanish, and those in
     GF(p), each with the line as a curve through it."""
@@ -427,7 +415,7 @@ def _on_line(
     every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
     points = [tuple((x + int(s) * v) % p for x, v in zip(a, b, strict=True)) for s, _ in radical.roots()]
     (inverse,) = map_.inverse.equations
-    curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, end) for point in points]
+    curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, limits) for point in points]
     return degree, int(radical.degree()), curves
 
 

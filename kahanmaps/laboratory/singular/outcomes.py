@@ -19,7 +19,7 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
-from kahanmaps.laboratory.singular.following import Range, orders_at, orders_until_return, walked, whole
+from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import (
     Letters,
     NotGeneric,
@@ -65,14 +65,14 @@ class Hypersurface:
     `generic` is its polynomial over Q[eps], empty where it is not known.
     """
 
-    polynomial: str
-    degree: int
-    is_pole: bool
-    multiplicity: int | None
-    status: str
-    contracted_at: int | None
-    confined_at: int | None
-    steps: tuple[Step, ...]
+    polynomial: str = "?"
+    degree: int = 0
+    is_pole: bool = False
+    multiplicity: int | None = None
+    status: str = UNDECIDED
+    contracted_at: int | None = None
+    confined_at: int | None = None
+    steps: tuple[Step, ...] = ()
     primes: tuple[int, ...] = ()
     note: str = ""
     followed: int = 0
@@ -116,20 +116,7 @@ class Followed:
     stage: int
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """What became of one point: see Hypersurface."""
-
-    status: str
-    contracted_at: int | None = None
-    confined_at: int | None = None
-    steps: tuple[Step, ...] = ()
-    followed: int = 0
-    settled_at: int | None = None
-    orders: Orders = NO_ORDERS
-
-
-_UNKNOWN = _Outcome(UNDECIDED)
+_UNKNOWN = Hypersurface()
 
 
 def outcome_of(
@@ -152,17 +139,15 @@ def outcome_of(
     and the length of a word, this map contracts it, and steps are single maps.
     Source: grammaticos-ramani-papageorgiou-1991.
     """
-    outcomes: list[_Outcome] = []
+    outcomes: list[Hypersurface] = []
     primes: list[int] = []
     forms = [*critical, *excess]
     stage, period = place or (0, 1)
-    at = None if place is None else stage
 
-    def told(outcome: _Outcome, note: str = "") -> Hypersurface:
-        degree = int(factor.total_degree())
-        return Hypersurface(
-            text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, stage=at, **vars(outcome)
-        )
+    def told(outcome: Hypersurface, note: str = "") -> Hypersurface:
+        degree, at = int(factor.total_degree()), None if place is None else stage
+        known = replace(outcome, polynomial=text, degree=degree, is_pole=is_pole, multiplicity=multiplicity)
+        return replace(known, primes=tuple(primes), note=note, stage=at)
 
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.is_over:
@@ -197,13 +182,8 @@ def outcome_of(
         (outcome.status, outcome.contracted_at, outcome.confined_at, outcome.orders.known) for outcome in outcomes
     )
     if one != other:
-        return told(_Outcome(UNDECIDED, steps=outcomes[0].steps), "two points tell different things")
+        return told(Hypersurface(steps=outcomes[0].steps), "two points tell different things")
     return told(outcomes[0])
-
-
-def untold(reason: str) -> Hypersurface:
-    """Contracted hypersurfaces of which nothing is known, and why."""
-    return Hypersurface("?", 0, False, None, note=reason, **vars(_UNKNOWN))
 
 
 def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
@@ -229,7 +209,7 @@ def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limit
             continue
         except PrecisionTooLow:
             outcome = _UNKNOWN
-        return [*found, Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(outcome))]
+        return [*found, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
     return found
 
 
@@ -253,7 +233,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             if tangents is None or limits.is_over:
                 continue
             direction = [rng.randrange(field.prime) for _ in critical.point]
-            run, _ = walked(equations, critical.point, direction, [], limits.shown, limits.end, most=_FEW_TERMS)
+            run, _ = Course(equations, critical.point, direction, limits).steps(limits.shown, most=_FEW_TERMS)
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             known = alike.setdefault(orders, [])
             if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
@@ -268,11 +248,10 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             known.append(key)
-            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(outcome))
+            one = replace(outcome, degree=seen[key[0]], is_pole=poles, multiplicity=key[0], primes=(field.prime,))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        untried = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
-        found[(multiplicity,)] = untried
+        found[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
@@ -303,29 +282,38 @@ def _outcome_at(
     rng: random.Random,
     limits: Range,
     tracked: AlongCurves = NOTHING,
-) -> _Outcome:
+) -> Hypersurface:
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end, most=_MOST_WITH_TANGENTS)
+    course = Course(equations, point, direction, limits, tracked)
+    run, is_whole = course.steps(limits.shown, tangents, _MOST_WITH_TANGENTS)
     status, down, up = _told([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
-        return _Outcome(status, down, up, tuple(run), len(run), 0)
+        return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
     if up is None:
-        orders = orders_at(equations, point, direction, tracked, (limits.shown, limits.reach), limits)
+        orders = course.orders(limits.shown)
         if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
             raise PrecisionTooLow
     else:
-        orders = orders_until_return(equations, point, direction, tracked, up, limits)
+        orders = course.orders_until_return(up)
     if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = list(whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end)))
+        run = list(course.all_steps(orders.settled_at + 2, tangents))
         status, down, up = _told([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         orders = replace(NO_ORDERS, followed=orders.followed)
-    return _Outcome(status, down, up, tuple(run), orders.followed, settled, orders)
+    return Hypersurface(
+        status=status,
+        contracted_at=down,
+        confined_at=up,
+        steps=tuple(run),
+        followed=orders.followed,
+        settled_at=settled,
+        orders=orders,
+    )
 
 
 def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:
