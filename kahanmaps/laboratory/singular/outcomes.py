@@ -8,6 +8,7 @@ from __future__ import annotations
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
 from flint import fmpq, nmod_poly
@@ -39,10 +40,18 @@ _POINTS = 2  # each modulo a prime of its own
 _LONGEST = 60  # characters of a polynomial in a sentence
 
 FIRST_STEPS = 12  # that are shown
-CONFINED = "confined"
-NOT_CONFINED = "not confined"
-NOT_CONTRACTED = "not contracted"
-UNDECIDED = "undecided"
+
+
+class Outcome(StrEnum):
+    """What becomes of a hypersurface."""
+
+    CONFINED = "confined"
+    NOT_CONFINED = "not confined"
+    NOT_CONTRACTED = "not contracted"
+    UNDECIDED = "undecided"
+
+
+CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = Outcome
 NO_POINT = "no point was followed"
 NO_TIME = "no two points could be followed in time"
 
@@ -53,10 +62,9 @@ class Hypersurface:
 
     `is_pole`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian determinant of
     the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?" where it is
-    too large: then `degree` is that of all components of this multiplicity together. `status` is
-    "confined", "not confined", "not contracted" or "undecided"; it is contracted by the step `contracted_at` and is a
-    hypersurface again after the step `confined_at` (each None if that did not happen). `steps` tells the first steps,
-    at the first of two points, modulo the first of the `primes`.
+    too large: then `degree` is that of all components of this multiplicity together. It is contracted by the step
+    `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not happen). `steps`
+    tells the first steps, at the first of two points, modulo the first of the `primes`.
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
@@ -69,7 +77,7 @@ class Hypersurface:
     degree: int = 0
     is_pole: bool = False
     multiplicity: int | None = None
-    status: str = UNDECIDED
+    status: Outcome = UNDECIDED
     contracted_at: int | None = None
     confined_at: int | None = None
     steps: tuple[Step, ...] = ()
@@ -266,7 +274,7 @@ def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
     )
 
 
-def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]:
+def _told(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
     """Status, the step that contracts and the step that ends it."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:
