@@ -119,7 +119,7 @@ def walk(
                 raise PrecisionTooLow
             precision -= common
             curves = [[entry.truncate(apart + precision) for entry in curve] for curve in moved]
-            if any(valuation(slope, apart) is not None for slope in _slopes(curves)):
+            if not all(slope.truncate(apart).is_zero() for slope in _slopes(curves)):
                 raise NotGeneric("the valuation differs at neighbouring points")
             last = valuation(curves[0][-1], precision)
             divided = divided * equation.image_degree + common
