@@ -127,9 +127,9 @@ from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as darboux
 from kahanmaps.laboratory.preserve.densities import find_densities as find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import Basis as Basis
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis as hirota_kimura_basis
-from kahanmaps.laboratory.preserve.integrals import closing_note as closing_note
 from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integrals
 from kahanmaps.laboratory.preserve.limits import flow_and_map as flow_and_map
+from kahanmaps.laboratory.preserve.results import closing_note as closing_note
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson as find_poisson
 from kahanmaps.laboratory.report import Statement as Statement
 from kahanmaps.laboratory.scan.kept import Kept as Kept

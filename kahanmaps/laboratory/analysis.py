@@ -31,7 +31,7 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
 from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
-from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.limits import flow_and_map
 from kahanmaps.laboratory.preserve.pencil import pencil_of
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
@@ -172,152 +172,12 @@ def analyze(
     """
     if seconds is not None and not (seconds > 0 and math.isfinite(seconds)):
         raise InputError(f"found {seconds} seconds, expected a positive number")
-    laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work is done
-    map_, dim = file.map, file.dim
-    system = file.system if file.is_quadratic else None
-    # Without its claims, so that none can be read; with symbols the file itself is needed, and its claims are not read.
-    bare = file if symbols or system is None else SystemFile.from_system(system, file.name)
-    total = seconds if seconds is not None else _SECONDS.get(dim, _MOST_SECONDS)
-    found = Analysis(file, laboratory.eps, total, seed, laboratory.free_symbols)
-    began = time.monotonic()
-
-    def left() -> float:
-        return total - (time.monotonic() - began)
-
-    def share(part: float) -> float:
-        return max(0.5, min(part * total, left()))
-
-    def told(what: str) -> Callable[[str], None]:
-        return lambda text: progress(f"{what}: {text}")
-
-    def integrals() -> None:
-        found.integrals = find_integrals(
-            bare, symbols=symbols, eps=found.eps, seconds=share(0.45), seed=seed, progress=told("integrals")
-        )
-        proved = [one for one in found.integrals.integrals if one.verdict is Verdict.PROVED]
-        if dim == 2 and len(proved) == 1 and not laboratory.symbols:
-            found.pencil = pencil_of(proved[0].name, proved[0].function, found.eps, seed=seed, seconds=share(0.1))
-        profile = found.integrals.profile
-        if profile.first_degree is not None and profile.period is None:
-            maps = Laboratory(bare, (), found.eps, seed, algebraic=True).maps
-            top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
-            for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
-                first = 1 + len({name for relation in found.relations for name in relation.names})
-                found.relations += sparse_relations(maps, degree, map_.variables, first=first) or ()
-
-    def vector_field() -> None:
-        if system is not None:
-            found.fixed_points = fixed_points(system, share(0.1))
-            found.equivalent = equivalent_system(file, found.fixed_points, share(0.1))
-
-    def hamiltonian() -> None:
-        if system is not None and dim <= MAX_HAMILTONIAN_DIMENSION:
-            found.hamiltonian = constant_structures(system, seed=seed)
-
-    def family() -> None:
-        hamiltonian = None if found.hamiltonian is None else found.hamiltonian.hamiltonian
-        if hamiltonian is not None:
-            found.centre = hamiltonian.centre
-            moved = hamiltonian if found.centre is None else hamiltonian.about(found.centre)
-            found.structure = structure_of(moved.system, moved)
-        elif system is not None:
-            found.centre = (fmpq(0),) * dim
-            found.structure = structure_of(system)
-        if system is not None and not isinstance(found.structure, Structure):  # of a member its normal form says more
-            found.tensor = tensor_structure(system)
-
-    def degrees() -> None:
-        # Where they are known to the end and are those that `degrees` would ask for itself.
-        known = patterns_of(found.singularities) if found.singularities and dim <= WRITTEN_DIMENSION else None
-        patterns = None if known is None or known.running else known
-        found.degrees = degree_growth(
-            map_,
-            found.eps,
-            seconds=share(0.25),
-            max_degree=_MAX_DEGREE,
-            seed=seed,
-            patterns=patterns,
-            progress=told("degrees"),
-        )
-
-    def densities() -> None:
-        found.densities = find_densities(
-            bare,
-            symbols=symbols,
-            eps=found.eps,
-            integrals=() if found.integrals is None else found.integrals.integrals,
-            seconds=share(0.25),
-            seed=seed,
-            progress=told("densities"),
-        )
-
-    def flow() -> None:
-        if found.integrals is not None:
-            found.flow = flow_and_map(
-                found.integrals,
-                found.densities,
-                known=found.integral_count,
-                seconds=share(0.03),
-                progress=told("integrals of the flow"),
-            )
-
-    def poisson() -> None:
-        if dim in _TENSORS:
-            known = found.integrals.integrals if found.integrals is not None else ()
-            found.poisson = find_poisson(
-                bare,
-                _TENSORS[dim],
-                symbols=symbols,
-                eps=found.eps,
-                integrals=known,
-                seconds=share(0.1),
-                seed=seed,
-                progress=told("Poisson tensors"),
-            )
-
-    def heights() -> None:
-        found.heights = height_survey(
-            map_, found.eps, starts=2, max_digits=5_000, seconds=share(0.08), seed=seed, progress=told("heights")
-        )
-
-    def symmetries() -> None:
-        if system is not None:
-            found.symmetries = linear_symmetries(system, seconds=share(0.1), progress=told("symmetries"))
-
-    def commuting() -> None:
-        if (system is not None or laboratory.root is not None) and found.eps is None:
-            seconds = share(0.1)
-            found.commuting = find_commuting(system or map_, seed=seed, seconds=seconds, progress=told("commuting"))
-
-    def confinement() -> None:
-        values = default_eps(map_, seed) if found.eps is None else (found.eps,)
-        part = share(0.4 if dim <= WRITTEN_DIMENSION else 0.1) / len(values)
-        if all(can_be_written(map_, value, part) for value in values):
-            found.singularities = [
-                singularities(map_, value, seed=seed, seconds=part, progress=told("singularities")) for value in values
-            ]
-
-    parts: list[tuple[str, Callable[[], None]]] = [
-        ("hamiltonian structure", hamiltonian),
-        ("the commuting family", family),
-        ("the vector field", vector_field),
-        ("degrees", degrees),
-        ("integrals", integrals),
-        ("densities", densities),
-        ("the flow", flow),
-        ("Poisson tensors", poisson),
-        ("heights", heights),
-        ("symmetries", symmetries),
-        ("commuting systems", commuting),
-    ]
-    # Where degrees make use of them singularities come first; in more dimensions they are slow, and come last.
-    parts.insert(3 if dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
-    if laboratory.root is not None:
-        parts = [part for part in parts if part[0] in _OVER_NUMBER_FIELDS]
-    found.pending = [name for name, _ in parts]
+    run = _Run(file, symbols, eps, seconds, seed, progress)
+    found, parts = run.found, run.parts
+    found.pending = list(parts)
     reached(found)
-    for name, part in parts:
-        if left() <= 0:
+    for name, part in parts.items():
+        if run.left <= 0:
             found.skipped.append(f"{name}: the time was over")
         else:
             progress(name)
@@ -327,14 +187,156 @@ def analyze(
                 found.skipped.append(f"{name}: {error}")
         found.pending.remove(name)
         reached(found)
-    if laboratory.root is not None:
+    if run.root is not None:
         found.skipped.append(
-            f"over the number field {laboratory.root.number_field}: fixed points, invariant curves, integrals in "
+            f"over the number field {run.root.number_field}: fixed points, invariant curves, integrals in "
             "iterates, the flow, Poisson tensors, singularities, symmetries, Hamiltonian structure, the family"
         )
-    elif system is None:
+    elif run.system is None:
         found.skipped.append(
             "fixed points, Hamiltonian structure, the commuting family, symmetries, commuting systems: for fields only"
         )
-    found.elapsed = time.monotonic() - began
+    found.elapsed = run.total - run.left
     return found
+
+
+class _Run:
+    """The analyses of one map, each with a share of the time; what they tell is in `found`."""
+
+    def __init__(
+        self,
+        file: SystemFile,
+        symbols: Sequence[str],
+        eps: Any,
+        seconds: float | None,
+        seed: int,
+        progress: Callable[[str], None],
+    ) -> None:
+        laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work
+        self.map, self.dim, self.root, self.seed = file.map, file.dim, laboratory.root, seed
+        self.system = file.system if file.is_quadratic else None
+        # Without its claims, so that none can be read; with symbols the file itself is needed, and its claims are not
+        # read.
+        self.bare = file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
+        self.total = seconds if seconds is not None else _SECONDS.get(self.dim, _MOST_SECONDS)
+        self.found = Analysis(file, laboratory.eps, self.total, seed, laboratory.free_symbols)
+        self.asked: dict[str, Any] = {"symbols": symbols, "eps": laboratory.eps, "seed": seed}
+        self._has_symbols, self._progress, self._began = bool(laboratory.symbols), progress, time.monotonic()
+
+    @property
+    def parts(self) -> dict[str, Callable[[], None]]:
+        """The analyses by their names, in their order: each may use what those before it have found."""
+        every: dict[str, Callable[[], None]] = {
+            "hamiltonian structure": self._hamiltonian,
+            "the commuting family": self._family,
+            "the vector field": self._vector_field,
+            "singularities": self._singularities,
+            "degrees": self._degrees,
+            "integrals": self._integrals,
+            "densities": self._densities,
+            "the flow": self._flow,
+            "Poisson tensors": self._poisson,
+            "heights": self._heights,
+            "symmetries": self._symmetries,
+            "commuting systems": self._commuting,
+        }
+        # Degrees make use of singularities; but in more dimensions these are slow, and come last.
+        if self.dim > WRITTEN_DIMENSION:
+            every["singularities"] = every.pop("singularities")
+        return {name: part for name, part in every.items() if self.root is None or name in _OVER_NUMBER_FIELDS}
+
+    @property
+    def left(self) -> float:
+        """The seconds that are left."""
+        return self.total - (time.monotonic() - self._began)
+
+    def _share(self, part: float, what: str = "") -> dict[str, Any]:
+        """The seconds for a part of what is to be done and, where it has something to tell, whom."""
+        seconds = {"seconds": max(0.5, min(part * self.total, self.left))}
+        return {**seconds, "progress": lambda text: self._progress(f"{what}: {text}")} if what else seconds
+
+    def _hamiltonian(self) -> None:
+        if self.system is not None and self.dim <= MAX_HAMILTONIAN_DIMENSION:
+            self.found.hamiltonian = constant_structures(self.system, seed=self.seed)
+
+    def _family(self) -> None:
+        found, system = self.found, self.system
+        hamiltonian = None if found.hamiltonian is None else found.hamiltonian.hamiltonian
+        if hamiltonian is not None:
+            found.centre = hamiltonian.centre
+            moved = hamiltonian if found.centre is None else hamiltonian.about(found.centre)
+            found.structure = structure_of(moved.system, moved)
+        elif system is not None:
+            found.centre = (fmpq(0),) * self.dim
+            found.structure = structure_of(system)
+        if system is not None and not isinstance(found.structure, Structure):  # of a member its normal form says more
+            found.tensor = tensor_structure(system)
+
+    def _vector_field(self) -> None:
+        found = self.found
+        if self.system is not None:
+            found.fixed_points = fixed_points(self.system, **self._share(0.1))
+            found.equivalent = equivalent_system(found.file, found.fixed_points, **self._share(0.1))
+
+    def _singularities(self) -> None:
+        values = default_eps(self.map, self.seed) if self.found.eps is None else (self.found.eps,)
+        share = self._share(0.4 if self.dim <= WRITTEN_DIMENSION else 0.1, "singularities")
+        share["seconds"] /= len(values)
+        if all(can_be_written(self.map, value, share["seconds"]) for value in values):
+            self.found.singularities = [singularities(self.map, value, seed=self.seed, **share) for value in values]
+
+    def _degrees(self) -> None:
+        found = self.found
+        # Where they are known to the end and are those that `degrees` would ask for itself.
+        known = patterns_of(found.singularities) if found.singularities and self.dim <= WRITTEN_DIMENSION else None
+        given: dict[str, Any] = {"patterns": None if known is None or known.running else known, "seed": self.seed}
+        share = self._share(0.25, "degrees")
+        found.degrees = degree_growth(self.map, found.eps, max_degree=_MAX_DEGREE, **given, **share)
+
+    def _integrals(self) -> None:
+        found = self.found
+        search = found.integrals = find_integrals(self.bare, **self.asked, **self._share(0.45, "integrals"))
+        proved = [one for one in search.integrals if one.verdict is Verdict.PROVED]
+        if self.dim == 2 and len(proved) == 1 and not self._has_symbols:
+            share = self._share(0.1)
+            found.pencil = pencil_of(proved[0].name, proved[0].function, found.eps, seed=self.seed, **share)
+        profile = search.profile
+        if profile.first_degree is not None and profile.period is None:
+            maps = Laboratory(self.bare, (), found.eps, self.seed, algebraic=True).maps
+            top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
+            for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
+                first = 1 + len({name for relation in found.relations for name in relation.names})
+                found.relations += sparse_relations(maps, degree, self.map.variables, first=first) or ()
+
+    @property
+    def _known(self) -> tuple[FoundIntegral, ...]:
+        """The integrals that were found in closed form."""
+        return () if self.found.integrals is None else self.found.integrals.integrals
+
+    def _densities(self) -> None:
+        share = self._share(0.25, "densities")
+        self.found.densities = find_densities(self.bare, **self.asked, integrals=self._known, **share)
+
+    def _flow(self) -> None:
+        found = self.found
+        if found.integrals is not None:
+            share = self._share(0.03, "integrals of the flow")
+            found.flow = flow_and_map(found.integrals, found.densities, known=found.integral_count, **share)
+
+    def _poisson(self) -> None:
+        if self.dim in _TENSORS:
+            given = {**self.asked, **self._share(0.1, "Poisson tensors")}
+            self.found.poisson = find_poisson(self.bare, _TENSORS[self.dim], integrals=self._known, **given)
+
+    def _heights(self) -> None:
+        given = {"starts": 2, "max_digits": 5_000, "seed": self.seed, **self._share(0.08, "heights")}
+        self.found.heights = height_survey(self.map, self.found.eps, **given)
+
+    def _symmetries(self) -> None:
+        if self.system is not None:
+            self.found.symmetries = linear_symmetries(self.system, **self._share(0.1, "symmetries"))
+
+    def _commuting(self) -> None:
+        if (self.system is not None or self.root is not None) and self.found.eps is None:
+            share = self._share(0.1, "commuting")
+            self.found.commuting = find_commuting(self.system or self.map, seed=self.seed, **share)

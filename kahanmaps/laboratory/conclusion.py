@@ -9,11 +9,12 @@ from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
+from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.preserve.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
 
-PROVED, EXPLAINED, MEASURED, ESTIMATED = "proved", "explained", "measured", "estimated"
 _CURVES = {0: "rational curves", 1: "elliptic curves, of genus 1"}
 
 
@@ -55,20 +56,22 @@ def conclude(found: Findings) -> Conclusion:
     if liouville:
         suffix += f" It is Liouville integrable, {liouville} (proved)."
 
-    def verdict(kind: str, sentence: str, sense: str = "", ground: str = MEASURED) -> Conclusion:
-        return Conclusion(kind, count, str(growth), sentence + suffix, sense or kind, ground)
+    def verdict(kind: str, sentence: str, sense: str = "", ground: Known | None = Known.MEASURED) -> Conclusion:
+        return Conclusion(kind, count, str(growth), sentence + suffix, sense or kind, str(ground or ""))
 
-    grown = EXPLAINED if degrees is not None and degrees.explained is not None else MEASURED
-    if degrees is not None and degrees.ended == "singular" and len(degrees.degrees) == 1:
+    grown = degrees.known if degrees is not None else Known.MEASURED
+    if degrees is not None and degrees.ended == Ended.SINGULAR and len(degrees.degrees) == 1:
         return verdict("singular", f"The map is nowhere defined: {degrees.message}.")
     if linear:
         closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
-        return verdict("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.", ground=PROVED)
+        return verdict(
+            "linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.", ground=Known.PROVED
+        )
     if said := contradictions(found):
         return verdict(
             "undecided",
             f"The findings do not agree: {'; '.join(said)}. {integrals[0].upper()}{integrals[1:]}.",
-            ground="",
+            ground=None,
         )
     if period is not None:
         closes = f"Orbits close after {counted(period, 'step')} (measured)"
@@ -86,13 +89,13 @@ def conclude(found: Findings) -> Conclusion:
             f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
             f"function is an integral; {phrase}{known if growth is GrowthClass.EXPONENTIAL else ''}.",
             _confining(found),
-            PROVED,
+            Known.PROVED,
         )
     if _orbits_on_curves_proved(found):
         sense = "superintegrable" if found.dim > 2 else "integrable"
         where = f"so that orbits lie on {_curves(found, growth)}"
         sentence = f"{sense.capitalize()} (proved): {integrals}, {where}; {phrase}{known}."
-        return verdict("integrable", sentence, sense, PROVED)
+        return verdict("integrable", sentence, sense, Known.PROVED)
     if growth is GrowthClass.UNKNOWN and (liouville or orbits_lie_on_curves(found)):
         curves = ", so that orbits lie on curves" if orbits_lie_on_curves(found) else ""
         sentence = f"Integrable: {integrals}{curves}; of the degrees: {phrase}."
@@ -105,17 +108,17 @@ def conclude(found: Findings) -> Conclusion:
             "not integrable",
             f"Not integrable in the sense of complexity: {phrase}{known if exact else ''}{although}.",
             _confining(found),
-            grown if exact else ESTIMATED,
+            grown if exact else Known.ESTIMATED,
         )
     if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
         sentence = f"Integrable in the sense of complexity: {phrase}{known}; {integrals}."
         return verdict("integrable", sentence, *_sense(liouville, grown))
-    return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.", ground="")
+    return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.", ground=None)
 
 
-def _sense(liouville: str, ground: str = MEASURED) -> tuple[str, str]:
+def _sense(liouville: str, ground: Known | None = Known.MEASURED) -> tuple[str, Known | None]:
     if liouville:
-        return "Liouville integrable", PROVED
+        return "Liouville integrable", Known.PROVED
     return "integrable in the sense of complexity", ground
 
 

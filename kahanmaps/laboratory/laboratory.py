@@ -21,12 +21,11 @@ from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux, darboux_cofactor
-from kahanmaps.laboratory.preserve.closed_forms import ClosedForms, Spaces, closed_forms
+from kahanmaps.laboratory.preserve.closed_forms import MAX_DEGREE, ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
 from kahanmaps.laboratory.preserve.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.laboratory.preserve.identities import verdict_on
-from kahanmaps.laboratory.preserve.number_fields import MAX_DEGREE
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
@@ -102,6 +101,8 @@ class Laboratory:
         subject = self.map.subject if self.root is None else file.map.subject
         self.seed = seed_for(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
+        self.primes = tuple(map_.prime for map_ in self.maps)
+        self.asked = file, self.free_symbols, self.eps, seed, self.primes  # with which all results of searches begin
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
         """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""
@@ -163,11 +164,6 @@ class Laboratory:
             return f"{at}the map is not invertible: {above} is 0 at all {'points' if self.system is None else 'images'}"
         return ""
 
-    @property
-    def primes(self) -> tuple[int, ...]:
-        """The primes of the maps."""
-        return tuple(map_.prime for map_ in self.maps)
-
     def cofactors(self) -> list[Cofactor]:
         """The cofactors that polynomials are tried with."""
         if self.flow:
@@ -210,17 +206,25 @@ class Laboratory:
         map_ = self.map if self.root is None else self.file.map
         return verdict_on(map_, function, self.eps, self.seed, is_density=is_density, factor=factor)
 
-    def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
+    def formulas(
+        self,
+        model: Spaces,
+        spaces_on: Callable[[ModularMap], Spaces | None],
+        deadline: float,
+        variables: Sequence[str] = (),
+        eps_enters: str = "",
+    ) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
 
         `spaces_on` returns None where the map is special. The search ends at `deadline`, a value of time.monotonic().
+        Without other `variables` they are those of the map; `eps_enters` is as for formulas in these unless given.
         """
         return closed_forms(
             model,
             lambda prime, values: spaces_on(self.map_for(prime, values)),
-            self.map.variables,
+            variables or self.map.variables,
             self.symbols,
-            self.eps_enters,
+            eps_enters or self.eps_enters,
             root=self.root,
             seed=self.seed,
             seconds=max(1.0, deadline - time.monotonic()),

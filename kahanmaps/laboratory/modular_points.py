@@ -5,11 +5,12 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from functools import cache
+from typing import Any
 
 from flint import nmod_mat, nmod_poly
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.polynomials import monomials
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap
@@ -238,3 +239,43 @@ def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmo
 def rank(vectors: Sequence[Sequence[int]], prime: int) -> int:
     """The rank of vectors modulo a prime."""
     return int(nmod_mat(vectors, prime).rank()) if vectors else 0
+
+
+def slopes(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:
+    """The gradient of N/D in the first n variables, times D^2."""
+    N, D = (evaluate(part, field, place) for part in (function.numerator, function.denominator))
+    upper, lower = (gradient(part)[:n] for part in (function.numerator, function.denominator))
+    return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(upper, lower, strict=True)]
+
+
+class Independent:
+    """The gradients of independent functions at one random point modulo a prime: what depends on them does not count.
+
+    `rows` are multiples of the gradients of those that were added.
+    """
+
+    def __init__(self, map_: ModularMap, functions: Sequence[RationalFunction] = ()) -> None:
+        self.map, self.point = map_, map_.random_point()
+        self.rows = [self.gradient(function) for function in functions]
+
+    def gradient(self, function: RationalFunction) -> list[int]:
+        """A multiple of the gradient of a function of (variables, symbols, eps) with respect to the variables."""
+        return gradient_at(self.map, function, self.point)
+
+    def adds(self, row: list[int]) -> bool:
+        """Whether a gradient is no combination of the others; nothing is added."""
+        return rank([*self.rows, row], self.map.prime) > len(self.rows)
+
+    def add(self, row: list[int]) -> bool:
+        """Add a gradient that is no combination of the others, and say whether it is none."""
+        if not self.adds(row):
+            return False
+        self.rows.append(row)
+        return True
+
+
+def gradient_at(map_: ModularMap, function: RationalFunction, point: Point) -> list[int]:
+    """A multiple of the gradient of a function with respect to the variables at a point."""
+    field = GF(map_.prime)
+    place = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
+    return [int(entry) for entry in slopes(function, field, place, map_.dim)]

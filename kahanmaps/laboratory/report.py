@@ -16,13 +16,15 @@ from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.consistency import doubt_of_heights
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
+from kahanmaps.laboratory.singular.outcomes import Outcome
 from kahanmaps.laboratory.symmetry.commuting import CommutingFamily, CommutingField
 from kahanmaps.laboratory.symmetry.symmetries import SIGNED
 
-PROVED, SUPPORTED, EXPLAINED, MEASURED = "proved", "supported", "explained", "measured"
-UNDECIDED, NOTE = "undecided", "note"
+PROVED, MEASURED = Known.PROVED, Known.MEASURED
+UNDECIDED, NOTE = Known.UNDECIDED, Known.NOTE
 _SHOWN_DEGREES = 12
 _NAMES = 6  # that are listed one by one
 _POINTS = 8  # as many fixed points as three quadratic equations have
@@ -31,12 +33,9 @@ _LONG = 300  # characters of a sentence with a formula
 
 @dataclass(frozen=True)
 class Statement:
-    """One line of the report and how it is known: proved, supported, explained, measured, undecided; or a note.
+    """One line of the report and how it is known."""
 
-    Explained is what follows exactly from the patterns of singularities, which are measured.
-    """
-
-    status: str
+    status: Known
     text: str
 
 
@@ -96,14 +95,11 @@ def _integral_lines(found: Findings) -> list[Statement]:
         family = [Statement(PROVED, f"{number}, as a member of the commuting family")]
     if search is None:
         return family
-    lines = [Statement(str(one.verdict), f"{one.name} = {one.short_text}  [{one.origin}]") for one in search.integrals]
-    lines += [Statement(str(one.verdict), f"{one.name} = {one.text}  [{one.origin}]") for one in search.in_iterates]
-    lines += [
-        Statement(
-            str(one.integral.verdict), f"{one.name} = {one.text} at the n-th point, an integral that depends on n"
-        )
-        for one in search.in_time
-    ]
+    texts = [(one, one.short_text) for one in search.integrals] + [(one, one.text) for one in search.in_iterates]
+    lines = [Statement(Known(one.verdict), f"{one.name} = {text}  [{one.origin}]") for one, text in texts]
+    for timed in search.in_time:
+        text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
+        lines.append(Statement(Known(timed.integral.verdict), text))
     profile = search.profile
     if search.by_theorems:
         number = counted(search.by_theorems, "independent integral")
@@ -170,21 +166,21 @@ def _measure_lines(found: Findings) -> list[Statement]:
         return []
     lines = []
     if search.densities:
-        lines += [Statement(str(one.verdict), f"dx/phi is invariant, phi = {one.text}") for one in search.shown]
+        lines += [Statement(Known(one.verdict), f"dx/phi is invariant, phi = {one.text}") for one in search.shown]
         if len(search.densities) > 1:
             names = [] if found.integrals is None else [one.name for one in found.integrals.integrals]
             times = f"any function of {_listed(names)}" if names else "any integral"
             lines.append(Statement(NOTE, f"so is dx/phi for this phi times {times}"))
     else:
-        lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
+        lines.append(Statement(MEASURED if search.none_there else UNDECIDED, search.reason))
     if search.turning is not None:
         text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.turning.text}"
-        lines.append(Statement(str(search.turning.verdict), text))
+        lines.append(Statement(Known(search.turning.verdict), text))
     return lines
 
 
 def _flow_lines(found: Findings) -> list[Statement]:
-    return [] if found.flow is None else [Statement(*line) for line in found.flow.lines()]
+    return [] if found.flow is None else [Statement(Known(known), text) for known, text in found.flow.lines()]
 
 
 def _poisson_lines(found: Findings) -> list[Statement]:
@@ -194,7 +190,7 @@ def _poisson_lines(found: Findings) -> list[Statement]:
         lines.append(Statement(PROVED, f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, {text}"))
     if search is None:
         return lines
-    lines += [Statement(str(one.verdict), f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors]
+    lines += [Statement(Known(one.verdict), f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors]
     return [*lines, *([Statement(NOTE, search.note)] if search.note else [])]
 
 
@@ -206,7 +202,7 @@ def _growth_lines(found: Findings) -> list[Statement]:
         if shown:
             lines.append(Statement(MEASURED, f"degrees of the iterates: {shown}{more}"))
         unknown = found.degrees.growth is GrowthClass.UNKNOWN and not found.degrees.looks_exponential
-        known = MEASURED if found.degrees.explained is None else EXPLAINED
+        known = found.degrees.known
         lines.append(Statement(UNDECIDED if unknown else known, found.degrees.growth_text))
         recurrence = found.degrees.recurrence
         if recurrence is not None:
@@ -232,7 +228,7 @@ def _singularity_lines(found: Findings) -> list[Statement]:
         return [Statement(UNDECIDED, f"the eps {values} disagree: {', '.join(sorted(verdicts))}")]
     first = min(found.singularities, key=lambda run: run.followed or 0)
     at = f" (eps = {values})" if found.file.map.has_eps else ""
-    lines = [Statement(UNDECIDED if first.verdict == "undecided" else MEASURED, f"{first.text}{at}")]
+    lines = [Statement(UNDECIDED if first.verdict == Outcome.UNDECIDED else MEASURED, f"{first.text}{at}")]
     ends = [h.confined_at for run in found.singularities for h in run.hypersurfaces if h.confined_at is not None]
     if ends:
         lines.append(Statement(MEASURED, f"the last confinement comes after {counted(max(ends), first.unit)}"))
@@ -338,10 +334,10 @@ def _commuting_lines(found: Findings) -> list[Statement]:
         if not any(one.system == other.system.scaled(-1) for other in told):
             told.append(one)
             text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(one.rhs)})"
-            lines.append(Statement(str(one.finding.verdict), text))
+            lines.append(Statement(Known(one.finding.verdict), text))
     for k, family in enumerate(search.families):
         if not any(_are_opposite(family, other) for other in search.families[:k]):
-            lines.append(Statement(str(family.finding.verdict), _family_text(family)))
+            lines.append(Statement(Known(family.finding.verdict), _family_text(family)))
     lines += [Statement(NOTE, text) for text in search.irrational]
     lines += [Statement(UNDECIDED, text) for text in search.undecided]
     if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):

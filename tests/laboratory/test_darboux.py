@@ -74,14 +74,14 @@ def test_a_perturbed_system_loses_them() -> None:
     lost = QuadraticSystem.from_text(["x", "y"], ["x^2 - y^2 + 1", "-2*x*y + x + 1"])
     assert any(len(s.polynomials) > 1 for s in darboux_polynomials(SystemFile.from_system(kept), 3).spaces)
     found = darboux_polynomials(SystemFile.from_system(lost), 1)
-    assert found.spaces == []
+    assert found.spaces == ()
     assert not found.reason
 
 
 def test_degenerate_systems_and_wrong_use() -> None:
     linear = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["x", "3*y"]))
     nowhere = darboux_polynomials(linear, 2, eps=1)
-    assert nowhere.spaces == []
+    assert nowhere.spaces == ()
     assert nowhere.reason
     zero = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x"], ["0"])), 2)
     assert [space.cofactor for space in zero.spaces] == ["1"]
@@ -130,5 +130,5 @@ def test_a_symbol_in_dimension_one() -> None:
 def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(rhs, eps):
     # At eps = -1 every point goes to x = 0, and all multiples of x would have the cofactor 0.
     found = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
-    assert found.spaces == []
+    assert found.spaces == ()
     assert f"at eps = {eps} the map" in found.reason

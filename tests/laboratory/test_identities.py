@@ -130,5 +130,5 @@ def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
 
     monkeypatch.setattr(Laboratory, "formulas", wrong)
     found = darboux_polynomials(load("lotka_volterra"), 1)
-    assert found.spaces == []
+    assert found.spaces == ()
     assert "did not pass as an identity" in found.reason

@@ -15,9 +15,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import rank
+from kahanmaps.laboratory.modular_points import gradient_at, rank
 from kahanmaps.laboratory.preserve.inherited import inherited_integrals
-from kahanmaps.laboratory.preserve.integrals import find_integrals, gradient_at
+from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -24,9 +24,9 @@ from kahanmaps.laboratory.preserve.integrals import (
     IntegralSearch,
     _affine,
     _is_affine_integral,
-    closing_note,
     find_integrals,
 )
+from kahanmaps.laboratory.preserve.results import closing_note
 
 integral_verdict = partial(verdict_on, is_density=False)
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
@@ -362,12 +362,12 @@ def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_fo
 
 
 def test_on_the_line_orbits_that_show_nothing_show_that_there_is_no_integral():
-    found = IntegralSearch(None, (), None, (), Profile(1, (0,), (0,), None, True, True), "", (), 0, 0, "")
+    found = IntegralSearch(None, (), None, 0, (), (), Profile(1, (0,), (0,), None, True, True), "")
     assert found.count_text == "there is no integral (measured, relations of degree up to 1 along orbits)"
 
 
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.preserve.interpolated.repeat", lambda *_: None)
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.search.repeat", lambda *_: None)
     found = find_integrals(load("euler_top"))
     assert (found.integrals, found.codimension, found.reason) == (
         (),
@@ -377,7 +377,7 @@ def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
 
 
 def test_an_affine_integral_is_written_with_its_coefficients():
-    function, origin, _ = _affine(Laboratory(load("euler_top")), [3, 0, -5])
+    function, origin, *_ = _affine(Laboratory(load("euler_top")), [3, 0, -5])
     assert (str(function.numerator), str(function.denominator), origin) == ("3*x1 - 5*x3", "1", "v.x with v.f(x) = 0")
 
 
@@ -405,7 +405,7 @@ def test_integrals_are_counted_by_theorems_orbits_and_formulas(
     dim, codimensions, period, known, proved, formulas, properties, text
 ):
     profile = Profile(dim, codimensions, codimensions, period, True, True, known)
-    found = IntegralSearch(load("riccati"), (), None, (None,) * formulas, profile, "", (), 0, proved, "T", (), False)
+    found = IntegralSearch(load("riccati"), (), None, 0, (), (None,) * formulas, profile, "", proved, "T")
     assert (found.codimension, found.is_exact, found.is_complete) == properties
     assert found.count_text == text
 

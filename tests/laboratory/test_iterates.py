@@ -19,6 +19,7 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import Independent
 from kahanmaps.laboratory.preserve.affine_functions import affine_integrals
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.iterates import RatioOfIterates, integrals_in_iterates, verdict_on_ratio
@@ -38,9 +39,10 @@ def searched(file, wanted=6, symbols=()):
     """The laboratory, the integrals in x and those in iterates that do not depend on the affine ones."""
     laboratory = Laboratory(file, symbols)
     map_ = laboratory.maps[0]
-    affine = [[int(entry) % map_.prime for entry in v] for v in affine_integrals(laboratory.system)]
-    plain, ratios = integrals_in_iterates(laboratory, wanted, affine, map_.random_point(), time.monotonic() + 60)
-    return laboratory, len(affine), [function for function, _ in plain], [ratio for ratio, _ in ratios]
+    known = Independent(map_)
+    known.rows = [[int(entry) % map_.prime for entry in v] for v in affine_integrals(laboratory.system)]
+    plain, ratios = integrals_in_iterates(laboratory, wanted, known, time.monotonic() + 60)
+    return laboratory, len(known.rows), [function for function, *_ in plain], [ratio for ratio, _ in ratios]
 
 
 def values_along_orbit(file, ratio, count=3):

@@ -30,7 +30,7 @@ from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, o
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.modular_points import rank
-from kahanmaps.laboratory.singular.following import Range, walked
+from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
@@ -521,7 +521,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
 ):
     tried = []
 
-    def walk(equation, point, direction, precision, functions):
+    def walk(equation, point, direction, precision, tangents, functions):
         tried.append(precision)
         yield SimpleNamespace(name="first", common=0)
         if precision < 64:
@@ -529,6 +529,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
         yield SimpleNamespace(name="t", common=1)
         yield SimpleNamespace(name="last", common=0)
 
-    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk_along", walk)
-    run, whole = walked((), (), (), (), steps, **{"end": math.inf, **options})
+    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk", walk)
+    limits = Range(0, 0, 0, options.get("end", math.inf))
+    run, whole = Course((), (), (), limits).steps(steps, most=options.get("most", 4096))
     assert ([step.name for step in run], whole, tried) == found

@@ -17,6 +17,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.growth import _goes_on
 from kahanmaps.laboratory.scan.kept import Kept
+from kahanmaps.laboratory.scan.members import Scanned
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
@@ -91,23 +92,28 @@ def test_a_member_of_a_component_is_a_system_of_its_own(three_lines):
         three_lines.member(replace(point, values=None))
 
 
+def three_lines_scanned(by="degrees"):
+    file = parse_system(THREE_LINES)
+    return Scanned(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0, by)
+
+
 def test_a_wrong_condition_is_not_confirmed():
-    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    family = three_lines_scanned()
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))
-    found = [_confirmed(one, ["g1", "g2"], map_, None, [], random.Random(1)) for one in (good, wrong)]
+    found = [_confirmed(one, family, [], random.Random(1)) for one in (good, wrong)]
     assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
 
 
 def test_one_member_speaks_for_others_only_as_long_as_their_degrees_agree(three_lines):
     points = {one.text: one for one in three_lines.components}
-    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    family = three_lines_scanned()
     known = points["(2, 3)"].growth
-    assert _goes_on(points["(3, 2)"], known, map_, None, 0)
+    assert _goes_on(points["(3, 2)"], known, family)
     # as if the first degrees of two components were the same and the further ones were not
-    assert not _goes_on(points["(1, 2)"], known, map_, None, 0)
-    assert not _goes_on(points["(3, 2)"], None, map_, None, 0)
+    assert not _goes_on(points["(1, 2)"], known, family)
+    assert not _goes_on(points["(3, 2)"], None, family)
 
 
 def test_the_conditions_of_lotka_volterra_in_space_are_found():
@@ -341,12 +347,12 @@ def test_blocks_of_relations_have_one_kind_of_growth_each():
 
 @pytest.mark.parametrize(("by", "degrees"), [("integrals", (3, 6, 10)), ("density", (3, 6, 9))])
 def test_a_wrong_condition_has_neither_relations_nor_densities(by, degrees):
-    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    family = three_lines_scanned(by)
     g1, g2 = ring(["g1", "g2"]).gens()
     wrong = Component((g1 - g2,), 1, tuple(d - 1 for d in degrees), (43, 47, 53))
-    found = _confirmed(wrong, ["g1", "g2"], map_, None, [], random.Random(1), by)
+    found = _confirmed(wrong, family, [], random.Random(1))
     assert (found.confirmed, found.tried) == (0, 3)
-    assert _confirmed(replace(wrong, degrees=degrees), ["g1", "g2"], map_, None, [], random.Random(1), by).is_confirmed
+    assert _confirmed(replace(wrong, degrees=degrees), family, [], random.Random(1)).is_confirmed
 
 
 def test_a_cycle_of_three_parameters_is_found_and_no_exchange():

@@ -19,6 +19,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Sequence
+from enum import StrEnum
 from functools import reduce
 from typing import NoReturn
 
@@ -32,10 +33,24 @@ _MINORS = 5  # the largest dimension in which minors are taken
 _MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^62
 
 
-class Stopped(Exception):
-    """Why no further curve is to be had: "time", "degree", and what else the search for degrees adds."""
+class Ended(StrEnum):
+    """What ends the walk along curves, or the search for degrees."""
 
-    def __init__(self, ended: str, message: str) -> None:
+    RECURRENCE = "recurrence"  # one was found, with terms to spare
+    EXPLAINED = "explained"  # by the singularities, and enough terms agree
+    UNCONFIRMED = "unconfirmed"  # a recurrence fits, and the patterns of the singularities are not known to the end
+    TERMS = "terms"  # as many as asked for
+    TIME = "time"
+    DEGREE = "degree"  # the next is over the limit
+    CONSTANT = "constant"  # the iterate is a constant map
+    SINGULAR = "singular"  # the next iterate exists nowhere
+    LINES = "lines"  # the lines do not agree
+
+
+class Stopped(Exception):
+    """Why no further curve is to be had, or no further degree is asked for."""
+
+    def __init__(self, ended: Ended, message: str) -> None:
         self.ended, self.message = ended, message
 
 
@@ -105,7 +120,7 @@ class Line:
         return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
 
     def _raise_degree(self) -> NoReturn:
-        raise Stopped("degree", f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
+        raise Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
 
     def _by_series(self, equation: Equation, guess: int) -> list[nmod_poly]:
         most = 2 * self._max_degree + _MARGIN + 1
@@ -121,7 +136,7 @@ class Line:
 
     def _require_time(self) -> None:
         if time.monotonic() > self._deadline:
-            raise Stopped("time", f"the time was over at iterate {self.steps + 1}")
+            raise Stopped(Ended.TIME, f"the time was over at iterate {self.steps + 1}")
 
     def _image(self, equation: Equation, length: int) -> list[nmod_poly]:
         """The coordinates of the next curve as power series, to `length` terms."""

@@ -33,10 +33,11 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.text import format_number
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
-from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
+from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
 from kahanmaps.laboratory.growth.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
+from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.singular.generic import with_eps
 from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMENSION, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
@@ -59,18 +60,14 @@ _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to n
 class DegreeGrowth(Printed):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and what they say of its complexity.
 
-    `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with terms
-    to spare), "explained" (by the singularities, and enough terms agree), "terms" (as many as asked for), "time",
-    "degree" (the next is over the limit), "constant" (the iterate is a constant map), "singular" (the next iterate
-    exists nowhere), "lines" (the lines do not agree) or "unconfirmed" (a recurrence fits, and the patterns of the
-    singularities are not known to the end). `patterns` is what the singularities say, None where they were not asked.
-    The degrees are measured, and so is what explains them: evidence, and no proof. `enclosure` has bounds of the
-    dynamical degree of planar maps that are proved, the lower one above 1; None where there are none.
+    `eps` is None for generic eps (a random residue for each line). `patterns` is what the singularities say, None where
+    they were not asked. The degrees are measured, and so is what explains them: evidence, and no proof. `enclosure` has
+    bounds of the dynamical degree of planar maps that are proved, the lower one above 1; None where there are none.
     """
 
     degrees: tuple[int, ...]
     eps: fmpq | None
-    ended: str
+    ended: str  # one of `Ended`, or what a record says
     message: str
     seed: int
     primes: tuple[int, ...]
@@ -128,7 +125,7 @@ class DegreeGrowth(Printed):
     @property
     def growth(self) -> GrowthClass:
         """How the degrees grow if the recurrence goes on; `GrowthClass.UNKNOWN` without one."""
-        if self.ended == "constant":
+        if self.ended == Ended.CONSTANT:
             return GrowthClass.ZERO
         return GrowthClass.UNKNOWN if self.recurrence is None else self.recurrence.growth
 
@@ -182,15 +179,22 @@ class DegreeGrowth(Printed):
     @property
     def basis(self) -> str:
         """How the growth is known where there is a recurrence: explained or measured, and with which limit."""
-        limit = self.patterns.limit if self.patterns is not None else ""
-        known = "measured" if self.explained is None else "explained"
-        return f"{known}: {limit}" if limit else known
+        return f"{self.known}: {self._limit}" if self._limit else str(self.known)
+
+    @property
+    def known(self) -> Known:
+        """How the growth is known where there is a recurrence."""
+        return Known.MEASURED if self.explained is None else Known.EXPLAINED
+
+    @property
+    def _limit(self) -> str:
+        """How far confinement was looked for, where it was not seen."""
+        return self.patterns.limit if self.patterns is not None else ""
 
     @property
     def growth_text(self) -> str:
         """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
-        limited = self.recurrence is not None and self.basis not in ("measured", "explained")
-        return self.kind_text + (f" ({self.basis})" if limited else "")
+        return self.kind_text + (f" ({self.basis})" if self.recurrence is not None and self._limit else "")
 
     def rows(self) -> list[dict[str, int]]:
         """A row for each iterate, for `pandas.DataFrame(found.rows())` and the like."""
@@ -303,16 +307,16 @@ class _Search:
             while True:
                 self._look_at_fit(max_terms is None)
                 if max_terms is not None and len(self.degrees) > max_terms:
-                    raise Stopped("terms", f"{counted(max_terms, 'iterate')} asked for and measured")
+                    raise Stopped(Ended.TERMS, f"{counted(max_terms, 'iterate')} asked for and measured")
                 if len(self.degrees) > _MOST_TERMS:
-                    raise Stopped("terms", f"{_MOST_TERMS} iterates, and no more are worked out")
+                    raise Stopped(Ended.TERMS, f"{_MOST_TERMS} iterates, and no more are worked out")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
                 self._step(lines)
                 if self.degrees[-1] == 0 and max_terms is None:
-                    raise Stopped("constant", f"iterate {len(self.degrees) - 1} is a constant map")
+                    raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as end:
             ended, message = end.ended, end.message
-        if ended == "degree":  # too soon for a recurrence to be seen
+        if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
             self._follow()
         primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
         found = replace(
@@ -325,7 +329,7 @@ class _Search:
         return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))
 
     def _so_far(self) -> DegreeGrowth:
-        return DegreeGrowth(tuple(self.degrees), self._eps, "", "", self._seed, (), (), (), self._patterns)
+        return DegreeGrowth(tuple(self.degrees), self._eps, Ended.TERMS, "", self._seed, (), (), (), self._patterns)
 
     def _look_at_fit(self, may_stop: bool) -> None:
         """Follow the singularities in good time, and stop where a recurrence is certain."""
@@ -346,14 +350,16 @@ class _Search:
             last = max(known.lengths, default=0) if known is not None else 0
             same = found is not None and found.characteristic == explained.characteristic
             if (enough and same) or size > 2 * last + _AGREEING or self.degrees[-1] > _LARGE:
-                raise Stopped("explained", "the singularities explain the degrees, and those measured agree")
+                raise Stopped(Ended.EXPLAINED, "the singularities explain the degrees, and those measured agree")
             return
         if found is None or not enough:
             return
         if known is not None and known.running:
-            raise Stopped("unconfirmed", f"a recurrence of order {found.order} fits, but {known.running}")
+            raise Stopped(Ended.UNCONFIRMED, f"a recurrence of order {found.order} fits, but {known.running}")
         if known is None or size >= known.terms_needed(found.order):
-            raise Stopped("recurrence", f"a recurrence of order {found.order} holds for {found.checked} terms to spare")
+            raise Stopped(
+                Ended.RECURRENCE, f"a recurrence of order {found.order} holds for {found.checked} terms to spare"
+            )
 
     def _follow(self) -> None:
         """What the singularities say, if that was not asked before and the map is not affine."""
@@ -389,9 +395,11 @@ class _Search:
                 return
             self._replaced += 1
             if best < 0 and self._replaced > _LINES:
-                raise Stopped("singular", f"iterate {n} exists nowhere: {self._map.denominator_name} = 0 on the image")
+                raise Stopped(
+                    Ended.SINGULAR, f"iterate {n} exists nowhere: {self._map.denominator_name} = 0 on the image"
+                )
             if self._replaced > _REPLACEMENTS:
-                raise Stopped("lines", f"random lines do not agree on the degree of iterate {n}: {found}")
+                raise Stopped(Ended.LINES, f"random lines do not agree on the degree of iterate {n}: {found}")
             if best >= 0:
                 self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")
             for k, degree in enumerate(found):

@@ -20,8 +20,8 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, ring, substitute
 from kahanmaps.algebra.roots import Root
 from kahanmaps.laboratory.modular_points import ModularMap
+from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.number_fields import reconstruct_at
 
 Pattern = tuple[tuple[bool, ...], ...]
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]

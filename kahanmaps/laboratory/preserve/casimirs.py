@@ -9,19 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import comb, lcm, prod
-from typing import Any
 
 from flint import fmpq_mpoly_ctx
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
-from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, gradient, ring
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, ring
 from kahanmaps.algebra.residues import rational_vector
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, null_space
-from kahanmaps.laboratory.preserve.closed_forms import closed_forms
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, null_space, slopes
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral
 
@@ -32,15 +30,8 @@ _BUDGET = 200_000  # products of terms, for writing a candidate out
 _SPARE = 4
 
 
-def slopes(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:
-    """The gradient of N/D in the first n variables, times D^2."""
-    N, D = (evaluate(part, field, place) for part in (function.numerator, function.denominator))
-    upper, lower = (gradient(part)[:n] for part in (function.numerator, function.denominator))
-    return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(upper, lower, strict=True)]
-
-
 def casimir_candidates(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], seconds: float
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
 ) -> Iterator[tuple[str, RationalFunction]]:
     """Functions of the integrals that may be Casimirs, as text in their names and written out.
 
@@ -48,7 +39,7 @@ def casimir_candidates(
         laboratory: the maps.
         tensor: one that the map preserves.
         integrals: known ones, by their names.
-        seconds: for the coefficients of polynomials, about.
+        deadline: for the coefficients of polynomials, a value of time.monotonic().
 
     Yields:
         Products of powers, then polynomials of degree 2 at most: right modulo a prime. Functions of single Casimirs may
@@ -63,7 +54,7 @@ def casimir_candidates(
     try:
         found = [
             *_products(laboratory.maps[0], tensor, integrals, context),
-            *_polynomials(laboratory, tensor, integrals, seconds),
+            *_polynomials(laboratory, tensor, integrals, deadline),
         ]
     except NoPoint:
         return
@@ -104,7 +95,7 @@ def _products(
 
 
 def _polynomials(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], seconds: float
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
 ) -> Iterator[RationalFunction]:
     """A basis of the polynomials of degree at most 2 in the integrals whose gradients the tensor kills."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MOST_TERMS else 1
@@ -133,15 +124,9 @@ def _polynomials(
     model = space(laboratory.maps[0])
     if not model.basis:
         return
-    forms = closed_forms(
-        [model],
-        lambda prime, values: [space(laboratory.map_for(prime, values))],
-        [one.name for one in integrals],
-        laboratory.symbols,
-        "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not",
-        seed=laboratory.seed,
-        seconds=seconds,
-    )
+    eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
+    names = [one.name for one in integrals]
+    forms = laboratory.formulas([model], lambda map_: [space(map_)], deadline, names, eps_enters)
     for P in forms.bases[0] if forms.bases is not None else ():
         if degree_in(P, len(integrals)) > 1 or len(P) > 1:
             yield RationalFunction(P, P.context().constant(1))

@@ -1,20 +1,125 @@
-"""Polynomials and rational functions over Q from spaces that are known modulo primes, at values of the symbols."""
+"""Polynomials and rational functions over Q from spaces that are known modulo primes, at values of the symbols.
+
+Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is known modulo a prime where g splits from its values at all
+roots of g there, by interpolation; the c_j are functions over Q, and are found as those are.
+"""
 
 from __future__ import annotations
 
+import random
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq_mpoly, fmpq_poly
 
+from kahanmaps.algebra.etale import EtaleElement
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.interpolation import Reconstruction, reconstruct
+from kahanmaps.algebra.modular_fit import BlackBox, Point
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
+from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.number_fields import primitive_over, reconstruct_at
+
+MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or more of them
+
+
+def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
+    """As `reconstruct` does, the first of the names standing for the root where there is one.
+
+    The box is asked at all roots modulo primes at which the polynomial splits; the functions are polynomials of a
+    degree below that of the field in the first name. `options` are those of `reconstruct`.
+    """
+    if root is None:
+        return reconstruct(black_box, names, **options)
+    m = root.degree
+    assert m <= MAX_DEGREE  # or primes are too rare; who makes a laboratory is told so
+
+    def split(rng: random.Random) -> int:
+        while True:
+            prime = random_prime(rng)
+            with suppress(BadPrime):
+                if len(root.residues(GF(prime))) == m:
+                    return prime
+
+    def box(prime: int, point: Point) -> list[int] | None:
+        roots, rows = root.residues(GF(prime)), []
+        for t in roots:
+            values = black_box(prime, (t, *point))
+            if values is None:
+                return None
+            rows.append(values)
+        through = [interpolated(roots, column, prime) for column in zip(*rows, strict=True)]
+        return [int(P[j]) for P in through for j in range(m)]
+
+    answer = reconstruct(box, names[1:], draw=split, **options)
+    if answer.functions is None:
+        return answer
+    t, *gens = ring(names).gens()
+    functions = []
+    for k in range(0, len(answer.functions), m):
+        above, below = over_one_denominator(answer.functions[k : k + m], t.context(), gens)
+        functions.append(RationalFunction(sum((P * t**j for j, P in enumerate(above)), 0 * t), below))
+    return replace(answer, functions=tuple(functions))
+
+
+def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
+    """A polynomial in n variables, the root and eps, not 0, without factors that contain no variable.
+
+    It has integer coefficients without a common factor; of its multiples by numbers of the field with a rational
+    coefficient it is the shortest.
+
+    >>> from kahanmaps.algebra.roots import parse_root
+    >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
+    >>> primitive_over(parse_root("root of t^2 - 2"), (a*x + 6*y) * (1 - a*eps), 2)
+    3*y*a + x
+    """
+    K = root.number_field
+    parts: dict[tuple[int, ...], list[EtaleElement]] = {}
+    for monomial, coefficient in root.remainder(polynomial, n).terms():
+        *exponents, j, e = (int(k) for k in monomial)
+        row = parts.setdefault(tuple(exponents), [])
+        row += [K.zero] * (e + 1 - len(row))
+        row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
+    content: list[EtaleElement] = []
+    for row in parts.values():
+        content, rest = row, content
+        while rest:
+            content, rest = rest, _divided(content, rest)[1]
+    entries = {
+        (*exponents, e): c
+        for exponents, row in parts.items()
+        for e, c in enumerate(_divided(row, content)[0])
+        if c != 0
+    }
+    found = []
+    for unit in {str(c): c for c in entries.values()}.values():
+        terms = {
+            (*m[:-1], j, m[-1]): number
+            for m, c in entries.items()
+            for j, number in enumerate((c / unit).coefficients)
+            if number != 0
+        }
+        found.append(primitive_part(polynomial.context().from_dict(terms))[1])
+    return min(found, key=lambda P: (len(P), len(str(P)), str(P)))
+
+
+def _divided(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[EtaleElement], list[EtaleElement]]:
+    """Quotient and remainder of polynomials over a field, coefficients from that of degree 0 on; the last is not 0."""
+    quotient, rest = [Q[-1] * 0] * max(0, len(P) - len(Q) + 1), list(P)
+    while len(rest) >= len(Q):
+        shift, factor = len(rest) - len(Q), rest[-1] / Q[-1]
+        quotient[shift] = factor
+        rest = [c - factor * Q[k - shift] if k >= shift else c for k, c in enumerate(rest[:-1])]
+        while rest and rest[-1] == 0:
+            rest.pop()
+    return quotient, rest
+
 
 Spaces = Sequence[DarbouxSpace]
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import comb
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.plain import attributes
@@ -20,7 +20,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.displayed import Printed, latex
+from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
@@ -36,6 +36,7 @@ from kahanmaps.laboratory.preserve.cofactors import (
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.identities import judged
+from kahanmaps.laboratory.preserve.results import Search
 
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
 _MOST_PRODUCTS = 2000
@@ -59,20 +60,14 @@ class DarbouxPolynomials:
         return {**attributes(self, "cofactor", "polynomials"), "latex": formulas, **attributes(self, "verdict")}
 
 
-@dataclass
-class DarbouxSearch(Printed):
+@dataclass(frozen=True)
+class DarbouxSearch(Search):
     """What `darboux_polynomials` found: spaces by the weight of their cofactor; `reason` if the search ended early."""
 
-    file: SystemFile
-    symbols: tuple[str, ...]
-    eps: fmpq | None
     degree: int
-    seed: int
-    primes: tuple[int, ...]
-    cofactors: tuple[str, ...] = ()
-    spaces: list[DarbouxPolynomials] = field(default_factory=list)
-    reason: str = ""
-    flow: bool = False  # whether they are those of the differential equation
+    cofactors: tuple[str, ...]
+    spaces: tuple[DarbouxPolynomials, ...]
+    reason: str
 
     def rows(self) -> list[dict[str, str]]:
         """A row for each polynomial, for `pandas.DataFrame(found.rows())` and the like."""
@@ -85,7 +80,7 @@ class DarbouxSearch(Printed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         known = attributes(self, "degree", "cofactors", "spaces", "reason", "primes")
-        return {**({"flow": True} if self.flow else {}), **known}
+        return {**self.of_flow, **known}
 
 
 def darboux_polynomials(
@@ -127,34 +122,43 @@ def darboux_polynomials(
     C[y] y proved
     """
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
-    found = DarbouxSearch(file, laboratory.symbols, laboratory.eps, degree, seed, laboratory.primes, flow=flow)
-    if laboratory.defect:  # all multiples of what vanishes on the image have the cofactor 0
-        found.reason = laboratory.defect
-        return found
+    deadline, cofactors, spaces = time.monotonic() + seconds, laboratory.cofactors(), list[DarbouxPolynomials]()
+    reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0
     if flow:
-        return _of_flow(laboratory, found, seconds)
-    deadline = time.monotonic() + seconds
-    cofactors = laboratory.cofactors()
-    found.cofactors = tuple(one.name for one in cofactors)
-    asked, dim = degree, laboratory.map.dim
+        reason = _of_flow(laboratory, degree, seconds, spaces)
+    elif not reason:
+        try:
+            reason = _of_map(laboratory, degree, cofactors, deadline, progress, spaces)
+        except NoPoint as error:
+            reason = str(error)
+    names = () if laboratory.defect else tuple(one.name for one in cofactors)
+    return DarbouxSearch(*laboratory.asked, degree, names, tuple(spaces), reason, flow=flow)
+
+
+def _of_map(
+    laboratory: Laboratory,
+    degree: int,
+    cofactors: Sequence[Cofactor],
+    deadline: float,
+    progress: Callable[[str], None],
+    found: list[DarbouxPolynomials],
+) -> str:
+    """Adds the spaces of polynomials to those found; why the search ended early, empty where it did not."""
+    asked, dim, reason = degree, laboratory.map.dim, ""
     while comb(dim + degree, dim) > _MOST_TERMS:
         degree -= 1
     if degree < asked:
-        found.reason = f"degrees above {degree} were not tried: polynomials in dimension {dim} have too many terms"
+        reason = f"degrees above {degree} were not tried: polynomials in dimension {dim} have too many terms"
     candidates = products(cofactors, degree)
     if len(candidates) > _MOST_PRODUCTS:
-        found.reason = f"{len(candidates)} products of cofactors, of which the first {_MOST_PRODUCTS} were tried"
+        reason = f"{len(candidates)} products of cofactors, of which the first {_MOST_PRODUCTS} were tried"
         candidates = candidates[:_MOST_PRODUCTS]
     map_ = laboratory.maps[0]
-    try:
-        sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
-    except NoPoint as error:
-        found.reason = str(error)
-        return found
+    sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
     known: dict[CofactorProduct, DarbouxSpace] = {}
     for product in candidates:
         if time.monotonic() > deadline:
-            found.reason = "the time was over before all products of cofactors were tried"
+            reason = "the time was over before all products of cofactors were tried"
             break
         progress(f"cofactor {product.text(cofactors)}")
         space = _without_constants(cofactor_space(sample, product, degree), product)
@@ -165,21 +169,23 @@ def darboux_polynomials(
     for product, space in known.items():
         if space not in listed:
             listed.append(space)
-            _list(found, laboratory, cofactors, product, space, deadline)
-    return found
+            written = _written(laboratory, cofactors, product, space, deadline)
+            if isinstance(written, str):
+                reason = written
+            else:
+                found.append(written)
+    return reason
 
 
-def _of_flow(laboratory: Laboratory, found: DarbouxSearch, seconds: float) -> DarbouxSearch:
-    """The search with the Darboux polynomials of the flow, each with its own cofactor."""
+def _of_flow(laboratory: Laboratory, degree: int, seconds: float, found: list[DarbouxPolynomials]) -> str:
+    """The same with the Darboux polynomials of the flow, each with its own cofactor."""
     assert laboratory.field is not None
-    known = flow_polynomials(laboratory.field, found.degree, seconds, laboratory.seed)
+    known = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
     for P in known.functions:
         K = darboux_cofactor(laboratory.field, P)
         assert K is not None  # or it would not have been listed
-        found.spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
-    if known.degree < found.degree:
-        found.reason = f"degrees above {known.degree} are not settled: {known.reason}"
-    return found
+        found.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
+    return "" if known.degree >= degree else f"degrees above {known.degree} are not settled: {known.reason}"
 
 
 def _without_constants(space: DarbouxSpace, product: CofactorProduct) -> DarbouxSpace:
@@ -202,29 +208,28 @@ def _is_spanned_by_products(known: dict[CofactorProduct, DarbouxSpace], product:
     return len(echelon([row for row in rows if row is not None], prime)) == len(space.basis)
 
 
-def _list(
-    found: DarbouxSearch,
+def _written(
     laboratory: Laboratory,
     cofactors: Sequence[Cofactor],
     product: CofactorProduct,
     model: DarbouxSpace,
     deadline: float,
-) -> None:
+) -> DarbouxPolynomials | str:
+    """A space in closed form, or why there is none."""
+
     def spaces_on(map_: ModularMap) -> list[DarbouxSpace]:
         sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree, model))
         return [_without_constants(cofactor_space(sample, product, model.degree, model), product)]
 
     forms = laboratory.formulas([model], spaces_on, deadline)
     if forms.bases is None:
-        found.reason = f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
-        return
+        return f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
     polynomials = tuple(forms.bases[0])
     outcomes = [_judged(laboratory, cofactors, product, P) for P in polynomials]
     if not all(outcome.holds for outcome in outcomes):
-        found.reason = f"a formula for the cofactor {product.text(cofactors)} did not pass as an identity"
-        return
+        return f"a formula for the cofactor {product.text(cofactors)} did not pass as an identity"
     verdict = Verdict.PROVED if all(one is Verdict.PROVED for one in outcomes) else Verdict.SUPPORTED
-    found.spaces.append(DarbouxPolynomials(product.text(cofactors), polynomials, verdict))
+    return DarbouxPolynomials(product.text(cofactors), polynomials, verdict)
 
 
 def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> Verdict:

@@ -21,7 +21,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, deg
 from kahanmaps.algebra.text import format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
-from kahanmaps.displayed import Printed, latex
+from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -36,8 +36,9 @@ from kahanmaps.laboratory.preserve.cofactors import (
 )
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, constant_structures
-from kahanmaps.laboratory.preserve.integrals import FoundIntegral, closing_note, find_integrals, toml_comment
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
+from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
@@ -69,27 +70,34 @@ class FoundDensity:
 
 
 @dataclass(frozen=True)
-class DensitySearch(Printed):
+class DensitySearch(Search):
     """What `find_densities` found.
 
     `densities` span all phi of the least degree that has some, after a proved one where these are not, or are
     det(I - eps f') of a Hamiltonian system, which need not be of least degree; `degree` is the largest that was tried,
-    and `reason` says why the search ended without a density. `eps` is None for every eps; `period` is the number of
-    points of orbits that close. `turning` is a phi with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into
-    -dx/phi, and |dx/phi| is invariant.
+    and `cut` says why not all that was asked for was tried, empty where it was. `period` is the number of points of
+    orbits that close. `turning` is a phi with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into -dx/phi, and
+    |dx/phi| is invariant.
     """
 
-    file: SystemFile
-    symbols: tuple[str, ...]
-    eps: fmpq | None
     densities: tuple[FoundDensity, ...]
     degree: int
-    reason: str
-    primes: tuple[int, ...]
-    seed: int
+    cut: str
     period: int | None = None
     turning: FoundDensity | None = None
-    flow: bool = False  # whether the densities are those of the differential equation
+
+    @property
+    def none_there(self) -> bool:
+        """Whether all that was asked for was tried, and nothing is a density: measured."""
+        return not self.densities and not self.cut
+
+    @property
+    def reason(self) -> str:
+        """Why the search ended without a density."""
+        if self.none_there:
+            degree = f"no polynomial of degree at most {self.degree}"
+            return f"{degree}, and no product of powers of known ones, is a density"
+        return "" if self.densities else self.cut
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
@@ -120,11 +128,7 @@ class DensitySearch(Printed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         more = attributes(self, "period", "note", "reason", "primes")
-        return {
-            **({"flow": True} if self.flow else {}),
-            **attributes(self, "densities", degree_tried="degree"),
-            **more,
-        }
+        return {**self.of_flow, **attributes(self, "densities", degree_tried="degree"), **more}
 
     def toml_section(self) -> str:
         """The density that is shown as a section [density] of a system file, which `check-measure` accepts.
@@ -133,7 +137,7 @@ class DensitySearch(Printed):
         """
         if not self.densities:
             return ""
-        return "\n".join([*toml_comment(self.eps, self.file.map), "[density]", f'phi = "{self.shown[0].text}"', ""])
+        return "\n".join([*self.toml_comments, "[density]", f'phi = "{self.shown[0].text}"', ""])
 
 
 def find_densities(
@@ -175,14 +179,13 @@ def find_densities(
     >>> [(one.text, str(one.verdict)) for one in found.densities]
     [('x*y', 'proved')]
     """
-    if not seconds > 0:
-        raise InputError(f"found {seconds} seconds, expected a time above 0")
+    require_time(seconds)
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    densities, tried, reason, period = list[FoundDensity](), -1, laboratory.defect, None
+    densities, tried, cut, period = list[FoundDensity](), -1, laboratory.defect, None
     product = turning = None
-    if not reason:
+    if not cut:
         period = None if flow else _period(laboratory)
         deadline = time.monotonic() + seconds
         theorem, dim = _theorem(laboratory), laboratory.map.dim
@@ -191,7 +194,7 @@ def find_densities(
         else:
             progress("densities that are products")
             product, turning = _products(laboratory, max_degree)
-            densities, tried, reason = _search(laboratory, product, max_degree, deadline, progress)
+            densities, tried, cut = _search(laboratory, product, max_degree, deadline, progress)
             if densities and all(one.verdict is not Verdict.PROVED for one in densities):
                 densities = [*_product_of_variables(laboratory, max_degree), *densities]
             if not densities and turning is None and not flow and time.monotonic() < deadline:
@@ -203,19 +206,7 @@ def find_densities(
                 product, turning = _products(laboratory, max_degree, integrals)
                 if product is not None:
                     densities, tried = [product], product.degree(dim)
-    return DensitySearch(
-        file,
-        laboratory.free_symbols,
-        laboratory.eps,
-        tuple(densities),
-        tried,
-        "" if densities else reason,
-        laboratory.primes,
-        seed,
-        period,
-        turning,
-        flow,
-    )
+    return DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
 
 
 def _search(
@@ -225,7 +216,7 @@ def _search(
     deadline: float,
     progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
-    """Densities, the largest degree that was tried, and why there are none; the product where none is simpler."""
+    """Densities, the largest degree that was tried, and what ended it; the product where none is simpler."""
     dim = laboratory.map.dim
     top = max_degree if max_degree is not None else _MAX_DEGREE
     top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
@@ -247,7 +238,7 @@ def _search(
             return [], degree - 1, str(error)
     if product is not None:
         return [product], product.degree(dim), ""
-    return [], top, f"no polynomial of degree at most {top}, and no product of powers of known ones, is a density"
+    return [], top, ""
 
 
 def _product_of_variables(laboratory: Laboratory, max_degree: int | None) -> list[FoundDensity]:

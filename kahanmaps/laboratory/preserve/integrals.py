@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -19,19 +20,18 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
+from kahanmaps.algebra.polynomials import RationalFunction, degree, ring
 from kahanmaps.algebra.text import format_factored, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
-from kahanmaps.displayed import Printed, latex
+from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
+from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
-from kahanmaps.laboratory.preserve.interpolated import bases_of
 from kahanmaps.laboratory.preserve.iterates import (
     IntegralInIterates,
     gradient_of,
@@ -39,12 +39,13 @@ from kahanmaps.laboratory.preserve.iterates import (
     verdict_on_ratio,
 )
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.search import AFFINE, Found, may_be_conjugate, repeat, search
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
+from kahanmaps.laboratory.preserve.search import AFFINE, bases_of, may_be_conjugate, repeat, search
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
+Formula = tuple[RationalFunction, str, str]  # where it comes from; in factors, where it is known so
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 
 
@@ -117,28 +118,21 @@ class TimedIntegral:
 
 
 @dataclass(frozen=True)
-class IntegralSearch(Printed):
+class IntegralSearch(Search):
     """What `find_integrals` found.
 
     `integrals` are functionally independent, also together with those that depend on time, `in_time`, or those whose
     formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits show (measured);
     `by_theorems` is how many independent integrals the Kahan map has by the theorems of inherited.py, and `theorems`
-    says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is. `eps` is
-    None for every eps.
+    says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is.
     """
 
-    file: SystemFile
-    symbols: tuple[str, ...]
-    eps: fmpq | None
     integrals: tuple[FoundIntegral, ...]
     profile: Profile
     reason: str
-    primes: tuple[int, ...]
-    seed: int
-    by_theorems: int
-    theorems: str
+    by_theorems: int = 0
+    theorems: str = ""
     in_time: tuple[TimedIntegral, ...] = ()
-    flow: bool = False  # whether the integrals are those of the differential equation
     in_iterates: tuple[IntegralInIterates, ...] = ()
 
     @property
@@ -201,7 +195,7 @@ class IntegralSearch(Printed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            **({"flow": True} if self.flow else {}),
+            **self.of_flow,
             **attributes(self, "integrals"),
             **attributes(self, "found", "in_time", "in_iterates"),
             **attributes(self, "codimension", codimension_is_exact="is_exact"),
@@ -219,32 +213,7 @@ class IntegralSearch(Printed):
             return ""
         lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
         lines += [f"# {one.name}: {one.text}" for one in self.in_iterates]
-        return "\n".join([*toml_comment(self.eps, self.file.map), *lines]) + "\n"
-
-
-def closing_note(period: int | None, eps: fmpq | None, map_: BirationalMap) -> str:
-    """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
-
-    >>> from kahanmaps.documents.catalog import load
-    >>> closing_note(4, fmpq(1), load("weierstrass").map)
-    'orbits close after 4 steps: at eps = 1 the map is periodic (measured); nothing follows for other eps'
-    """
-    if period is None:
-        return ""
-    closes = f"orbits close after {period} step{'s' * (period != 1)}"
-    if not map_.has_eps:
-        return f"{closes}: the map is periodic (measured)"
-    if eps is None:
-        return f"{closes} at every eps that was tried: the map is periodic (measured)"
-    return f"{closes}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"
-
-
-def toml_comment(eps: fmpq | None, map_: BirationalMap) -> list[str]:
-    """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
-    if eps is None:
-        return []
-    step = f" (time step 2 eps = {2 * eps})" if map_.has_time_step else ""
-    return [f"# for eps = {eps} only{step}: check with --eps {eps}"]
+        return "\n".join([*self.toml_comments, *lines]) + "\n"
 
 
 def find_integrals(
@@ -284,68 +253,43 @@ def find_integrals(
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
     ([('y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
-    if not seconds > 0:
-        raise InputError(f"found {seconds} seconds, expected a time above 0")
+    require_time(seconds)
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
     deadline = time.monotonic() + seconds
-    primes = laboratory.primes
+    known = _Known(laboratory, seed) if laboratory.system is not None and not flow and laboratory.root is None else None
+    collected = _Collected(laboratory, deadline, progress)
 
-    inherited: list[InheritedIntegrals] = []  # of each map; theorems speak of Kahan maps
-    if laboratory.system is not None and not flow and laboratory.root is None:
-        # Without symbols the maps have the same values, none, and one system.
-        systems = {
-            values: inherited_integrals(laboratory.system.at(values), seed=seed)
-            for values in {map_.values for map_ in laboratory.maps}
-        }
-        inherited = [systems[map_.values] for map_ in laboratory.maps]
-    by_theorems = 0
-    in_time: list[TimedIntegral] = []
-    in_iterates: list[IntegralInIterates] = []
-
-    def gradients(map_: ModularMap, x: Point) -> list[list[int]]:
-        return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
-
-    def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
-        values = f", at random values of {', '.join(symbols)}" if laboratory.free_symbols else ""
-        theorems = inherited[0].text + values if inherited else ""
-        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems)
-        more = tuple(in_time), flow, tuple(in_iterates)
-        return IntegralSearch(file, laboratory.free_symbols, laboratory.eps, *found, *more)
+    def result(profile: Profile, reason: str) -> IntegralSearch:
+        theorems = known.text if known is not None else ""
+        by_theorems = known.count if known is not None and not laboratory.defect else 0
+        found = tuple(collected.integrals), profile, reason, by_theorems, theorems
+        more = tuple(collected.in_time), tuple(collected.in_iterates)
+        return IntegralSearch(*laboratory.asked, *found, *more, flow=flow)
 
     empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
-        return result([], empty, laboratory.defect)
-    if inherited:
-        by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
+        return result(empty, laboratory.defect)
+    gradients = {} if known is None else {"known": known.gradients}
     try:
         profile = orbit_profile(
-            laboratory.maps, max_degree=max_degree, seconds=seconds / 3, known=gradients, progress=progress
+            laboratory.maps, max_degree=max_degree, seconds=seconds / 3, progress=progress, **gradients
         )
         cofactors = laboratory.cofactors()
-        base, found = _search(laboratory, profile, cofactors, deadline, progress)
-        formulas: list[tuple[RationalFunction, str]] = []
-        reason = ""
-        if found.steps:
-            progress("interpolating closed forms")
-            bases, reason = bases_of(laboratory, base.prime, found, cofactors, deadline)
-            origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
-            formulas = [
-                (_ratio(P, Q), origin) for (Q, *more), origin in zip(bases, origins, strict=False) for P in more
-            ]
+        formulas, reason = _formulas(laboratory, profile, cofactors, deadline, progress)
     except NoPoint as error:
-        return result([], empty, str(error))
-    integrals = _independent(laboratory, formulas, progress)
-    if inherited and not laboratory.symbols:
-        integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
-    if len(integrals) < laboratory.map.dim - 1:
+        return result(empty, str(error))
+    collected.offer(formulas)
+    if known is not None and not laboratory.symbols:
+        collected.add_by_theorems(known.inherited[0])
+    if len(collected.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
-        integrals, in_time = _products(laboratory, cofactors, integrals, progress)
-    done = result(integrals, profile, "")
+        collected.add_products(cofactors)
+    done = result(profile, "")
     if not flow and not done.is_complete and laboratory.root is None:
-        integrals, in_iterates = _in_iterates(laboratory, done, deadline, progress)
-        done = result(integrals, profile, "")
+        collected.add_in_iterates(done.codimension)
+        done = result(profile, "")
     missing = done.codimension - done.found
     if missing <= 0:
         reason = ""
@@ -359,6 +303,35 @@ def find_integrals(
     return replace(done, reason="; ".join(filter(None, reasons)))
 
 
+class _Known:
+    """What theorems say of the integrals of a Kahan map, on each of the maps modulo primes."""
+
+    def __init__(self, laboratory: Laboratory, seed: int) -> None:
+        assert laboratory.system is not None
+        self._laboratory = laboratory
+        # Without symbols the maps have the same values, none, and one system.
+        systems = {
+            values: inherited_integrals(laboratory.system.at(values), seed=seed)
+            for values in {map_.values for map_ in laboratory.maps}
+        }
+        self.inherited = [systems[map_.values] for map_ in laboratory.maps]
+
+    def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
+        """Those of the integrals at a point."""
+        return self.inherited[self._laboratory.maps.index(map_)].gradients(map_, x)
+
+    @cached_property
+    def count(self) -> int:
+        """How many are independent."""
+        return min(one.count(map_) for one, map_ in zip(self.inherited, self._laboratory.maps, strict=True))
+
+    @property
+    def text(self) -> str:
+        """Which there are."""
+        symbols = ", ".join(self._laboratory.free_symbols)
+        return self.inherited[0].text + (f", at random values of {symbols}" if symbols else "")
+
+
 def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
     """That formulas with symbols depend on each other, or vanish, where these have the values that the file gives."""
     values = [laboratory.file.parameters.get(name) for name in laboratory.symbols]
@@ -366,10 +339,10 @@ def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
         return ""
     prime = laboratory.maps[0].prime
     map_ = laboratory.map_at(prime, [int(GF(prime).convert(value)) for value in values], laboratory.maps[0].eps)
-    point = map_.random_point()
-    rows = [gradient_at(map_, one.function, point) for one in search.integrals]
-    rows += [gradient_of(one.ratio, laboratory.map, map_, point) for one in search.in_iterates]
-    left = rank(rows, prime)
+    there = Independent(map_)
+    rows = [there.gradient(one.function) for one in search.integrals]
+    rows += [gradient_of(one.ratio, laboratory.map, map_, there.point) for one in search.in_iterates]
+    left = sum(map(there.add, rows))
     if left == len(rows):
         return ""
     told = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
@@ -383,21 +356,30 @@ def _unfinished(profile: Profile, max_degree: int | None) -> str:
     return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
 
 
-def _search(
+def _formulas(
     laboratory: Laboratory,
     profile: Profile,
     cofactors: Sequence[Cofactor],
     deadline: float,
     progress: Callable[[str], None],
-) -> tuple[ModularMap, Found]:
-    """What is found modulo a prime where spaces that are conjugate over an extension of Q do not occur, and the map."""
+) -> tuple[list[Formula], str]:
+    """Ratios of polynomials with a common cofactor, and why there are no others. Raises NoPoint.
+
+    They are sought modulo a prime where spaces that are conjugate over an extension of Q do not occur.
+    """
     base = laboratory.maps[0]
     found = search(base, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
     if may_be_conjugate(found):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
             if time.monotonic() < deadline and repeat(found, map_, cofactors, base.prime) is None:
                 base, found = map_, search(map_, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
-    return base, found
+    if not found.steps:
+        return [], ""
+    progress("interpolating closed forms")
+    bases, reason = bases_of(laboratory, base.prime, found, cofactors, deadline)
+    origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
+    pairs = zip(bases, origins, strict=False)
+    return [(_ratio(P, Q), origin, "") for (Q, *more), origin in pairs for P in more], reason
 
 
 def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
@@ -408,94 +390,94 @@ def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
     return RationalFunction(P, Q)
 
 
-def _products(
-    laboratory: Laboratory,
-    cofactors: Sequence[Cofactor],
-    integrals: Sequence[FoundIntegral],
-    progress: Callable[[str], None],
-) -> tuple[list[FoundIntegral], list[TimedIntegral]]:
-    """The integrals and those among products of powers that do not depend on them; and such that depend on time."""
-    origin = "product of powers of known polynomials"
-    try:
-        products = products_of(laboratory, candidates(laboratory, cofactors))
-    except NoPoint:
-        return list(integrals), []
-    written = [(function, one) for one in products.integrals if (function := one.function) is not None]
-    text = {id(function): one.text for function, one in written}
-    found = _independent(laboratory, [(function, origin) for function, _ in written], progress, integrals)
-    found = [replace(one, product=text.get(id(one.function), one.product)) for one in found]
-    in_time: list[TimedIntegral] = []
-    map_ = laboratory.maps[0]
-    point = map_.random_point()
-    rows = [gradient_at(map_, one.function, point) for one in found]
-    for product in products.in_time:
-        function = product.function
-        if function is None or len(found) + len(in_time) >= laboratory.map.dim:
-            continue
-        row = gradient_at(map_, function, point)
-        if rank([*rows, row], map_.prime) == len(rows):
-            continue
-        verdict, evidence = laboratory.verdict_on(function, factor=product.constant)
-        if verdict.holds:
-            rows.append(row)
-            name = f"T{len(in_time) + 1}"
-            one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
-            in_time.append(TimedIntegral(name, one, product.constant, laboratory.flow))
-    return found, in_time
+def _size(formula: Formula) -> tuple[int, int, list[list[int]]]:
+    """By size, then by monomials: the order must not depend on the primes."""
+    P = formula[0].numerator
+    return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
 
-def _in_iterates(
-    laboratory: Laboratory, search: IntegralSearch, deadline: float, progress: Callable[[str], None]
-) -> tuple[list[FoundIntegral], list[IntegralInIterates]]:
-    """The integrals found so far with more of them in x, and those in iterates of x; none that was refuted."""
-    map_, known = laboratory.maps[0], search.integrals
-    point = map_.random_point()
-    rows = [gradient_at(map_, one.function, point) for one in known]
-    try:
-        plain, ratios = integrals_in_iterates(laboratory, search.codimension, rows, point, deadline, progress)
-    except NoPoint:
-        return list(known), []
-    integrals, found = _independent(laboratory, plain, progress, known), list[IntegralInIterates]()
-    too_long = set[int]()
-    for ratio, origin in ratios:
-        verdict, evidence = verdict_on_ratio(laboratory, ratio, too_long)
-        if verdict.holds:
-            name = f"I{len(integrals) + len(found) + 1}"
-            found.append(IntegralInIterates(name, ratio, origin, verdict, evidence))
-    return integrals, found
+class _Collected:
+    """Integrals that do not depend on each other, with verdicts; none that was refuted."""
 
+    def __init__(self, laboratory: Laboratory, deadline: float, progress: Callable[[str], None]) -> None:
+        self._laboratory, self._deadline, self._progress = laboratory, deadline, progress
+        self._gradients = Independent(laboratory.maps[0])
+        self.integrals: list[FoundIntegral] = []
+        self.in_time: list[TimedIntegral] = []
+        self.in_iterates: list[IntegralInIterates] = []
 
-def _independent(
-    laboratory: Laboratory,
-    formulas: Sequence[tuple[RationalFunction, str]],
-    progress: Callable[[str], None],
-    known: Sequence[FoundIntegral] = (),
-) -> list[FoundIntegral]:
-    """The known integrals and those that do not depend on them and each other, with verdicts; none that was refuted."""
-    map_ = laboratory.maps[0]
-    point = map_.random_point()
-    found = list(known)
-    rows = [gradient_at(map_, one.function, point) for one in known]
+    def offer(self, formulas: Sequence[Formula]) -> None:
+        """Take those that do not depend on others and pass as identities, short ones first."""
+        for function, origin, product in sorted(formulas, key=_size):
+            row = self._gradients.gradient(function)
+            if not self._gradients.adds(row):
+                continue
+            self._progress("verifying an integral")
+            verdict, evidence = self._judged(function)
+            if verdict.holds:
+                self._add(row, function, origin, verdict, evidence, product)
 
-    # By size, then by monomials: the order must not depend on the primes.
-    def size(P: fmpq_mpoly) -> tuple[int, int, list[list[int]]]:
-        return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
+    def _add(self, row: list[int], *known: Any) -> None:
+        self._gradients.add(row)
+        name = f"{'F' if self._laboratory.flow else 'I'}{len(self.integrals) + 1}"
+        self.integrals.append(FoundIntegral(name, *known))
 
-    by_size = sorted(formulas, key=lambda pair: size(pair[0].numerator))
-    for function, origin in by_size:
-        row = gradient_at(map_, function, point)
-        if rank([*rows, row], map_.prime) == len(rows):
-            continue
-        progress("verifying an integral")
+    def _judged(self, function: RationalFunction) -> tuple[Verdict, Evidence]:
+        laboratory = self._laboratory
         if not laboratory.flow and laboratory.system is not None and _is_affine_integral(laboratory.system, function):
-            verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
-        else:
-            verdict, evidence = laboratory.verdict_on(function)
-        if verdict.holds:
-            rows.append(row)
-            name = f"{'F' if laboratory.flow else 'I'}{len(found) + 1}"
-            found.append(FoundIntegral(name, function, origin, verdict, evidence))
-    return found
+            return Verdict.PROVED, _AFFINE_EVIDENCE
+        return laboratory.verdict_on(function)
+
+    def add_by_theorems(self, inherited: InheritedIntegrals) -> None:
+        """Those of the theorems, as far as they can be written out."""
+        laboratory = self._laboratory
+        affine = len(inherited.quotient.integrals)
+        for k, row in enumerate(inherited.gradients(laboratory.maps[0], self._gradients.point)):
+            if not self._gradients.adds(row):
+                continue
+            if k < affine:
+                self._add(row, *_affine(laboratory, inherited.quotient.integrals[k]))
+            elif time.monotonic() <= self._deadline and (written := _modified(laboratory, inherited, k - affine)):
+                self._add(row, *written)
+
+    def add_products(self, cofactors: Sequence[Cofactor]) -> None:
+        """Products of powers of known polynomials, and such that depend on time."""
+        laboratory, origin = self._laboratory, "product of powers of known polynomials"
+        try:
+            products = products_of(laboratory, candidates(laboratory, cofactors))
+        except NoPoint:
+            return
+        written = ((one, one.function) for one in products.integrals)
+        self.offer([(function, origin, one.text) for one, function in written if function is not None])
+        for product in products.in_time:
+            function = product.function
+            if function is None or len(self.integrals) + len(self.in_time) >= laboratory.map.dim:
+                continue
+            row = self._gradients.gradient(function)
+            if not self._gradients.adds(row):
+                continue
+            verdict, evidence = laboratory.verdict_on(function, factor=product.constant)
+            if verdict.holds:
+                self._gradients.add(row)
+                name = f"T{len(self.in_time) + 1}"
+                one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
+                self.in_time.append(TimedIntegral(name, one, product.constant, laboratory.flow))
+
+    def add_in_iterates(self, wanted: int) -> None:
+        """Those in iterates of x, and more of them in x, until there are as many as wanted."""
+        laboratory = self._laboratory
+        self._gradients = Independent(laboratory.maps[0], [one.function for one in self.integrals])  # free of time
+        try:
+            plain, ratios = integrals_in_iterates(laboratory, wanted, self._gradients, self._deadline, self._progress)
+        except NoPoint:
+            return
+        self.offer(plain)
+        too_long = set[int]()
+        for ratio, origin in ratios:
+            verdict, evidence = verdict_on_ratio(laboratory, ratio, too_long)
+            if verdict.holds:
+                name = f"I{len(self.integrals) + len(self.in_iterates) + 1}"
+                self.in_iterates.append(IntegralInIterates(name, ratio, origin, verdict, evidence))
 
 
 def _is_affine_integral(system: QuadraticSystem, function: RationalFunction) -> bool:
@@ -506,54 +488,16 @@ def _is_affine_integral(system: QuadraticSystem, function: RationalFunction) -> 
     return is_affine and is_kept_by_flow(system, function)
 
 
-def gradient_at(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:
-    """A multiple of the gradient of P/Q with respect to the variables, modulo the prime."""
-    field = GF(map_.prime)
-    at = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
-    P, Q = evaluate(function.numerator, field, at), evaluate(function.denominator, field, at)
-    return [
-        int(
-            evaluate(function.numerator.derivative(k), field, at) * Q
-            - evaluate(function.denominator.derivative(k), field, at) * P
-        )
-        for k in range(map_.dim)
-    ]
-
-
-def _by_theorems(
-    laboratory: Laboratory, inherited: InheritedIntegrals, known: Sequence[FoundIntegral], deadline: float
-) -> list[FoundIntegral]:
-    """The integrals of the theorems that do not depend on the known ones, as far as they can be written out."""
-    map_ = laboratory.maps[0]
-    point = map_.random_point()
-    rows = [gradient_at(map_, one.function, point) for one in known]
-    found = list(known)
-    affine = len(inherited.quotient.integrals)
-    for k, row in enumerate(inherited.gradients(map_, point)):
-        if rank([*rows, row], map_.prime) == len(rows):
-            continue
-        if k < affine:
-            function, origin, evidence = _affine(laboratory, inherited.quotient.integrals[k])
-        else:
-            written = None if time.monotonic() > deadline else _modified(laboratory, inherited, k - affine)
-            if written is None:
-                continue
-            function, origin, evidence = written
-        rows.append(row)
-        found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, Verdict.PROVED, evidence))
-    return found
-
-
-def _affine(laboratory: Laboratory, vector: Sequence[fmpz]) -> tuple[RationalFunction, str, Evidence]:
+def _affine(laboratory: Laboratory, vector: Sequence[fmpz]) -> tuple[RationalFunction, str, Verdict, Evidence]:
     """v.x as a function of the variables and eps."""
     context = ring((*laboratory.map.variables, "eps"))
     total = sum((gen * v for gen, v in zip(context.gens(), vector, strict=False)), context.constant(0))
-    return RationalFunction(total, context.constant(1)), AFFINE, _AFFINE_EVIDENCE
+    return RationalFunction(total, context.constant(1)), AFFINE, Verdict.PROVED, _AFFINE_EVIDENCE
 
 
 def _modified(
     laboratory: Laboratory, inherited: InheritedIntegrals, k: int
-) -> tuple[RationalFunction, str, Evidence] | None:
+) -> tuple[RationalFunction, str, Verdict, Evidence] | None:
     """The modified Hamiltonian that belongs to the k-th form; None where it is too long to be written out."""
     field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
     eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
@@ -569,4 +513,4 @@ def _modified(
     )
     summary = f"{what}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
     evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k))})
-    return function, "modified Hamiltonian (cmoq-2013)", evidence
+    return function, "modified Hamiltonian (cmoq-2013)", Verdict.PROVED, evidence

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -34,13 +35,12 @@ from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, rank
+from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.branches import pattern
 from kahanmaps.laboratory.preserve.identities import judged
-from kahanmaps.laboratory.preserve.interpolated import bases_of
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
-from kahanmaps.laboratory.preserve.search import Found, Step
+from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 
@@ -186,33 +186,32 @@ def _orbit_about(over: MapOver, x: tuple[Any, ...], length: int) -> list[tuple[A
 def integrals_in_iterates(
     laboratory: Laboratory,
     wanted: int,
-    rows: Sequence[Sequence[int]],
-    point: Point,
+    known: Independent,
     deadline: float,
     progress: Callable[[str], None] = lambda _: None,
-) -> tuple[list[tuple[RationalFunction, str]], list[tuple[RatioOfIterates, str]]]:
+) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]]]:
     """Integrals that do not depend on known ones: those in x alone, and those in iterates, each with its origin.
 
     Args:
         laboratory: the map.
         wanted: how many independent ones there are to be, with the known ones.
-        rows: the gradients of the known ones at `point`, modulo the prime of the first map of the laboratory.
-        point: a point modulo that prime.
+        known: the known ones, on the first map of the laboratory.
         deadline: a value of time.monotonic().
         progress: is told what is being tried.
 
     Returns:
-        Formulas that are to be put to the proof. Raises NoPoint.
+        Formulas that are to be put to the proof, those in x with an empty text for their factors. Raises NoPoint.
 
     Source: petrera-suris-2018.
     """
-    known = [list(row) for row in rows]
-    plain, ratios = list[tuple[RationalFunction, str]](), list[tuple[RatioOfIterates, str]]()
+    known = copy(known)
+    known.rows = list(known.rows)  # nothing is added to what was given
+    plain, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
     level = _level(laboratory)
     inside, back = (laboratory, None) if level is None else level
-    base, prime = inside.maps[0], laboratory.maps[0].prime
+    base = inside.maps[0]
     for lift in LIFTS if level is not None else LIFTS[1:]:
-        if len(known) >= wanted or time.monotonic() > deadline:
+        if len(known.rows) >= wanted or time.monotonic() > deadline:
             break
         for one, spaces in lifts_with_spaces(base, [lift]):
             progress(one.text)
@@ -222,14 +221,12 @@ def integrals_in_iterates(
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]
                 for ratio in _ratios(one, functions if back is None else [back(F, one.shift) for F in functions]):
-                    row = gradient_of(ratio, laboratory.map, laboratory.maps[0], point)
-                    if rank([*known, row], prime) == len(known):
+                    if not known.add(gradient_of(ratio, laboratory.map, laboratory.maps[0], known.point)):
                         continue
-                    known.append(row)
                     if lift.shift:
                         ratios.append((ratio, one.text))
                     else:
-                        plain.append((_in_x(ratio, laboratory.map), one.text))
+                        plain.append((_in_x(ratio, laboratory.map), one.text, ""))
     return plain, ratios
 
 

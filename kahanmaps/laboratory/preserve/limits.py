@@ -28,10 +28,10 @@ from kahanmaps.algebra.text import format_factored, format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import exponents_up_to, rank
+from kahanmaps.laboratory.modular_points import Independent, exponents_up_to
 from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, find_densities
-from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, find_integrals, gradient_at
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, find_integrals
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 
@@ -86,9 +86,10 @@ class FlowAndMap:
 
     Integrals of the flow are those that integrals of the map tend to, `limits`, and `others`, all independent;
     `without_limit` counts the integrals of the map of which no limit is known, of `count` that it has. `search` is that
-    of the flow, None where there can be no more than the limits. `density` is a phi of the flow, where there is none
-    `reason` says so; `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals,
-    `polynomials_degree` is the degree up to which there are no others, measured; 0 where they were not sought.
+    of the flow, None where there can be no more than the limits. `density` is a phi of the flow, `density_search` what
+    was sought where that of the map gave none; `polynomials` are those of its Darboux polynomials above degree 1 that
+    are known and no integrals, `polynomials_degree` is the degree up to which there are no others, measured; 0 where
+    they were not sought.
     """
 
     limits: tuple[Limit, ...]
@@ -98,9 +99,14 @@ class FlowAndMap:
     map_search: IntegralSearch
     search: IntegralSearch | None
     density: FoundDensity | None
-    reason: str
+    density_search: DensitySearch | None
     polynomials: tuple[fmpq_mpoly, ...]
     polynomials_degree: int
+
+    @property
+    def reason(self) -> str:
+        """Why no density of the flow is known."""
+        return "" if self.density_search is None else self.density_search.reason
 
     @property
     def lost(self) -> int:
@@ -140,8 +146,9 @@ class FlowAndMap:
             found.append(("measured", f"no {more}rational integral of the flow shows in {tried}"))
         if self.density is not None:
             found.append((str(self.density.verdict), f"the flow keeps dx/phi, phi = {self.density.text}"))
-        elif self.reason:
-            found.append(("measured" if "no polynomial" in self.reason else "undecided", f"of the flow: {self.reason}"))
+        elif self.density_search is not None and self.reason:
+            known = "measured" if self.density_search.none_there else "undecided"
+            found.append((known, f"of the flow: {self.reason}"))
         if self.polynomials:
             told = ", ".join(map(format_polynomial, self.polynomials))
             found.append(("proved", f"Darboux polynomials of the flow, apart from affine ones: {told}"))
@@ -203,10 +210,7 @@ def flow_and_map(
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
     limits = _limits(search, laboratory) if is_kahan else _limits_on_solutions(search, laboratory)
-    modular = laboratory.maps[0]
-    point = modular.random_point()
-    rows = [gradient_at(modular, one.leading, point) for one in limits]
-    dim = laboratory.map.dim
+    independent, dim = Independent(laboratory.maps[0], [one.leading for one in limits]), laboratory.map.dim
     if flow is None and len(limits) < dim - 1:
         flow = find_integrals(
             search.file,
@@ -217,21 +221,18 @@ def flow_and_map(
             seed=search.seed,
             progress=progress,
         )
-    others: list[FoundIntegral] = []
-    for one in flow.integrals if flow is not None else ():
-        row = gradient_at(modular, one.function, point)
-        if rank([*rows, row], modular.prime) > len(rows):
-            rows.append(row)
-            others.append(one)
+    offered = flow.integrals if flow is not None else ()
+    others = [one for one in offered if independent.add(independent.gradient(one.function))]
     functions = [*(one.leading for one in limits), *(one.function for one in others)]
-    density, reason = _density(laboratory, densities if is_kahan else None, seconds)
+    density, sought_density = _density(laboratory, densities if is_kahan else None, seconds)
     count = max(known, search.codimension)
     without = max(0, count - len(limits))
     progress("Darboux polynomials of the flow")
     sought = laboratory.flow_polynomials()
     known_factors = [*functions, *([] if density is None else [density.function])]
     polynomials = _polynomials(laboratory, sought.functions, known_factors)
-    return FlowAndMap(limits, tuple(others), without, count, search, flow, density, reason, polynomials, sought.degree)
+    known_density = density, sought_density
+    return FlowAndMap(limits, tuple(others), without, count, search, flow, *known_density, polynomials, sought.degree)
 
 
 def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
@@ -241,19 +242,17 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
     labels = [one.name + "(x)" * (one.name in symbols) for one in search.integrals]
     formal = FunctionField((*labels, *symbols, "eps"), reduces=True)
     map_laboratory = Laboratory(search.file, symbols, None, search.seed)
-    map_ = laboratory.maps[0]
-    point = map_.random_point()
+    independent = Independent(laboratory.maps[0])
     found: list[Limit] = []
     used: list[tuple[Function, Function]] = []  # the integrals of the map, and how they are made
     for one, name in zip(search.integrals, formal.variables, strict=False):
         I = Function(field, one.function.numerator, one.function.denominator)
         R = None
-        rows = [gradient_at(map_, limit.leading, point) for limit in found]
         try:
             for _ in range(_ROUNDS):
                 order, content, leading = _leading(I)
                 I, name = (function * function.field.variables[-1] ** -order / content for function in (I, name))
-                if rank([*rows, gradient_at(map_, leading, point)], map_.prime) > len(rows):
+                if independent.adds(independent.gradient(leading)):
                     break
                 R = _relation([leading, *(limit.leading for limit in found)], n, len(symbols))
                 I = evaluate(R, field, [I, *(before for before, _ in used), *field.variables[n:-1]])
@@ -270,6 +269,7 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
         verdict, _ = laboratory.verdict_on(leading)
         if not verdict.holds:
             continue
+        independent.add(independent.gradient(leading))
         kept = one.verdict if second is None and R is None else map_laboratory.verdict_on(leading)[0]
         used.append((I, name))
         found.append(Limit(f"L{len(found) + 1}", formal.format(name), leading, order, second, kept))
@@ -295,8 +295,7 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
     old = [*lifted.gens()[:n], *lifted.gens()[search.file.dim :]]
     formal = FunctionField([one.name for one in search.integrals] + ["eps"], reduces=True)
     functions = FunctionField(laboratory.map.names, _BUDGET)
-    map_ = laboratory.maps[0]
-    point = map_.random_point()
+    independent = Independent(laboratory.maps[0])
     found: list[Limit] = []
     for one, name in zip(search.integrals, formal.variables, strict=False):
         P, Q = (
@@ -310,11 +309,12 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
                     break
                 P = _below_third_order(P - content * Q)
                 name = name - formal.convert(content)
-            rows = [*(gradient_at(map_, limit.leading, point) for limit in found), gradient_at(map_, leading, point)]
+            row = independent.gradient(leading)
         except (BudgetExceeded, _NoLimit, ZeroDivisionError):
             continue
-        if rank(rows, map_.prime) < len(rows) or not laboratory.verdict_on(leading)[0].holds:
+        if not (independent.adds(row) and laboratory.verdict_on(leading)[0].holds):
             continue
+        independent.add(row)
         combination = formal.format(name * formal.variables[-1] ** -order / formal.convert(content))
         parts = (part.compose(*old, ctx=lifted) for part in (leading.numerator, leading.denominator))
         kept, _ = Laboratory(search.file, search.symbols, None, search.seed).verdict_on(RationalFunction(*parts))
@@ -372,18 +372,18 @@ def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fm
 
 def _density(
     laboratory: Laboratory, densities: DensitySearch | None, seconds: float
-) -> tuple[FoundDensity | None, str]:
-    """A density of the flow: the limit of one of the map where that is one, else one that is sought; or why not."""
+) -> tuple[FoundDensity | None, DensitySearch | None]:
+    """A density of the flow: the limit of one of the map where that is one, else one that is sought."""
     for one in densities.densities if densities is not None else ():
         field = FunctionField(laboratory.map.names)
         *_, phi = _leading(Function(field, one.function.numerator, one.function.denominator))
         verdict, evidence = laboratory.verdict_on(phi, is_density=True)
         if verdict.holds:
-            return FoundDensity(phi, verdict, evidence), ""
+            return FoundDensity(phi, verdict, evidence), None
     search = find_densities(
         laboratory.file, symbols=laboratory.symbols, flow=True, max_degree=_DENSITY_DEGREE, seconds=seconds
     )
-    return (search.densities[0], "") if search.densities else (None, search.reason)
+    return (search.densities[0] if search.densities else None), search
 
 
 def _polynomials(

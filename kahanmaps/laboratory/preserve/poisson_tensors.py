@@ -19,7 +19,7 @@ from itertools import combinations
 from math import comb
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.plain import attributes
@@ -29,12 +29,13 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
-from kahanmaps.displayed import Printed, latex
+from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import (
+    Independent,
     ModularMap,
     NoPoint,
     exponents_up_to,
@@ -42,14 +43,15 @@ from kahanmaps.laboratory.modular_points import (
     null_space,
     product_of,
     rank,
+    slopes,
 )
-from kahanmaps.laboratory.preserve.casimirs import casimir_candidates, slopes
-from kahanmaps.laboratory.preserve.closed_forms import closed_forms
+from kahanmaps.laboratory.preserve.casimirs import casimir_candidates
 from kahanmaps.laboratory.preserve.cofactors import CofactorProduct, Sample, cofactor_space, points_needed
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.identities import judged
-from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals, toml_comment
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
+from kahanmaps.laboratory.preserve.results import Search
 
 _MAX_UNKNOWNS = 2000
 _MOST_LOGARITHMIC = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
@@ -137,7 +139,7 @@ class FoundTensor:
 
 
 @dataclass(frozen=True)
-class PoissonSearch(Printed):
+class PoissonSearch(Search):
     """What `find_poisson` found: tensors up to `degree`, and why the search ended where it found none.
 
     They span all of these, together with products of polynomial integrals and tensors of lower degrees.
@@ -145,17 +147,12 @@ class PoissonSearch(Printed):
     `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None where that was not asked.
     """
 
-    file: SystemFile
-    symbols: tuple[str, ...]
-    eps: fmpq | None
     tensors: tuple[FoundTensor, ...]
     integrals: tuple[FoundIntegral, ...]
     degree: int
     denominator: RationalFunction | None
     pencil: Verdict | None
     reason: str
-    primes: tuple[int, ...]
-    seed: int
 
     @property
     def note(self) -> str:
@@ -184,7 +181,7 @@ class PoissonSearch(Printed):
         """The first tensor as a section [poisson], which `check-poisson --tensor` reads; empty where there is none."""
         if not self.tensors:
             return ""
-        return "\n".join([*toml_comment(self.eps, self.file.map), self.tensors[0].tensor.toml_section()])
+        return "\n".join([*self.toml_comments, self.tensors[0].tensor.toml_section()])
 
 
 def find_poisson(
@@ -271,10 +268,8 @@ def find_poisson(
     if cut:
         cut = f"{cut}: such tensors have too many coefficients"
         reason = f"{reason}; {cut}" if reason and not found else cut
-    return PoissonSearch(
-        file, laboratory.symbols, laboratory.eps, tuple(found), tuple(integrals or ()), degree, denominator, pencil,
-        reason, laboratory.primes, seed,
-    )  # fmt: skip
+    known = tuple(integrals or ())
+    return PoissonSearch(*laboratory.asked, tuple(found), known, degree, denominator, pencil, reason)
 
 
 def _integrals(laboratory: Laboratory, symbols: Sequence[str], deadline: float, seed: int) -> tuple[FoundIntegral, ...]:
@@ -304,14 +299,11 @@ def _tensors(
         return [], "what was found at one eps was not found at another"
     support = frozenset(model.support)
     variables = laboratory.map.variables
-    forms = closed_forms(
+    forms = laboratory.formulas(
         [model],
-        lambda prime, values: [tensor_space(laboratory.map_for(prime, values), degree, denominator, support)],
+        lambda map_: [tensor_space(map_, degree, denominator, support)],
+        deadline,
         (*variables, *_directions(variables)),
-        laboratory.symbols,
-        laboratory.eps_enters,
-        seed=laboratory.seed,
-        seconds=max(1.0, deadline - time.monotonic()),
     )
     if forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
@@ -475,29 +467,26 @@ def _judged(
         return None
     jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, eps), deadline)
     map_ = laboratory.maps[0]
-    field = GF(map_.prime)
-    x, at = tuple(field.convert(c) for c in (*map_.random_point(), *map_.values)), field.convert(map_.eps)
+    field, there = GF(map_.prime), Independent(map_)  # the gradients of Casimirs
+    x, at = tuple(field.convert(c) for c in (*there.point, *map_.values)), field.convert(map_.eps)
     P = tensor.value(field, at, x)
-    rows = [slopes(one.function, field, (*x, at), tensor.dim) for one in integrals]
+    rows = [there.gradient(one.function) for one in integrals]
     casimirs: list[str] = []
-    independent: list[list[int]] = []  # gradients of Casimirs
 
-    def add_casimir(name: str, function: RationalFunction, row: Sequence[Any]) -> None:
-        more = [*independent, [int(entry) for entry in row]]
+    def add_casimir(name: str, function: RationalFunction, row: list[int]) -> None:
         is_killed = all(entry == 0 for entry in (P * field.column(row)).entries())
         if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), deadline)[0].holds:
             casimirs.append(name)
-            independent[:] = more if rank(more, map_.prime) == len(more) else independent
+            there.add(row)
 
     rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
     for one, row in zip(integrals, rows, strict=True):
         add_casimir(one.name, one.function, row)
-    most = min(tensor.dim - rank_of_P, rank([[int(entry) for entry in row] for row in rows], map_.prime))
-    if len(independent) < most and len(integrals) <= _MOST_INTEGRALS and time.monotonic() < deadline:
-        seconds = deadline - time.monotonic()
-        for name, function in casimir_candidates(laboratory, tensor, integrals, seconds):
-            row = slopes(function, field, (*x, at), tensor.dim)
-            if len(independent) < most and rank([*independent, [int(e) for e in row]], map_.prime) > len(independent):
+    most = min(tensor.dim - rank_of_P, rank(rows, map_.prime))
+    if len(there.rows) < most and len(integrals) <= _MOST_INTEGRALS and time.monotonic() < deadline:
+        for name, function in casimir_candidates(laboratory, tensor, integrals, deadline):
+            row = there.gradient(function)
+            if len(there.rows) < most and there.adds(row):
                 add_casimir(name, function, row)
     chosen = [integrals[k] for k in _in_involution(field, P, rows)]
     involution = None

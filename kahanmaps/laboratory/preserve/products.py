@@ -40,9 +40,9 @@ from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
+from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.flow import coefficient_rows
-from kahanmaps.laboratory.preserve.number_fields import reconstruct_at
 from kahanmaps.maps.implicit import StepOver
 from kahanmaps.systems.polynomial import PolynomialField
 

@@ -6,18 +6,17 @@ import random
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.symbols import member_of
 from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
-from kahanmaps.laboratory.scan.members import degrees_on
+from kahanmaps.laboratory.scan.members import Scanned
 from kahanmaps.laboratory.scan.result import STEPS, Component
 from kahanmaps.laboratory.scan.sweep import Degrees, TimeOver
-from kahanmaps.maps.implicit import BirationalMap
 
 Progress = Callable[[str], None]
 
@@ -29,15 +28,7 @@ _ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass
 
 
 def with_growth(
-    components: list[Component],
-    file: SystemFile,
-    map_: BirationalMap,
-    eps: fmpq | None,
-    deadline: float,
-    check: Callable[[], None],
-    seed: int,
-    progress: Progress,
-    by: str,
+    components: list[Component], family: Scanned, deadline: float, check: Callable[[], None], progress: Progress
 ) -> tuple[list[Component], int]:
     """The components with the growth at a rational member, those with the slowest first; for how many it is missing.
 
@@ -52,13 +43,13 @@ def with_growth(
         try:
             progress(f"scan: growth on component {k + 1} of {len(components)}")
             check()
-            if by == "degrees" and _goes_on(one, enough.get(one.degrees), map_, eps, seed):
+            if family.by == "degrees" and _goes_on(one, enough.get(one.degrees), family):
                 continue
             left = max(0.1, deadline - time.monotonic())
-            known = None if one.values is None else _growth(one.values, file, eps, left, seed)
+            known = None if one.values is None else _growth(one.values, family, left)
             # there may be a special member only
-            if known is None or (by == "degrees" and not _agree(known.degrees, (1, *one.degrees))):
-                known = _beyond(one, map_, eps, seed)
+            if known is None or (family.by == "degrees" and not _agree(known.degrees, (1, *one.degrees))):
+                known = _beyond(one, family)
         except TimeOver:
             missed += 1
             continue
@@ -73,34 +64,30 @@ def with_growth(
     return sorted(found, key=order), missed
 
 
-def _growth(values: dict[str, fmpq], file: SystemFile, eps: fmpq | None, left: float, seed: int) -> DegreeGrowth:
+def _growth(values: dict[str, fmpq], family: Scanned, left: float) -> DegreeGrowth:
     """The growth at a rational member."""
-    member, step = _member(file, values, eps)
+    member, step = family.member(values)
+    given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
     for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
-        found = degree_growth(
-            member.map, step, seconds=min(_SECONDS, left), steps=STEPS, seed=seed + attempt, enclosed=False
-        )
+        found = degree_growth(member.map, step, seed=family.seed + attempt, **given)
         if found.growth is not GrowthClass.UNKNOWN:
             break
     return found
 
 
-def _beyond(
-    one: Component, map_: BirationalMap, eps: fmpq | None, seed: int, most: int = _LARGE
-) -> DegreeGrowth | None:
+def _beyond(one: Component, family: Scanned, most: int = _LARGE) -> DegreeGrowth | None:
     """The growth that more degrees fit, measured modulo a prime; None where there is no member."""
-    count = one.equations[0].context().nvars()
-    found = degrees_on(map_, one.equations, count, eps, [one.degrees[-1]] * _TERMS, random.Random(seed), most)
+    found = family.degrees_on(one.equations, [one.degrees[-1]] * _TERMS, random.Random(family.seed), most)
     if found is None:
         return None
-    return DegreeGrowth((1, *found), eps, "terms", f"{len(found)} iterates measured", seed, (), ())
+    return DegreeGrowth((1, *found), family.eps, Ended.TERMS, f"{len(found)} iterates measured", family.seed, (), ())
 
 
-def _goes_on(one: Component, known: DegreeGrowth | None, map_: BirationalMap, eps: fmpq | None, seed: int) -> bool:
+def _goes_on(one: Component, known: DegreeGrowth | None, family: Scanned) -> bool:
     """Whether degrees go on as they do at a member of another component with the same first ones."""
     if known is None:
         return False
-    found = _beyond(one, map_, eps, seed, max(_SOME, 2 * one.degrees[-1]))
+    found = _beyond(one, family, max(_SOME, 2 * one.degrees[-1]))
     return found is not None and _agree(found.degrees, known.degrees)
 
 
@@ -108,19 +95,12 @@ def _agree(some: Degrees, others: Degrees) -> bool:
     return all(a == b for a, b in zip(some, others, strict=False))
 
 
-def _member(file: SystemFile, values: dict[str, fmpq], eps: fmpq | None) -> tuple[SystemFile, fmpq | None]:
-    """The system of a member and its eps."""
-    return member_of(file, {name: value for name, value in values.items() if name != "eps"}), values.get("eps", eps)
-
-
 def with_verdicts(
     components: list[Component],
-    file: SystemFile,
-    eps: fmpq | None,
+    family: Scanned,
     seconds: float,
     deadline: float,
     check: Callable[[], None],
-    seed: int,
     progress: Progress,
 ) -> tuple[list[Component], int]:
     """The components with what an analysis says of a member, where degrees do not grow exponentially; how many lack it.
@@ -133,12 +113,13 @@ def with_verdicts(
     for one in components:
         asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
         if asked and one.values is not None and one.degrees not in points:
-            member, step = _member(file, one.values, eps)
+            member, step = family.member(one.values)
             try:
                 progress(f"scan: analyzes a member where {one.text}")
                 check()
                 left = max(0.1, deadline - time.monotonic())
-                one = replace(one, verdict=analyze(member, eps=step, seconds=min(seconds, left), seed=seed).conclusion)
+                told = analyze(member, eps=step, seconds=min(seconds, left), seed=family.seed)
+                one = replace(one, verdict=told.conclusion)
             except TimeOver:
                 missed += 1
             if one.dimension == 0:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
 from kahanmaps.algebra.chance import random_prime_field
-from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.curves import Line, Stopped
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, rank
+from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import BirationalMap
 
 _TRIES = 200
@@ -82,83 +86,94 @@ def _univariate(coefficients: Sequence[Any], field: Field) -> Any:
     return nmod_poly([int(c) for c in coefficients], field.characteristic)
 
 
-def degrees_on(
-    map_: BirationalMap,
-    equations: Sequence[fmpq_mpoly],
-    count: int,
-    eps: fmpq | None,
-    expected: Sequence[int],
-    rng: random.Random,
-    most: int = 1 << 20,
-) -> tuple[int, ...] | None:
-    """The degrees of a random member on a component modulo a random prime of 63 bits; None where none is found.
+@dataclass(frozen=True)
+class Scanned:
+    """What is scanned: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
 
-    Of `count` parameters eps is the last one where that are more than symbols. On one line; -1 where the iterate exists
-    nowhere. `expected` says how many, and about how large; they end before one above `most`.
+    `eps` is an exact number, or None for generic eps; `by` says what is measured: "degrees", or "integrals" or
+    "density" for what `kahanmaps.maps.residues.relations.ranks` counts.
     """
-    member = _random_member(map_, equations, count, eps, rng)
-    if member is None:
-        return None
-    field, step, parameters = member
-    over = map_.at(step, field, parameters)
-    line = Line(over, rng, math.inf, most)
-    found: list[int] = []
-    try:
-        for degree in expected:
-            line.step(max(1, degree))
-            found.append(line.degree)
-    except Stopped:
-        pass
-    except ZeroDivisionError:
-        found += [-1] * (len(expected) - len(found))
-    return tuple(found)
 
+    file: SystemFile
+    names: tuple[str, ...]
+    map: BirationalMap
+    eps: fmpq | None
+    seed: int
+    by: str = "degrees"
 
-def ranks_on(
-    map_: BirationalMap,
-    equations: Sequence[fmpq_mpoly],
-    count: int,
-    eps: fmpq | None,
-    top: int,
-    rng: random.Random,
-    by: str,
-) -> tuple[int, ...] | None:
-    """What `kahanmaps.maps.residues.relations.ranks` counts, up to a degree, on a random member as for `degrees_on`."""
-    found = _random_member(map_, equations, count, eps, rng)
-    if found is None:
-        return None
-    field, step, parameters = found
-    p = field.characteristic
-    over = ModularMap(map_, p, int(step), [int(x) for x in parameters], rng.getrandbits(60))
-    sizes = [len(exponents_up_to(map_.dim, degree)) for degree in range(1, top + 1)]
-    try:
-        if by == "integrals":
-            rows, _, _ = over.along_orbit(top, sizes[-1] + _SPARE)
-        else:
-            rows = []
-            for x, image in over.pairs(sizes[-1] + _SPARE):
-                above, below = over.determinant(x, image)
-                here, there = over.moved(x, image, top)
-                rows.append([(below * b - above * a) % p for a, b in zip(here, there, strict=True)])
-    except NoPoint:
-        return None
-    return tuple(rank([row[:size] for row in rows], p) for size in sizes)
+    def member(self, values: Mapping[str, fmpq]) -> tuple[SystemFile, fmpq | None]:
+        """The system of a member and its eps."""
+        parameters = {name: value for name, value in values.items() if name != "eps"}
+        return member_of(self.file, parameters), values.get("eps", self.eps)
 
+    def measured_on(
+        self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random
+    ) -> Degrees | None:
+        """What is measured on a random member on a component; None where none is found."""
+        if self.by == "degrees":
+            return self.degrees_on(equations, expected, rng)
+        return self._ranks_on(equations, len(expected), rng)
 
-def _random_member(
-    map_: BirationalMap, equations: Sequence[fmpq_mpoly], count: int, eps: fmpq | None, rng: random.Random
-) -> tuple[Any, Any, list[Any]] | None:
-    """A field GF(p), eps and the symbols of a random member on a component."""
-    for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
-        field = random_prime_field(rng)
+    def degrees_on(
+        self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, most: int = 1 << 20
+    ) -> Degrees | None:
+        """The degrees of a random member on a component modulo a random prime of 63 bits; None where none is found.
+
+        On one line; -1 where the iterate exists nowhere. `expected` says how many, and about how large; they end before
+        one above `most`.
+        """
+        member = self._random_member(equations, rng)
+        if member is None:
+            return None
+        field, step, parameters = member
+        line = Line(self.map.at(step, field, parameters), rng, math.inf, most)
+        found: list[int] = []
         try:
-            values = point_on(equations, count, field, rng)
-            if values is None:
+            for degree in expected:
+                line.step(max(1, degree))
+                found.append(line.degree)
+        except Stopped:
+            pass
+        except ZeroDivisionError:
+            found += [-1] * (len(expected) - len(found))
+        return tuple(found)
+
+    def _ranks_on(self, equations: Sequence[fmpq_mpoly], top: int, rng: random.Random) -> Degrees | None:
+        """The ranks up to a degree on a random member."""
+        found = self._random_member(equations, rng)
+        if found is None:
+            return None
+        field, step, parameters = found
+        p = field.characteristic
+        over = ModularMap(self.map, p, int(step), [int(x) for x in parameters], rng.getrandbits(60))
+        sizes = [len(exponents_up_to(self.map.dim, degree)) for degree in range(1, top + 1)]
+        try:
+            if self.by == "integrals":
+                rows, _, _ = over.along_orbit(top, sizes[-1] + _SPARE)
+            else:
+                rows = []
+                for x, image in over.pairs(sizes[-1] + _SPARE):
+                    above, below = over.determinant(x, image)
+                    here, there = over.moved(x, image, top)
+                    rows.append([(below * b - above * a) % p for a, b in zip(here, there, strict=True)])
+        except NoPoint:
+            return None
+        return tuple(rank([row[:size] for row in rows], p) for size in sizes)
+
+    def _random_member(
+        self, equations: Sequence[fmpq_mpoly], rng: random.Random
+    ) -> tuple[PrimeField, Any, list[Any]] | None:
+        """A field GF(p), eps and the symbols of a random member on a component."""
+        for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
+            field = random_prime_field(rng)
+            try:
+                values = point_on(equations, len(self.names), field, rng)
+                if values is None:
+                    continue
+                *parameters, step = values if len(self.names) > len(self.map.symbols) else (*values, self.eps)
+                step = field.random(rng) if step is None else field.convert(step)
+                self.map.at(step, field, parameters)
+            except BadPrime:
                 continue
-            *parameters, step = values if count > len(map_.symbols) else (*values, eps)
-            step = field.random(rng) if step is None else field.convert(step)
-            map_.at(step, field, parameters)
-        except BadPrime:
-            continue
-        return field, step, parameters
-    return None
+            return field, step, parameters
+        return None

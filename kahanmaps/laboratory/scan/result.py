@@ -219,7 +219,7 @@ class Scan(Printed):
         for degrees, members in self.classes:
             growth = growth_on(members)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
-            known = "" if growth is None or growth.recurrence is None else f", {growth.basis.partition(':')[0]}"
+            known = "" if growth is None or growth.recurrence is None else f", {growth.known}"
             lines.append((WORDS[self.by][0], told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
             for where, sign, here in (
                 ("where", "; ", [one for one in members if not one.is_rational_point]),

@@ -28,7 +28,7 @@ from kahanmaps.errors import BadPrime, InputError, counted, quoted
 from kahanmaps.laboratory.scan.conditions import beside, conditions
 from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
 from kahanmaps.laboratory.scan.kept import Kept
-from kahanmaps.laboratory.scan.members import degrees_on, point_on, ranks_on
+from kahanmaps.laboratory.scan.members import Scanned, point_on
 from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
@@ -145,6 +145,7 @@ def scan(
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
     terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
+    family = Scanned(file, names, map_, exact, seed, by)
     began = time.monotonic()  # not before: loops are compiled there, once on a machine, and that may take all the time
     jobs = jobs or processors()
     most = _PART * seconds * jobs / cost
@@ -230,15 +231,15 @@ def scan(
     for k, one in enumerate(known):
         try:
             tell(f"scan: confirms component {k + 1} of {len(known)}")
-            known[k] = _confirmed(one, names, map_, exact, known, rng, by, until(_UNTIL[2]))
+            known[k] = _confirmed(one, family, known, rng, until(_UNTIL[2]))
         except TimeOver:
             omitted.append(f"the confirmation of {counted(len(known) - k, 'component')}")
             break
     check = until(1 if analysis is None else _UNTIL[3])
-    known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, tell, by)
+    known, missed = with_growth(known, family, began + seconds, check, tell)
     omitted += [f"the growth on {missed} components"] if missed else []
     if analysis is not None:
-        known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, tell)
+        known, missed = with_verdicts(known, family, analysis, began + seconds, until(1), tell)
         omitted += [f"{missed} verdicts"] if missed else []
     left = tuple(_left(one, known) for one in sweeps)
     symmetric = tuple(symmetries(sweeps, known, names))
@@ -328,22 +329,16 @@ def _top(
 
 def _confirmed(
     one: Component,
-    names: Sequence[str],
-    map_: BirationalMap,
-    eps: fmpq | None,
+    family: Scanned,
     others: Sequence[Component],
     rng: random.Random,
-    by: str = "degrees",
     check: Callable[[], None] = lambda: None,
 ) -> Component:
     """The component with what random members on it say, and a rational one that is on no smaller component."""
-    measured = []
+    measured, names = [], family.names
     for _ in range(_MEMBERS):
         check()
-        if by == "degrees":
-            measured.append(degrees_on(map_, one.equations, len(names), eps, one.degrees, rng))
-        else:
-            measured.append(ranks_on(map_, one.equations, len(names), eps, len(one.degrees), rng, by))
+        measured.append(family.measured_on(one.equations, one.degrees, rng))
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):

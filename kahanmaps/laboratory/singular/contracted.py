@@ -8,6 +8,11 @@ modulo a prime their zeros are points. Those that share all orders from the firs
 What is known along a curve are the orders of forms, each a product of powers of hypersurfaces. The exponents are the
 orders at the points themselves, and so linear equations give the orders of the hypersurfaces and their degrees. Where
 these do not suffice, as hypersurfaces are zeros of one form, forms are factored on surfaces through the curves.
+
+The components over GF(p) of the zeros of forms, on a surface: told apart where one form over Q has several.
+
+Restricted to a generic ruled surface, an irreducible factor of a form in many variables stays irreducible (Bertini),
+with its degree. So a polynomial of two variables is factored where that form could not even be written down.
 """
 
 from __future__ import annotations
@@ -18,20 +23,81 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
 
-from flint import fmpq, fmpq_mat, nmod_poly
+from flint import Ordering, fmpq, fmpq_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.components import Component, Kind, components
-from kahanmaps.laboratory.singular.following import Range, orders_at, walked
-from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of
+from kahanmaps.laboratory.singular.following import Course, Range
+from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
 from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
+
+Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
+
+
+@dataclass(frozen=True)
+class Component:
+    """A hypersurface: its exponents in the forms, its degree, its order along the curve t (None: it contains it), and
+    its equation on the surface (t, u)."""
+
+    exponents: tuple[int, ...]
+    degree: int
+    order: int | None
+    equation: nmod_mpoly
+
+    @property
+    def kind(self) -> Kind:
+        """What two components have to differ in if they are to be told apart."""
+        return self.exponents, self.degree
+
+    def roots(self, t: int) -> list[int]:
+        """The points u in GF(p) that it has at this t."""
+        p = int(self.equation.context().modulus())
+        on_line = [0] * (self.degree + 1)
+        for (i, j), c in self.equation.terms():
+            on_line[j] += int(c) * pow(t, i, p)
+        return [int(u) for u, _ in nmod_poly(on_line, p).roots()]
+
+
+def components(
+    equation: Equation, forms: Sequence[tuple[Any, bool]], curve: Sequence[nmod_poly], direction: Sequence[int]
+) -> list[Component]:
+    """The components of the zeros of forms on the surface curve(t) + u direction, in projective space over GF(p).
+
+    With each of the forms over Q stands whether it is one at the image of the point under the map of the equation.
+    `direction` is a random vector: then degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
+    """
+    field = GF(equation.over.characteristic)
+    ring = nmod_mpoly_ctx.get(("t", "u"), modulus=field.prime, ordering=Ordering.degrevlex)
+    X = [
+        ring.from_dict({(k, 0): int(c) for k, c in enumerate(entry.coeffs())}) + ring.gen(1) * w
+        for entry, w in zip(curve, direction, strict=True)
+    ]
+    image = equation.image(X, ring.constant(0))
+    common = reduce(nmod_mpoly.gcd, image)
+    image = [entry / common for entry in image]
+    found: dict[str, tuple[nmod_mpoly, list[int]]] = {}
+    for k, (form, is_there) in enumerate(forms):
+        value = modulo(form, field).compose(*(image if is_there else X), ctx=ring)
+        for factor, exponent in value.factor()[1]:
+            _, exponents = found.setdefault(str(factor), (factor, [0] * len(forms)))
+            exponents[k] = int(exponent)
+    return [
+        Component(
+            tuple(exponents),
+            int(factor.degrees()[1]),
+            min((int(power[0]) for power in factor.monoms() if power[1] == 0), default=None),
+            factor,
+        )
+        for factor, exponents in found.values()
+        if factor.degrees()[1]
+    ]
+
 
 _LEAST_LINES, _MOST_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
 _REPEATED = 4  # so many times orders of forms are told apart, and then the same way again
@@ -78,7 +144,7 @@ class _Curve:
     """A curve through a point of a line where a form vanishes, and what is tracked along it.
 
     `across` is another random vector, for surfaces. `excess` are the exponents of the forms in the common factor of the
-    minors of the equation, which is no part of the map. Curves end at a time of the monotonic clock.
+    minors of the equation, which is no part of the map. Curves are followed within the limits.
     """
 
     equation: Equation
@@ -89,7 +155,11 @@ class _Curve:
     functions: tuple[Function, ...]
     excess: tuple[int, ...]
     forms: _Forms
-    end: float
+    limits: Range
+
+    def course(self, tracked: AlongCurves) -> Course:
+        """The curve as it is followed."""
+        return Course([self.equation], self.point, self.direction, self.limits, tracked)
 
     @property
     def prime(self) -> int:
@@ -112,7 +182,7 @@ class _Curve:
 
         Raises Untold where there is no first step.
         """
-        run = walked([self.equation], self.point, self.direction, [], _FIRST, self.end, functions=self.functions)[0]
+        run = self.course(self).steps(_FIRST)[0]
         if not run:
             raise Untold("the time was over, or a curve touches a hypersurface in too high an order")
         is_contracted = image_of([self.inverse], run[0].limit) is None
@@ -241,14 +311,14 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             functions = tuple(form_order(form, field) for form in forms.all)
         except BadPrime:
             continue
-        degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits.end, rng)
+        degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits, rng)
         for curve in curves:
             kinds.setdefault(curve.key, []).append(curve)
         # A hypersurface that splits over an extension has points modulo some primes only.
         if line >= _LEAST_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
             kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
-                return degree, _resolved(kinds, forms, degree, zeros, limits)
+                return degree, _resolved(kinds, forms, degree, zeros)
             except Untold:
                 continue  # a hypersurface without points modulo the primes so far
     if limits.is_over or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
@@ -256,12 +326,10 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
     }
-    return degree, _followed(followed, [0] * len(kinds), range(len(forms.all)), limits)
+    return degree, _followed(followed, [0] * len(kinds), range(len(forms.all)))
 
 
-def _resolved(
-    kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int, limits: Range
-) -> list[Hypersurface]:
+def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
     """The contracted hypersurfaces with their degrees and orders. Raises Untold."""
     keys = list(kinds)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
@@ -288,21 +356,18 @@ def _resolved(
         raise Untold("not all hypersurfaces were met")
     # Orders on hypersurfaces that are not contracted have no part in what follows.
     chosen = [k for k, key in enumerate(keys) if key[0]]
-    return _followed(followed, [int(size) for size in sizes.entries()], chosen, limits)
+    return _followed(followed, [int(size) for size in sizes.entries()], chosen)
 
 
 def _followed(
-    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int], limits: Range
+    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
     """The contracted hypersurfaces with the orders in these columns, at points modulo two primes. Raises Untold."""
     found = []
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, along) for curve, along in pairs}
-            orders = [
-                orders_at([curve.equation], curve.point, curve.direction, along, (_FIRST, limits.reach), limits)
-                for curve, along in list(by_prime.values())[:2]
-            ]
+            orders = [curve.course(along).orders(_FIRST) for curve, along in list(by_prime.values())[:2]]
             if len(orders) < 2 or orders[0].known != orders[1].known:
                 raise Untold("two points tell different things")
             found.append(_hypersurface(key, size, tuple(by_prime)[:2], orders[0].of(columns)))
@@ -310,20 +375,9 @@ def _followed(
 
 
 def _hypersurface(key: tuple[Any, ...], degree: int, primes: tuple[int, ...], orders: Orders) -> Hypersurface:
-    return Hypersurface(
-        "Z" if key[2] else "?",
-        degree,
-        any(key[1]),
-        1,
-        CONFINED if any(row[0] for row in orders.rows) else NOT_CONFINED,
-        1,
-        None,
-        (),
-        primes,
-        followed=orders.followed,
-        settled_at=orders.settled_at if orders.is_settled else None,
-        orders=orders,
-    )
+    status = CONFINED if any(row[0] for row in orders.rows) else NOT_CONFINED
+    known = Hypersurface("Z" if key[2] else "?", degree, any(key[1]), 1, status, 1, primes=primes, orders=orders)
+    return replace(known, followed=orders.followed, settled_at=orders.settled_at if orders.is_settled else None)
 
 
 def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
@@ -338,7 +392,7 @@ def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
 
 
 def _on_line(
-    map_: StepOver, forms: _Forms, functions: tuple[Function, ...], end: float, rng: random.Random
+    map_: StepOver, forms: _Forms, functions: tuple[Function, ...], limits: Range, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
     """The degree of the map on a random line, the number of points over the closure where forms vanish, and those in
     GF(p), each with the line as a curve through it."""
@@ -361,7 +415,7 @@ def _on_line(
     every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
     points = [tuple((x + int(s) * v) % p for x, v in zip(a, b, strict=True)) for s, _ in radical.roots()]
     (inverse,) = map_.inverse.equations
-    curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, end) for point in points]
+    curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, limits) for point in points]
     return degree, int(radical.degree()), curves
 
 

@@ -7,17 +7,16 @@ image of X. On a line E is a polynomial of one variable. Source: petrera-suris-2
 
 from __future__ import annotations
 
+import operator
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
-from typing import Any
 
 from flint import nmod_poly
 
-from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.laboratory.singular.jets import Jet
+from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.maps.equation import Equation
 
 
@@ -47,16 +46,15 @@ def critical_points(
     value, poles = one, one
     for equation, inverse in zip(equations, inverses, strict=True):
         image, common = _image(equation, line)
-        value = value * _denominator(inverse, image, one * 0)
+        value = value * _denominator(inverse, image)
         poles = poles * image[-1] * common * line[-1]
         line = image
 
-    def E(X: Sequence[Any], zero: Any) -> Any:
-        total = None
+    def E(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
+        total = one
         for equation, inverse in zip(equations, inverses, strict=True):
-            X = equation.image(X, zero)
-            found = _denominator(inverse, X, zero)
-            total = found if total is None else total * found
+            X = equation.image(X, one * 0, times)
+            total = times(total, _denominator(inverse, X, times))
         return total
 
     return _zeros(_without(value, poles), E, a, b, rng)
@@ -67,15 +65,15 @@ def pole_points(equations: Sequence[Equation], rng: random.Random) -> tuple[list
     a, b, line = _random_line(equations[0], rng)
     infinity, value = line[-1], line[-1] * 0 + 1
     for k, equation in enumerate(equations):
-        value = value * _denominator(equation, line, infinity * 0)
+        value = value * _denominator(equation, line)
         if k + 1 < len(equations):
             line, _ = _image(equation, line)
 
-    def determinants(X: Sequence[Any], zero: Any) -> Any:
-        total = _denominator(equations[0], X, zero)
+    def determinants(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
+        total = _denominator(equations[0], X, times)
         for before, equation in pairwise(equations):
-            X = before.image(X, zero)
-            total = total * _denominator(equation, X, zero)
+            X = before.image(X, infinity * 0, times)
+            total = times(total, _denominator(equation, X, times))
         return total
 
     return _zeros(_without(value, infinity), determinants, a, b, rng)
@@ -104,7 +102,7 @@ def _without(value: nmod_poly, *others: nmod_poly) -> nmod_poly:
 
 def _zeros(
     value: nmod_poly,
-    function: Callable[[Sequence[Any], Any], Any],
+    function: Callable[[Sequence[nmod_poly], Product], nmod_poly],
     a: Sequence[int],
     b: Sequence[int],
     rng: random.Random,
@@ -130,24 +128,31 @@ def _zeros(
 
 
 def _gradient(
-    function: Callable[[Sequence[Any], Any], Any],
+    function: Callable[[Sequence[nmod_poly], Product], nmod_poly],
     point: Sequence[int],
     power: int,
     p: int,
     rng: random.Random,
 ) -> list[int]:
-    """The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is (t F_v + d F_w)^power G + ..."""
-    size, n = len(point), power + 1
-    zero, one = nmod_poly([], p), nmod_poly([1], p)
-    curve = [
-        Jet(nmod_poly([x, rng.randrange(p)], p), [one if i == k else zero for i in range(size)], n)
-        for k, x in enumerate(point)
-    ]
-    value = function(curve, Jet(zero, [zero] * size, n))
-    return [int(slope[power - 1]) for slope in value.slopes]
+    """The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is (t F_v + d F_w)^power G + ...
+
+    A power of t above all those that count stands for d.
+    """
+    apart = power + 1
+    far = nmod_poly([0] * apart + [1], p)
+    curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
+
+    def coefficient(X: Sequence[nmod_poly]) -> int:
+        return int(function(X, lambda left, right: left.mul_low(right, apart + power))[apart + power - 1])
+
+    here = coefficient(curve)
+    moved = ([x + far if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))
+    return [(coefficient(X) - here) % p for X in moved]
 
 
-def _denominator(equation: Equation, X: Sequence[Any], zero: Any) -> Any:
-    """The last minor of L at X, whose coordinates are polynomials or jets: up to its sign det M."""
-    rows = equation.rows(equation.monomials(X), zero)
-    return kernel_minors([[*row[:-1], zero] for row in rows])[-1]
+def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product = operator.mul) -> nmod_poly:
+    """The last minor of L at X, whose coordinates are polynomials: up to its sign det M."""
+    zero = X[0] * 0
+    rows = equation.rows(equation.monomials(X, times), zero)
+    minor: nmod_poly = kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
+    return minor

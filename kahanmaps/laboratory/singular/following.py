@@ -11,7 +11,6 @@ from flint import nmod_poly
 
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
 from kahanmaps.laboratory.singular.jets import (
-    Function,
     Letters,
     NotGeneric,
     PrecisionTooLow,
@@ -20,9 +19,8 @@ from kahanmaps.laboratory.singular.jets import (
     image_of,
     orders_of,
     walk,
-    walk_along,
 )
-from kahanmaps.laboratory.singular.orders import AlongCurves, Orders, Tracked
+from kahanmaps.laboratory.singular.orders import NOTHING, AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
@@ -52,182 +50,148 @@ class Range:
         return time.monotonic() > self.end
 
 
-def orders_until_return(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    tracked: AlongCurves,
-    up: int,
-    limits: Range,
-) -> Orders:
-    """The orders along a curve whose hypersurface is one again after the step `up`, until it is a critical one.
+@dataclass(frozen=True)
+class Course:
+    """The curve point + t direction over GF(p), what moves it and how far, and what is looked at along it."""
 
-    From then on they are those of the other.
-    """
-    steps = limits.shown
-    reach = min(limits.reach, steps + _FREE_STEPS)
-    while True:
-        run = whole(walked(equations, point, direction, [], steps, limits.end, functions=tracked.functions))
-        rows = tracked.rows(run)
-        for t, (_, *nu) in enumerate(rows, 1):
-            if t >= up and any(nu) and tracked.functions:
-                if sorted(nu)[-2:] not in ([1], [0, 1]):
-                    raise NotGeneric("a point where several critical hypersurfaces meet")
-                return Orders(rows[:t], (), t, True, (t, nu.index(1)))
-        hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
-        if hit is None or not tracked.functions:  # nothing is asked beyond the next point without a value
-            return Orders(rows[:up], (), reached, True)
-        steps = hit
+    equations: Sequence[Equation]
+    point: Sequence[int]
+    direction: Sequence[int]
+    limits: Range
+    tracked: AlongCurves = NOTHING
 
+    @property
+    def prime(self) -> int:
+        """The prime modulo which all is computed."""
+        return self.equations[0].over.characteristic
 
-def whole(walked: tuple[list[Step], bool]) -> tuple[Step, ...]:
-    """The steps of a walk that has not ended early. Raises PrecisionTooLow."""
-    run, is_whole = walked
-    if not is_whole:
-        raise PrecisionTooLow
-    return tuple(run)
+    def steps(
+        self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
+    ) -> tuple[list[Step], bool]:
+        """So many steps along series as long as needed, and whether these are all: time or precision may end it.
 
+        With tangents nothing is tracked.
+        """
+        precision, end = 8, self.limits.end
+        functions = () if tangents else self.tracked.functions
+        start = self.equations, self.point, self.direction
+        while True:
+            run: list[Step] = []
+            try:
+                for step in islice(walk(*start, precision, tangents, functions), count):
+                    run.append(step)
+                    if time.monotonic() > end:
+                        return run, len(run) == count
+                return run, True
+            except PrecisionTooLow:
+                if precision >= most or time.monotonic() > end:
+                    return run, False
+                precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
-def orders_at(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    tracked: AlongCurves,
-    span: tuple[int, int],
-    limits: Range,
-) -> Orders:
-    """The orders along a curve, for as many steps as it takes until they are known for all, or the limits end it.
+    def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[Step, ...]:
+        """The same where it does not end early. Raises PrecisionTooLow."""
+        run, is_whole = self.steps(count, tangents)
+        if not is_whole:
+            raise PrecisionTooLow
+        return tuple(run)
 
-    `span` has the number of steps to begin with, and the largest one. The image may move on a critical hypersurface
-    until something happens, so that orders have to repeat for as long as curves are followed.
-    """
-    steps, reach = span
-    while True:
-        run, is_whole = walked(
-            equations, point, direction, [], steps, limits.end, most=_MOST_ALONG, functions=tracked.functions
-        )
-        rows = tracked.rows(run)
-        last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
-        hit = None
-        if is_whole and len(rows) - last >= _CONSTANT:
-            hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
-            if hit is None:
-                return Orders(rows[:last], (), reached, True)
-        found = [find_recurrence(column) for column in zip(*rows, strict=True)]
-        repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
-        is_cut = not is_whole and not limits.is_over  # by the precision
-        if rows and repeats and (len(run) >= min(reach, limits.along) or is_cut):
-            laws = tuple(one.characteristic for one in found if one is not None)
-            kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
-            return Orders(rows[:kept], laws, len(run), True)
-        longest = min(reach, max(limits.along, 2 * (hit or 0)))
-        if (
-            rows
-            and is_cut
-            and (beyond := _met_for_ever(equations, run[-1].limit, direction, reach, tracked, limits.end)) is not None
-        ):
-            last = max(
-                (
+    def orders_until_return(self, up: int) -> Orders:
+        """The orders along a curve whose hypersurface is one again after the step `up`, until it is a critical one.
+
+        From then on they are those of the other.
+        """
+        steps = self.limits.shown
+        reach = min(self.limits.reach, steps + _FREE_STEPS)
+        while True:
+            run = self.all_steps(steps)
+            rows = self.tracked.rows(run)
+            for t, (_, *nu) in enumerate(rows, 1):
+                if t >= up and any(nu) and self.tracked.functions:
+                    if sorted(nu)[-2:] not in ([1], [0, 1]):
+                        raise NotGeneric("a point where several critical hypersurfaces meet")
+                    return Orders(rows[:t], (), t, True, (t, nu.index(1)))
+            hit, reached = self._next_hit(run[-1].limit, len(run), reach)
+            if hit is None or not self.tracked.functions:  # nothing is asked beyond the next point without a value
+                return Orders(rows[:up], (), reached, True)
+            steps = hit
+
+    def orders(self, first: int) -> Orders:
+        """The orders along the curve, for as many steps as it takes until they are known for all, or the limits end it.
+
+        `first` is the number of steps to begin with. The image may move on a critical hypersurface until something
+        happens, so that orders have to repeat for as long as curves are followed.
+        """
+        steps, limits = first, self.limits
+        while True:
+            run, is_whole = self.steps(steps, most=_MOST_ALONG)
+            rows = self.tracked.rows(run)
+            last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
+            hit = None
+            if is_whole and len(rows) - last >= _CONSTANT:
+                hit, reached = self._next_hit(run[-1].limit, len(run), limits.reach)
+                if hit is None:
+                    return Orders(rows[:last], (), reached, True)
+            found = [find_recurrence(column) for column in zip(*rows, strict=True)]
+            repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
+            is_cut = not is_whole and not limits.is_over  # by the precision
+            if rows and repeats and (len(run) >= min(limits.reach, limits.along) or is_cut):
+                laws = tuple(one.characteristic for one in found if one is not None)
+                kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
+                return Orders(rows[:kept], laws, len(run), True)
+            longest = min(limits.reach, max(limits.along, 2 * (hit or 0)))
+            if rows and is_cut and (beyond := self._met_for_ever(run[-1].limit)) is not None:
+                others = (
                     t
                     for t, (mu, *nu) in enumerate(rows, 1)
                     if mu or any(order for k, order in enumerate(nu) if k not in beyond)
-                ),
-                default=1,
-            )
-            return Orders(rows[:last], (), reach, True, None, beyond)
-        if not is_whole or steps >= longest:
-            return Orders(rows, (), len(rows), False)
-        steps = longest
+                )
+                return Orders(rows[: max(others, default=1)], (), limits.reach, True, None, beyond)
+            if not is_whole or steps >= longest:
+                return Orders(rows, (), len(rows), False)
+            steps = longest
 
+    def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:
+        """The critical hypersurfaces on the later orbit of a point, if it closes and the map has a value on all of it.
 
-def _met_for_ever(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    reach: int,
-    tracked: AlongCurves,
-    end: float,
-) -> tuple[int, ...] | None:
-    """The critical hypersurfaces on the later orbit of a point, where that closes and the map has a value on all of it.
-
-    Then no power of t is ever divided out again. None elsewhere. Lines in a random direction show the value of the map.
-    """
-    if not isinstance(tracked, Tracked) or isinstance(equations, Letters):
+        Then no power of t is ever divided out again. None elsewhere. Lines in this direction show the value of the map.
+        """
+        tracked, p = self.tracked, self.prime
+        if not isinstance(tracked, Tracked) or isinstance(self.equations, Letters):
+            return None
+        point, seen, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
+        for _ in range(self.limits.reach):
+            seen.add(point)
+            line = [nmod_poly([x, v], p) for x, v in zip(point, self.direction, strict=True)]
+            first = [function(line, _MAX_PRECISION) for function in tracked.functions]
+            run = replace(self, point=point).steps(1)[0]
+            if not run or None in first:
+                return None
+            ((mu, *orders),) = replace(tracked, first=tuple(k or 0 for k in first)).rows(run)
+            if mu:
+                return None
+            point = _normal(run[0].limit, p)
+            met |= {k for k, order in enumerate(orders) if order}
+            if point in seen:
+                return tuple(sorted(met))
         return None
-    p = equations[0].over.characteristic
-    point, seen, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
-    for _ in range(reach):
-        seen.add(point)
-        line = [nmod_poly([x, v], p) for x, v in zip(point, direction, strict=True)]
-        first = [function(line, _MAX_PRECISION) for function in tracked.functions]
-        run = walked(equations, point, direction, [], 1, end, functions=tracked.functions)[0]
-        if not run or None in first:
-            return None
-        ((mu, *orders),) = replace(tracked, first=tuple(k or 0 for k in first)).rows(run)
-        if mu:
-            return None
-        point = _normal(run[0].limit, p)
-        met |= {k for k, order in enumerate(orders) if order}
-        if point in seen:
-            return tuple(sorted(met))
-    return None
+
+    def _next_hit(self, limit: Sequence[int], steps: int, reach: int) -> tuple[int | None, int]:
+        """The next step that a point does not have, or with a zero of a function, and for how long it was followed."""
+        at: Sequence[int] = limit
+        for step in range(steps + 1, reach + 1):
+            image = image_of(equations_of(self.equations, step), at)
+            if image is None:
+                return step, step
+            at = image
+            constants = [nmod_poly([x], self.prime) for x in at]
+            if None in orders_of(self.equations, self.tracked.functions, step, constants, 1):
+                return step, step
+            if self.limits.is_over:
+                return None, step
+        return None, reach
 
 
 def _normal(point: Sequence[int], p: int) -> tuple[int, ...]:
     """The coordinates of a point with the first one that is not zero as 1."""
     inverse = pow(next(x for x in point if x), -1, p)
     return tuple(x * inverse % p for x in point)
-
-
-def walked(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    tangents: Sequence[Sequence[int]],
-    steps: int,
-    end: float,
-    most: int = _MAX_PRECISION,
-    functions: Sequence[Function] = (),
-) -> tuple[list[Step], bool]:
-    """So many steps along series as long as needed, and whether these are all: time or precision may end it."""
-    precision = 8
-    while True:
-        run: list[Step] = []
-        try:
-            if tangents:
-                taken = walk(equations, point, direction, tangents, precision)
-            else:
-                taken = walk_along(equations, point, direction, precision, functions)
-            for step in islice(taken, steps):
-                run.append(step)
-                if time.monotonic() > end:
-                    return run, len(run) == steps
-            return run, True
-        except PrecisionTooLow:
-            if precision >= most or time.monotonic() > end:
-                return run, False
-            precision = min(most, max(2 * precision, 8 + precision * steps // max(1, len(run))))
-
-
-def _next_hit(
-    equations: Sequence[Equation],
-    limit: Sequence[int],
-    steps: int,
-    reach: int,
-    limits: Range,
-    functions: Sequence[Function] = (),
-) -> tuple[int | None, int]:
-    """The next step that a point does not have, or with a zero of a function, and for how long it was followed."""
-    p = equations[0].over.characteristic
-    at: Sequence[int] = limit
-    for step in range(steps + 1, reach + 1):
-        image = image_of(equations_of(equations, step), at)
-        if image is None:
-            return step, step
-        at = image
-        constants = [nmod_poly([x], p) for x in at]
-        if None in orders_of(equations, functions, step, constants, 1):
-            return step, step
-        if limits.is_over:
-            return None, step
-    return None, reach

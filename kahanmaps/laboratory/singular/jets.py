@@ -1,7 +1,8 @@
 """Curves in projective space with their tangent directions, carried by the Kahan map over GF(p)((t)).
 
-A jet is a power series in t, known up to a power of t, with one slope a tangent direction: an element of GF(p)[[t]][d1,
-..., dm]/(d_i d_j). Coordinates are homogeneous, so that nothing is ever divided but a common power of t.
+Coordinates are power series in t, known up to a power of t. They are homogeneous, so that nothing is ever divided but a
+common power of t. For the differential a curve has neighbours: moved by t^N in a tangent direction, from which it is
+told by the terms from t^N to t^2N, as by a number whose square is 0.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from kahanmaps.maps.equation import Equation
 Function = Callable[[Sequence[nmod_poly], int], int | None]
 
 
+Place = tuple[int, int, int]  # an exponent of t, a row and a column
+_ELIMINATED = 4  # the least dimension in which there are more minors than steps of an elimination
 _FEW = 4  # terms, of which mostly one is the first that is not zero
 
 
@@ -56,40 +59,6 @@ def orders_of(
     return [function(X, precision) for function in functions]
 
 
-class Jet:
-    """A power series modulo t^precision and its slopes; sums and products keep the lower precision."""
-
-    __slots__ = ("precision", "slopes", "value")
-
-    def __init__(self, value: nmod_poly, slopes: Sequence[nmod_poly], precision: int) -> None:
-        self.value, self.slopes, self.precision = value, slopes, precision
-
-    def __add__(self, other: Jet) -> Jet:
-        slopes = [a + b for a, b in zip(self.slopes, other.slopes, strict=True)]
-        return Jet(self.value + other.value, slopes, min(self.precision, other.precision))
-
-    def __neg__(self) -> Jet:
-        return Jet(-self.value, [-slope for slope in self.slopes], self.precision)
-
-    def __sub__(self, other: Jet) -> Jet:
-        return self + (-other)
-
-    def __mul__(self, other: Jet | nmod) -> Jet:
-        if not isinstance(other, Jet):
-            return Jet(self.value * other, [slope * other for slope in self.slopes], self.precision)
-        n = min(self.precision, other.precision)
-        a, b = self.value, other.value
-        slopes = [a.mul_low(q, n) + b.mul_low(p, n) for p, q in zip(self.slopes, other.slopes, strict=True)]
-        return Jet(a.mul_low(b, n), slopes, n)
-
-    def over_power(self, power: int) -> Jet:
-        """The jet divided by t^power. Raises NotGeneric where a slope is not divisible."""
-        if any(int(slope[k]) for slope in self.slopes for k in range(power)):
-            raise NotGeneric("the valuation differs at neighbouring points")
-        slopes = [slope.right_shift(power) for slope in self.slopes]
-        return Jet(self.value.right_shift(power), slopes, self.precision - power)
-
-
 def valuation(series: nmod_poly, precision: int) -> int | None:
     """The exponent of the first term that is not zero below t^precision, None if there is none.
 
@@ -124,73 +93,49 @@ def walk(
     equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
-    tangents: Sequence[Sequence[int]],
     precision: int,
-) -> Iterator[Step]:
-    """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
-
-    The equation of the map is one over GF(p), points and vectors are residues (X : Z). Step after step without an end;
-    raises PrecisionTooLow and NotGeneric.
-    """
-    prime = equations[0].over.characteristic
-    X = [
-        Jet(
-            nmod_poly([x, v], prime).truncate(precision),
-            [nmod_poly([tangent[k]], prime) for tangent in tangents],
-            precision,
-        )
-        for k, (x, v) in enumerate(zip(point, direction, strict=True))
-    ]
-    zero = nmod_poly([], prime)
-    for number in count(1):
-        divided, denominators = 0, list[int | None]()
-        for equation in equations_of(equations, number):
-            nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
-            image = [nothing if jet is None else jet for jet in equation.image(X, None)]
-            known = min(jet.precision for jet in image)
-            common, denominator = _divided([jet.value for jet in image], known)
-            X = [jet.over_power(common) for jet in image]
-            divided = divided * equation.image_degree + common
-            denominators.append(denominator)
-        pole = None if denominator is None else denominator - common
-        limit = tuple(int(jet.value[0]) for jet in X)
-        yield Step(divided, pole, _product(denominators), _rank(X, prime), limit)
-
-
-def walk_along(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    precision: int,
+    tangents: Sequence[Sequence[int]] = (),
     functions: Sequence[Function] = (),
 ) -> Iterator[Step]:
-    """The steps of the curve point + t direction alone, which is quicker, with the orders of `functions` along it.
+    """The steps of the curve point + t direction, with its neighbours in the tangent directions; exact.
 
-    As `walk` else. Raises PrecisionTooLow.
+    The equation of the map is one over GF(p), points and vectors are residues (X : Z). Without tangents nothing is said
+    of the rank, with them nothing of the orders of `functions`. Step after step without an end; raises PrecisionTooLow
+    and NotGeneric.
     """
     prime = equations[0].over.characteristic
-    zero = nmod_poly([], prime)
-    X = [nmod_poly([x, v], prime).truncate(precision) for x, v in zip(point, direction, strict=True)]
+    apart = precision if tangents else 0
+    line = [nmod_poly([x, v], prime) for x, v in zip(point, direction, strict=True)]
+    far = nmod_poly([0] * apart + [1], prime)
+    curves = [line, *([x + far * w for x, w in zip(line, tangent, strict=True)] for tangent in tangents)]
+    curves = [[entry.truncate(apart + precision) for entry in curve] for curve in curves]
     for number in count(1):
         divided, denominators = 0, list[int | None]()
         for equation in equations_of(equations, number):
-
-            def times(left: nmod_poly, right: nmod_poly, known: int = precision) -> nmod_poly:
-                return left.mul_low(right, known)
-
-            image = equation.image(X, zero, times)
-            common, denominator = _divided(image, precision)
+            places: list[Place] = []
+            moved = [_moved(equation, curve, precision, apart + precision, places) for curve in curves]
+            common = sum(power for power, *_ in places)
+            if common + 1 > precision - 1:
+                raise PrecisionTooLow
             precision -= common
-            X = [entry.right_shift(common).truncate(precision) for entry in image]
+            curves = [[entry.truncate(apart + precision) for entry in curve] for curve in moved]
+            if not all(slope.truncate(apart).is_zero() for slope in _slopes(curves)):
+                raise NotGeneric("the valuation differs at neighbouring points")
+            last = valuation(curves[0][-1], precision)
             divided = divided * equation.image_degree + common
-            denominators.append(denominator)
-        pole = None if denominator is None else denominator - common
-        orders = orders_of(equations, functions, number, X, precision)
+            denominators.append(None if last is None else last + common)
+        orders = orders_of(equations, functions, number, curves[0], precision) if functions else []
         if None in orders:
             raise PrecisionTooLow
-        limit = tuple(int(entry[0]) for entry in X)
+        limit = tuple(int(entry[0]) for entry in curves[0])
+        rank = _rank(curves, apart) if tangents else 0
         kept = tuple(order or 0 for order in orders)
-        yield Step(divided, pole, _product(denominators), 0, limit, kept, tuple(X) if functions else ())
+        yield Step(divided, last, _product(denominators), rank, limit, kept, tuple(curves[0]) if functions else ())
+
+
+def _slopes(curves: Sequence[Sequence[nmod_poly]]) -> Iterator[nmod_poly]:
+    """The differences of coordinates of the neighbours to those of the curve."""
+    return (there - here for curve in curves[1:] for here, there in zip(curves[0], curve, strict=True))
 
 
 def _product(valuations: Sequence[int | None]) -> int | None:
@@ -199,13 +144,66 @@ def _product(valuations: Sequence[int | None]) -> int | None:
     return sum(known) if len(known) == len(valuations) else None
 
 
-def _divided(image: Sequence[nmod_poly], known: int) -> tuple[int, int | None]:
-    """The exponent of t in all coordinates, and in the last one. Raises PrecisionTooLow."""
-    sizes = [valuation(entry, known) for entry in image]
-    seen = [size for size in sizes if size is not None]
-    if not seen or min(seen) + 1 > known - 1:
+def _moved(
+    equation: Equation, X: Sequence[nmod_poly], precision: int, known: int, places: list[Place]
+) -> list[nmod_poly]:
+    """The image of a curve known below t^known without a common power of t, which is told by `places`.
+
+    They are empty for a curve, and those of the curve for its neighbours. Raises PrecisionTooLow.
+    """
+    zero = X[0] * 0
+
+    def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
+        return left.mul_low(right, known)
+
+    if equation.dim >= _ELIMINATED and equation.explicit is None:
+        return _kernel(equation.rows(equation.monomials(X, times), zero), precision, known, places)
+    image = equation.image(X, zero, times)
+    if not places:
+        places.append(_least([image], [0], range(len(image)), precision))
+    return [entry.right_shift(places[0][0]) for entry in image]
+
+
+def _kernel(rows: list[list[nmod_poly]], precision: int, known: int, places: list[Place]) -> list[nmod_poly]:
+    """The kernel of an n x (n + 1) matrix of series, without a common power of t; its minors have that of all places.
+
+    A pivot has the least exponent of all entries that are left, so that nothing but its own power of t is divided out.
+    """
+    left_rows, left = list(range(len(rows))), list(range(len(rows) + 1))
+    solved: list[tuple[int, dict[int, nmod_poly]]] = []
+    for k in range(len(rows)):
+        if len(places) == k:
+            places.append(_least(rows, left_rows, left, precision))
+        power, i, j = places[k]
+        left_rows.remove(i)
+        left.remove(j)
+        inverse = rows[i][j].right_shift(power).inverse_series_trunc(known - power)
+        normal = {c: rows[i][c].right_shift(power).mul_low(inverse, known - power) for c in left}
+        for r in left_rows:
+            factor = rows[r][j]
+            if not factor.is_zero():
+                for c in left:
+                    rows[r][c] = rows[r][c] - factor.mul_low(normal[c], known)
+        solved.append((j, normal))
+    X = [rows[0][0] * 0 + 1] * (len(rows) + 1)
+    for j, normal in reversed(solved):
+        X[j] = -sum((entry.mul_low(X[c], known) for c, entry in normal.items()), 0 * X[j])
+    return X
+
+
+def _least(rows: Sequence[Sequence[nmod_poly]], left_rows: Sequence[int], left: Sequence[int], precision: int) -> Place:
+    """The entry of the least exponent of t in these rows and columns. Raises PrecisionTooLow where there is none."""
+    best: Place | None = None
+    for i in left_rows:
+        for j in left:
+            power = valuation(rows[i][j], precision)
+            if power is not None and (best is None or power < best[0]):
+                best = power, i, j
+                if power == 0:
+                    return best
+    if best is None:
         raise PrecisionTooLow
-    return min(seen), sizes[-1]
+    return best
 
 
 def modulo(form: Any, field: PrimeField) -> nmod_mpoly:
@@ -256,8 +254,7 @@ def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] |
     return X
 
 
-def _rank(X: Sequence[Jet], prime: int) -> int:
+def _rank(curves: Sequence[Sequence[nmod_poly]], apart: int) -> int:
     """The rank at t = 0 in projective space: the limit itself counts for nothing."""
-    rows: list[list[Any]] = [[jet.value[0] for jet in X]]
-    rows += [[jet.slopes[i][0] for jet in X] for i in range(len(X[0].slopes))]
-    return int(nmod_mat(len(rows), len(X), [int(entry) for row in rows for entry in row], prime).rank()) - 1
+    entries = [int(entry[0]) for entry in curves[0]] + [int(slope[apart]) for slope in _slopes(curves)]
+    return int(nmod_mat(len(curves), len(curves[0]), entries, curves[0][0].modulus()).rank()) - 1

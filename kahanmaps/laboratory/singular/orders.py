@@ -109,7 +109,7 @@ class AlongCurves(Protocol):
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """What `walk_along` takes."""
+        """What `walk` takes."""
 
     def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
         """For each of the steps, or the first of them, what is divided out and the orders of hypersurfaces."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
 from flint import fmpq, nmod_poly
@@ -19,7 +20,7 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
-from kahanmaps.laboratory.singular.following import Range, orders_at, orders_until_return, walked, whole
+from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import (
     Letters,
     NotGeneric,
@@ -32,16 +33,25 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
 _MOST_WITH_TANGENTS = 1024
+_FEW_TERMS = 64  # of series that tell points apart
 _TRIES = 40
 _LINES = 6  # on which critical points are looked for, and more while some have no point
 _POINTS = 2  # each modulo a prime of its own
 _LONGEST = 60  # characters of a polynomial in a sentence
 
 FIRST_STEPS = 12  # that are shown
-CONFINED = "confined"
-NOT_CONFINED = "not confined"
-NOT_CONTRACTED = "not contracted"
-UNDECIDED = "undecided"
+
+
+class Outcome(StrEnum):
+    """What becomes of a hypersurface."""
+
+    CONFINED = "confined"
+    NOT_CONFINED = "not confined"
+    NOT_CONTRACTED = "not contracted"
+    UNDECIDED = "undecided"
+
+
+CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = Outcome
 NO_POINT = "no point was followed"
 NO_TIME = "no two points could be followed in time"
 
@@ -52,10 +62,9 @@ class Hypersurface:
 
     `is_pole`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian determinant of
     the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?" where it is
-    too large: then `degree` is that of all components of this multiplicity together. `status` is
-    "confined", "not confined", "not contracted" or "undecided"; it is contracted by the step `contracted_at` and is a
-    hypersurface again after the step `confined_at` (each None if that did not happen). `steps` tells the first steps,
-    at the first of two points, modulo the first of the `primes`.
+    too large: then `degree` is that of all components of this multiplicity together. It is contracted by the step
+    `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not happen). `steps`
+    tells the first steps, at the first of two points, modulo the first of the `primes`.
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
@@ -64,14 +73,14 @@ class Hypersurface:
     `generic` is its polynomial over Q[eps], empty where it is not known.
     """
 
-    polynomial: str
-    degree: int
-    is_pole: bool
-    multiplicity: int | None
-    status: str
-    contracted_at: int | None
-    confined_at: int | None
-    steps: tuple[Step, ...]
+    polynomial: str = "?"
+    degree: int = 0
+    is_pole: bool = False
+    multiplicity: int | None = None
+    status: Outcome = UNDECIDED
+    contracted_at: int | None = None
+    confined_at: int | None = None
+    steps: tuple[Step, ...] = ()
     primes: tuple[int, ...] = ()
     note: str = ""
     followed: int = 0
@@ -115,20 +124,7 @@ class Followed:
     stage: int
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """What became of one point: see Hypersurface."""
-
-    status: str
-    contracted_at: int | None = None
-    confined_at: int | None = None
-    steps: tuple[Step, ...] = ()
-    followed: int = 0
-    settled_at: int | None = None
-    orders: Orders = NO_ORDERS
-
-
-_UNKNOWN = _Outcome(UNDECIDED)
+_UNKNOWN = Hypersurface()
 
 
 def outcome_of(
@@ -151,17 +147,15 @@ def outcome_of(
     and the length of a word, this map contracts it, and steps are single maps.
     Source: grammaticos-ramani-papageorgiou-1991.
     """
-    outcomes: list[_Outcome] = []
+    outcomes: list[Hypersurface] = []
     primes: list[int] = []
     forms = [*critical, *excess]
     stage, period = place or (0, 1)
-    at = None if place is None else stage
 
-    def told(outcome: _Outcome, note: str = "") -> Hypersurface:
-        degree = int(factor.total_degree())
-        return Hypersurface(
-            text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, stage=at, **vars(outcome)
-        )
+    def told(outcome: Hypersurface, note: str = "") -> Hypersurface:
+        degree, at = int(factor.total_degree()), None if place is None else stage
+        known = replace(outcome, polynomial=text, degree=degree, is_pole=is_pole, multiplicity=multiplicity)
+        return replace(known, primes=tuple(primes), note=note, stage=at)
 
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.is_over:
@@ -196,13 +190,8 @@ def outcome_of(
         (outcome.status, outcome.contracted_at, outcome.confined_at, outcome.orders.known) for outcome in outcomes
     )
     if one != other:
-        return told(_Outcome(UNDECIDED, steps=outcomes[0].steps), "two points tell different things")
+        return told(Hypersurface(steps=outcomes[0].steps), "two points tell different things")
     return told(outcomes[0])
-
-
-def untold(reason: str) -> Hypersurface:
-    """Contracted hypersurfaces of which nothing is known, and why."""
-    return Hypersurface("?", 0, False, None, note=reason, **vars(_UNKNOWN))
 
 
 def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
@@ -228,15 +217,16 @@ def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limit
             continue
         except PrecisionTooLow:
             outcome = _UNKNOWN
-        return [*found, Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(outcome))]
+        return [*found, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
     return found
 
 
 def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool) -> list[Hypersurface]:
     found: dict[tuple[Any, ...], Hypersurface] = {}
+    alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
     degrees: dict[int, int] = {}
     for line in range(4 * _LINES):
-        if line >= _LINES and set(degrees) <= {key[0] for key in found}:
+        if limits.is_over or (line >= _LINES and set(degrees) <= {key[0] for key in found}):
             break
         field = random_prime_field(rng)
         try:
@@ -250,6 +240,14 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
+            direction = [rng.randrange(field.prime) for _ in critical.point]
+            run, _ = Course(equations, critical.point, direction, limits).steps(limits.shown, most=_FEW_TERMS)
+            orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
+            known = alike.setdefault(orders, [])
+            if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
+                primes = dict.fromkeys((*found[known[0]].primes, field.prime))
+                found[known[0]] = replace(found[known[0]], primes=tuple(primes))
+                continue
             try:
                 outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
             except NotGeneric:
@@ -257,11 +255,11 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             except PrecisionTooLow:
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
-            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(outcome))
+            known.append(key)
+            one = replace(outcome, degree=seen[key[0]], is_pole=poles, multiplicity=key[0], primes=(field.prime,))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        untried = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
-        found[(multiplicity,)] = untried
+        found[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
@@ -276,7 +274,7 @@ def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
     )
 
 
-def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]:
+def _told(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
     """Status, the step that contracts and the step that ends it."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:
@@ -292,29 +290,38 @@ def _outcome_at(
     rng: random.Random,
     limits: Range,
     tracked: AlongCurves = NOTHING,
-) -> _Outcome:
+) -> Hypersurface:
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end, most=_MOST_WITH_TANGENTS)
+    course = Course(equations, point, direction, limits, tracked)
+    run, is_whole = course.steps(limits.shown, tangents, _MOST_WITH_TANGENTS)
     status, down, up = _told([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
-        return _Outcome(status, down, up, tuple(run), len(run), 0)
+        return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
     if up is None:
-        orders = orders_at(equations, point, direction, tracked, (limits.shown, limits.reach), limits)
+        orders = course.orders(limits.shown)
         if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
             raise PrecisionTooLow
     else:
-        orders = orders_until_return(equations, point, direction, tracked, up, limits)
+        orders = course.orders_until_return(up)
     if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = list(whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end)))
+        run = list(course.all_steps(orders.settled_at + 2, tangents))
         status, down, up = _told([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         orders = replace(NO_ORDERS, followed=orders.followed)
-    return _Outcome(status, down, up, tuple(run), orders.followed, settled, orders)
+    return Hypersurface(
+        status=status,
+        contracted_at=down,
+        confined_at=up,
+        steps=tuple(run),
+        followed=orders.followed,
+        settled_at=settled,
+        orders=orders,
+    )
 
 
 def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:

@@ -41,7 +41,6 @@ from kahanmaps.laboratory.singular.outcomes import (
     Hypersurface,
     outcome_of,
     outcomes_at_random,
-    untold,
     unwritten,
 )
 from kahanmaps.laboratory.singular.written import (
@@ -230,7 +229,9 @@ def singularities(
         if over.is_bilinear:
             found += unwritten(map_, exact_eps, rng, limits)
         else:
-            found.append(untold("the hypersurfaces that this map contracts are too large to be written down"))
+            found.append(
+                Hypersurface(note="the hypersurfaces that this map contracts are too large to be written down")
+            )
         stopped = limits.is_over
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 

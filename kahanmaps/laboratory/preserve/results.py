@@ -1,0 +1,64 @@
+"""What the searches for preserved things have in common: what they were asked, and the words for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.displayed import Printed
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap
+
+
+@dataclass(frozen=True)
+class Search(Printed):
+    """What was asked: the map of a file, the symbols that formulas contain, and eps, None for every eps.
+
+    With `flow` it is the differential equation that was asked for. Random points were taken modulo the `primes`.
+    """
+
+    file: SystemFile
+    symbols: tuple[str, ...]
+    eps: fmpq | None
+    seed: int
+    primes: tuple[int, ...]
+    flow: bool = field(default=False, kw_only=True)
+
+    @property
+    def of_flow(self) -> dict[str, Any]:
+        """What plain data begin with: that it is the flow, or nothing."""
+        return {"flow": True} if self.flow else {}
+
+    @property
+    def toml_comments(self) -> list[str]:
+        """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
+        if self.eps is None:
+            return []
+        step = f" (time step 2 eps = {2 * self.eps})" if self.file.map.has_time_step else ""
+        return [f"# for eps = {self.eps} only{step}: check with --eps {self.eps}"]
+
+
+def require_time(seconds: float) -> None:
+    """Raise InputError for less than no time."""
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a time above 0")
+
+
+def closing_note(period: int | None, eps: fmpq | None, map_: BirationalMap) -> str:
+    """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> closing_note(4, fmpq(1), load("weierstrass").map)
+    'orbits close after 4 steps: at eps = 1 the map is periodic (measured); nothing follows for other eps'
+    """
+    if period is None:
+        return ""
+    closes = f"orbits close after {period} step{'s' * (period != 1)}"
+    if not map_.has_eps:
+        return f"{closes}: the map is periodic (measured)"
+    if eps is None:
+        return f"{closes} at every eps that was tried: the map is periodic (measured)"
+    return f"{closes}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"
