@@ -31,10 +31,12 @@ from kahanmaps.checks.claims import Evidence as Evidence
 from kahanmaps.checks.claims import Finding as Finding
 from kahanmaps.checks.claims import Report as Report
 from kahanmaps.checks.claims import Verdict as Verdict
+from kahanmaps.checks.claims import combined as combined
 from kahanmaps.checks.conserve import known_integrals as known_integrals
 from kahanmaps.checks.settings import Settings as Settings
 from kahanmaps.checks.settings import eps_record as eps_record
 from kahanmaps.checks.settings import eps_words as eps_words
+from kahanmaps.checks.table import CHECKS as CHECKS
 from kahanmaps.display.experiments import summary_markdown as summary_markdown
 from kahanmaps.display.laboratory import analysis_head as analysis_head
 from kahanmaps.display.laboratory import analysis_title as analysis_title
@@ -129,8 +131,8 @@ from kahanmaps.laboratory.preserve.hirota_kimura import Basis as Basis
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis as hirota_kimura_basis
 from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integrals
 from kahanmaps.laboratory.preserve.limits import flow_and_map as flow_and_map
-from kahanmaps.laboratory.preserve.results import closing_note as closing_note
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson as find_poisson
+from kahanmaps.laboratory.preserve.results import closing_note as closing_note
 from kahanmaps.laboratory.report import Statement as Statement
 from kahanmaps.laboratory.scan.kept import Kept as Kept
 from kahanmaps.laboratory.scan.result import Scan as Scan
@@ -240,6 +242,7 @@ from kahanmaps.plots.windows import Window as Window
 from kahanmaps.plots.windows import fullest_axes as fullest_axes
 from kahanmaps.plots.windows import require_window as require_window
 from kahanmaps.plots.windows import window_of as window_of
+from kahanmaps.reports.report import report_html as report_html
 from kahanmaps.sources import source as source
 from kahanmaps.systems.quadratic import MAX_DIMENSION as MAX_DIMENSION
 from kahanmaps.systems.quadratic import QuadraticSystem as QuadraticSystem

@@ -11,18 +11,8 @@ import click
 
 from kahanmaps.checks.table import CHECKS, Check, ClaimOption
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.complete import complete_system
-from kahanmaps_cli.options import (
-    check_options,
-    inline_options,
-    integral_option,
-    is_inline,
-    load_pair,
-    load_system,
-    settings_from,
-    system_argument,
-    system_options,
-)
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
@@ -38,33 +28,33 @@ def command(name: str) -> click.Command:
         if check.is_of_pair:
             system, other = _pair(system, other, options)
         with Progress(options["quiet"]) as progress:
-            settings = settings_from(options, progress)
+            settings = opt.settings_from(options, progress)
             if check.is_of_pair:
-                file, second = load_pair(system, other, options)
+                file, second = opt.load_pair(system, other, options)
                 report = check(file, second, settings, eps2)
             else:
-                file = load_system(system, options)
+                file = opt.load_system(system, options)
                 report = check(file, settings, _claimed(file, check.claim, claim))
         return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
-    run = check_options(run)
+    run = opt.check_options(run)
     if check.is_of_pair:
         run = click.option(
             "--eps2", type=ExactNumber(), metavar="E", help="Another eps for the second map (needs --eps)."
         )(run)
-        run = inline_options(run)
+        run = opt.inline_options(run)
         run = click.argument("other", required=False, shell_complete=complete_system)(run)
-        run = system_argument(run)
+        run = opt.system_argument(run)
     else:
         run = _option(check.claim)(run) if check.claim is not None else run
-        run = system_options(run)
+        run = opt.system_options(run)
     made: click.Command = click.command(name, help=_help(check))(run)
     return made
 
 
 def _option(claim: ClaimOption) -> Any:
     if claim.many:
-        return integral_option(claim.help, claim.flag, "claim")
+        return opt.integral_option(claim.help, claim.flag, "claim")
     kind = click.Path() if claim.metavar == "FILE" else None
     return click.option(claim.flag, "claim", type=kind, metavar=claim.metavar, help=claim.help)
 
@@ -78,7 +68,7 @@ def _help(check: Check) -> str:
 
 def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tuple[str | None, str | None]:
     """An inline system is the first, and the argument the second."""
-    if is_inline(options) and system is not None and other is None:
+    if opt.is_inline(options) and system is not None and other is None:
         system, other = None, system
     if system == other == "-":
         raise click.UsageError("found - twice, but standard input holds one system only")

@@ -13,18 +13,9 @@ import click
 
 from kahanmaps.errors import InputError
 from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.commands.heights import require_heights, surveyed
-from kahanmaps_cli.options import (
-    eps_options,
-    inline_options,
-    is_inline,
-    load_system,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from
 from kahanmaps_cli.progress import Progress
@@ -41,17 +32,17 @@ _scale_option = click.option(
 @picture(
     "degrees",
     click.argument("systems", nargs=-1, metavar="[SYSTEM]..."),
-    inline_options,
+    opt.inline_options,
     click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
-    eps_options,
-    seconds_option(10.0, "Stop each system after about so many."),
+    opt.eps_options,
+    opt.seconds_option(10.0, "Stop each system after about so many."),
     click.option(
         "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
     ),
     click.option(
         "--max-degree", type=int, metavar="N", default=20_000, show_default=True, help="Work out no larger degree."
     ),
-    seed_option,
+    opt.seed_option,
     _scale_option,
 )
 def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
@@ -73,8 +64,8 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
     growths: dict[str, lib.DegreeGrowth] = {}
     for path in options["records"]:
         _add(growths, *lib.degrees_of_record(read_record(path), path))
-    eps = the_eps(options["eps"], options["time_step"], required=False)
-    inline = is_inline(options)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    inline = opt.is_inline(options)
     asked: list[str | None] = list(options["systems"])
     if inline or not (asked or growths):
         asked.append(None)
@@ -82,7 +73,7 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
         raise click.UsageError("give SYSTEMs or an inline one, not both")
     if len(asked) > 1 and options["parameters"]:
         raise click.UsageError("-p is for one system: write several as files, or draw --from records")
-    files = [load_system(name, options) for name in asked]
+    files = [opt.load_system(name, options) for name in asked]
     early: list[str] = []
     for file in files:
         found = measured(file, eps, options, partial(_tell, progress, file.label))
@@ -105,9 +96,9 @@ def _add(growths: dict[str, lib.DegreeGrowth], name: str, found: lib.DegreeGrowt
 
 @picture(
     "heights",
-    system_options,
+    opt.system_options,
     click.option("--from", "record", metavar="FILE", help="Written by heights --json, instead of SYSTEM."),
-    eps_options,
+    opt.eps_options,
     click.option("--random", "count", type=Whole(1), metavar="N", help="N starts drawn at random (default 3)."),
     click.option(
         "--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable."
@@ -121,8 +112,8 @@ def _add(growths: dict[str, lib.DegreeGrowth], name: str, found: lib.DegreeGrowt
         show_default=True,
         help="Digit budget of each orbit.",
     ),
-    seconds_option(30.0, "Stop after about so many seconds."),
-    seed_option,
+    opt.seconds_option(30.0, "Stop after about so many seconds."),
+    opt.seed_option,
     _scale_option,
 )
 def heights(options: dict[str, Any], progress: Progress) -> Drawn:
@@ -151,8 +142,8 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
         curves = lib.curves_of_record(record, options["record"])
         whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
     else:
-        file = load_system(options["system"], options)
-        eps = the_eps(options["eps"], options["time_step"], required=False)
+        file = opt.load_system(options["system"], options)
+        eps = opt.the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
         curves, whole = lib.height_curves(survey), survey.is_whole
     figure = lib.draw_heights(curves, style_from(options), scale=options["scale"])

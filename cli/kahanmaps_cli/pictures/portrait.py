@@ -9,16 +9,7 @@ import click
 
 from kahanmaps.errors import counted
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.options import (
-    backward_option,
-    eps_of,
-    eps_options,
-    is_inline,
-    load_system,
-    random_starts_options,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
 from kahanmaps_cli.pictures.portrait_orbits import Orbits
@@ -36,19 +27,19 @@ _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "eul
 
 @picture(
     "portrait",
-    system_options,
-    eps_options,
+    opt.system_options,
+    opt.eps_options,
     click.option(
         "--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits."
     ),
-    random_starts_options,
+    opt.random_starts_options,
     click.option(
         "--steps",
         type=int,
         metavar="N",
         help="Steps of each orbit (default 1000; of one variable 100; with --density 100000).",
     ),
-    backward_option,
+    opt.backward_option,
     click.option(
         "--from",
         "stored",
@@ -152,11 +143,11 @@ def _word(name: str) -> str:
 def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
 
     file = None
-    if system is not None or is_inline(options):
-        file = load_system(system, options)
+    if system is not None or opt.is_inline(options):
+        file = opt.load_system(system, options)
     elif options["parameters"]:
         raise click.UsageError("-p sets a parameter of the system: name the SYSTEM as well")
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     stored = read_orbits(options["stored"], None if file is None else file.variables)
     told = stored.header.get("eps")
     try:
@@ -171,8 +162,8 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
 
     from kahanmaps_cli.ensemble_starts import drawn, read_starts
 
-    file = load_system(system, options)
-    eps = eps_of(file, options)
+    file = opt.load_system(system, options)
+    eps = opt.eps_of(file, options)
     file.map.at(lib.fmpq(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
     starts: Any = None
     if options["start"]:
