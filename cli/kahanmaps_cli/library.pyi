@@ -129,8 +129,8 @@ from kahanmaps.laboratory.preserve.hirota_kimura import Basis as Basis
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis as hirota_kimura_basis
 from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integrals
 from kahanmaps.laboratory.preserve.limits import flow_and_map as flow_and_map
-from kahanmaps.laboratory.preserve.results import closing_note as closing_note
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson as find_poisson
+from kahanmaps.laboratory.preserve.results import closing_note as closing_note
 from kahanmaps.laboratory.report import Statement as Statement
 from kahanmaps.laboratory.scan.kept import Kept as Kept
 from kahanmaps.laboratory.scan.result import Scan as Scan
