@@ -125,6 +125,7 @@ from kahanmaps.laboratory.growth.height_survey import HeightSurvey as HeightSurv
 from kahanmaps.laboratory.growth.height_survey import height_survey as height_survey
 from kahanmaps.laboratory.laboratory import Laboratory as Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint as NoPoint
+from kahanmaps.laboratory.preserve.darboux import DarbouxSearch as DarbouxSearch
 from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities as find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import Basis as Basis

@@ -43,6 +43,12 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
     return tuple(name for name in named if name != "eps"), eps
 
 
+def asked(options: dict[str, Any], *names: str) -> dict[str, Any]:
+    """What every search is asked with, and these options: symbols, eps, seconds, seed."""
+    symbols, eps = symbols_and_eps(options)
+    return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "seconds", "seed")}
+
+
 def scope(found: Any) -> str:
     """For which eps and which symbols the formulas hold, to follow the name of the map."""
     if getattr(found, "flow", False):
@@ -64,6 +70,11 @@ def heading(name: str, found: Any) -> dict[str, Any]:
     }
 
 
+def record(name: str, found: Any, **more: Any) -> dict[str, Any]:
+    """All that a search found, as plain data."""
+    return {**heading(name, found), **found.to_json(), **more, "document": dict(found.file.document)}
+
+
 def print_search(
     name: str, found: Any, options: dict[str, Any], formulas: Iterable[tuple[str, Any, str]], count: str = ""
 ) -> None:
@@ -73,7 +84,7 @@ def print_search(
     them.
     """
     if options["as_json"]:
-        print_json({**heading(name, found), **found.to_json(), "document": dict(found.file.document)})
+        print_json(record(name, found))
     elif options["as_toml"]:
         click.echo(found.toml_section(), nl=False)
     elif options["as_latex"]:

@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
+from kahanmaps_cli.search import asked, print_search, require_one_form, search_options
 
 
 @click.command("find-density")
@@ -36,16 +36,10 @@ def command(system: str | None, **options: Any) -> int:
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
         file = opt.load_system(system, options)
-        symbols, eps = symbols_and_eps(options)
+        settings = asked(options, "flow", "max_degree")
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow goes without --toml, which is about the map")
-        found = lib.find_densities(
-            file,
-            symbols=symbols,
-            eps=eps,
-            **opt.given(options, "flow", "max_degree", "seconds", "seed"),
-            progress=progress,
-        )
+        found = lib.find_densities(file, **settings, progress=progress)
     further = f"note\t{found.further}" if found.further else ""
     print_search("find-density", found, options, [("phi", one, "") for one in found.shown], further)
     return 0 if found.densities else 3

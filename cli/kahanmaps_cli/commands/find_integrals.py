@@ -12,12 +12,13 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import (
+    asked,
     heading,
     print_search,
+    record,
     require_one_form,
     scope,
     search_options,
-    symbols_and_eps,
 )
 from kahanmaps_cli.terminal import formula, tell
 from kahanmaps_cli.value_rows import Cell, rows_of, table
@@ -72,20 +73,16 @@ def command(system: str | None, **options: Any) -> int:
     def cell(file: lib.SystemFile, progress: Progress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
-        symbols, eps = symbols_and_eps(options)
-        limits = opt.given(options, "max_degree", "seconds", "seed")
-        found = lib.find_integrals(file, symbols=symbols, eps=eps, progress=progress, **limits)
+        found = lib.find_integrals(file, **asked(options, "max_degree"), progress=progress)
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
-        document = {"document": dict(file.document)}
-        record = {**heading("find-integrals", found), **found.to_json(), **document}
-        return Cell(line, lambda: record, lambda: None, found.reason)
+        return Cell(line, lambda: record("find-integrals", found), lambda: None, found.reason)
 
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
     with Progress(options["quiet"]) as progress:
         file = opt.load_system(system, options)
-        symbols, eps = symbols_and_eps(options)
+        settings = asked(options)
         if options["flow"] and (options["sets"] or options["as_toml"]):
             raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
         if options["sets"]:
@@ -93,25 +90,20 @@ def command(system: str | None, **options: Any) -> int:
                 raise click.UsageError("give --monomials or --darboux, not both")
             if options["as_toml"] or options["as_latex"]:
                 raise click.UsageError("--monomials goes with --json, not with --toml and --latex")
-            return _bases(file, eps, options)
+            return _bases(file, settings["eps"], options)
         if options["darboux"] is not None:
             if options["as_toml"] or options["as_latex"]:
                 raise click.UsageError("--darboux goes with --json, not with --toml and --latex")
-            return _darboux(file, symbols, eps, options, progress)
-        search = partial(
-            lib.find_integrals,
-            file,
-            symbols=symbols,
-            eps=eps,
-            **opt.given(options, "max_degree", "seed"),
-            seconds=options["seconds"] / (1 + options["flow"]),
-            progress=progress,
-        )
+            darboux = lib.darboux_polynomials(
+                file, options["darboux"], flow=options["flow"], **settings, progress=progress
+            )
+            return _print_darboux(darboux, options["as_json"])
+        settings |= {"max_degree": options["max_degree"], "seconds": options["seconds"] / (1 + options["flow"])}
+        search = partial(lib.find_integrals, file, **settings, progress=progress)
         found = search(flow=options["flow"])
         beside = lib.flow_and_map(search(), None, found) if options["flow"] else None
     if beside is not None and options["as_json"]:
-        both = {**heading("find-integrals", found), **found.to_json(), "beside_map": beside.to_json()}
-        print_json({**both, "document": dict(file.document)})
+        print_json(record("find-integrals", found, beside_map=beside.to_json()))
         return 3 if found.reason else 0
     every: list[Any] = [*found.integrals, *found.in_iterates]
     named = [(one.name, one, f"{one.origin}: ") for one in every]
@@ -131,19 +123,11 @@ def _count(found: Any) -> str:
     return f"found\t{found.found} functionally independent; {found.count_text}"
 
 
-def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:
-    found = lib.darboux_polynomials(
-        file,
-        options["darboux"],
-        symbols=symbols,
-        eps=eps,
-        **opt.given(options, "flow", "seconds", "seed"),
-        progress=progress,
-    )
-    if options["as_json"]:
-        print_json({**heading("darboux-polynomials", found), **found.to_json(), "document": dict(file.document)})
+def _print_darboux(found: lib.DarbouxSearch, as_json: bool) -> int:
+    if as_json:
+        print_json(record("darboux-polynomials", found))
     else:
-        tell(f"Darboux polynomials: {file.name}{scope(found)}")
+        tell(f"Darboux polynomials: {found.file.name}{scope(found)}")
         tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
     return 3 if found.reason else 0
 

@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
+from kahanmaps_cli.search import asked, print_search, require_one_form, search_options
 from kahanmaps_cli.terminal import tell
 
 
@@ -37,19 +37,10 @@ def command(system: str | None, **options: Any) -> int:
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
         file = opt.load_system(system, options)
-        symbols, eps = symbols_and_eps(options)
-        denominator = None
+        settings, denominator = asked(options), None
         if options["denominator"] is not None:
             denominator = lib.parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
-        found = lib.find_poisson(
-            file,
-            options["degree"],
-            symbols=symbols,
-            eps=eps,
-            denominator=denominator,
-            **opt.given(options, "seconds", "seed"),
-            progress=progress,
-        )
+        found = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=progress)
     print_search("find-poisson", found, options, [(one.name, one, f"{one.statement}; ") for one in found.tensors])
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in found.integrals:
