@@ -31,7 +31,12 @@ from kahanmaps.checks.claims import Evidence as Evidence
 from kahanmaps.checks.claims import Finding as Finding
 from kahanmaps.checks.claims import Report as Report
 from kahanmaps.checks.claims import Verdict as Verdict
+from kahanmaps.checks.claims import combined as combined
+from kahanmaps.checks.commute import check_commute as check_commute
+from kahanmaps.checks.conserve import check_integrals as check_integrals
 from kahanmaps.checks.conserve import known_integrals as known_integrals
+from kahanmaps.checks.preserve import check_measure as check_measure
+from kahanmaps.checks.preserve import check_poisson as check_poisson
 from kahanmaps.checks.settings import Settings as Settings
 from kahanmaps.checks.settings import eps_record as eps_record
 from kahanmaps.checks.settings import eps_words as eps_words
@@ -241,6 +246,7 @@ from kahanmaps.plots.windows import Window as Window
 from kahanmaps.plots.windows import fullest_axes as fullest_axes
 from kahanmaps.plots.windows import require_window as require_window
 from kahanmaps.plots.windows import window_of as window_of
+from kahanmaps.reports.report import report_html as report_html
 from kahanmaps.sources import source as source
 from kahanmaps.systems.quadratic import MAX_DIMENSION as MAX_DIMENSION
 from kahanmaps.systems.quadratic import QuadraticSystem as QuadraticSystem

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli import library as lib
 from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.options import (
     eps_options,
@@ -26,9 +27,6 @@ from kahanmaps_cli.progress import Progress, say
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from kahanmaps.checks.claims import Report
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.documents.files import SystemFile
 
 _ONLY_FOR = {
     "symbolic": ("analyze",),
@@ -136,64 +134,55 @@ def _option_name(name: str) -> str:
 
 
 def _write(html: str, options: dict[str, Any]) -> None:
-    from kahanmaps.whole_files import write_whole
 
     content = html.encode()
     if options["output"] == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
         return
-    write_whole(options["output"], content)
+    lib.write_whole(options["output"], content)
     if not options["quiet"]:
         say(f"{options['output']}: {len(content)} bytes")
 
 
 def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tuple[str, int]:
     """The page, and the exit status."""
-    from kahanmaps.checks.settings import Settings
-    from kahanmaps.reports.report import report_html
-
     how: dict[str, Any] = {
         "title": options["title"],
         "pictures": not options["no_pictures"],
         "command": command_line(),
     }
     if options["db"] is not None:
-        from kahanmaps.experiments.store import Store
-
-        with Store.open(options["db"], readonly=True) as store:
+        with lib.Store.open(options["db"], readonly=True) as store:
             by = [name.strip() for name in (options["by"] or "").split(",") if name.strip()]
-            return report_html(store, by=by, values=options["values"], **how), 0
+            return lib.report_html(store, by=by, values=options["values"], **how), 0
     if options["source"] == "analyze":
         return _analysis(system, options, progress, how)
     file = _system_or_member(system, options)
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    settings = Settings(eps=eps, seed=options["seed"], progress=progress)
+    settings = lib.Settings(eps=eps, seed=options["seed"], progress=progress)
     left_out: list[str] = []
     if options["source"] == "verify":
-        from kahanmaps.paper.verifier import VerifyOptions
-        from kahanmaps.paper.verify import verify
-
-        reports = [verify(file, settings, VerifyOptions(options["sections"] or None))]
+        reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
     else:
         reports, left_out = _checks(file, settings)
     progress("the page")
-    return report_html(reports, file=file, left_out=left_out, **how), _status(reports)
+    return lib.report_html(reports, file=file, left_out=left_out, **how), _status(reports)
 
 
 def _analysis(system: str | None, options: dict[str, Any], progress: Progress, how: dict[str, Any]) -> tuple[str, int]:
-    from kahanmaps.laboratory.analysis import analyze
-    from kahanmaps.reports.report import report_html
     from kahanmaps_cli.search import symbols_and_eps
 
     symbols, eps = symbols_and_eps(options)
     file = load_system(system, options)
-    found = analyze(file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress)
+    found = lib.analyze(
+        file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress
+    )
     progress("the page")
-    return report_html(found, explore=options["explore"], **how), 3 if found.conclusion.kind == "undecided" else 0
+    return lib.report_html(found, explore=options["explore"], **how), 3 if found.conclusion.kind == "undecided" else 0
 
 
-def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile:
+def _system_or_member(system: str | None, options: dict[str, Any]) -> lib.SystemFile:
     """The system that is named; for verify, and where one is to be drawn, a member of the family."""
     is_drawn = any(options[name] is not None and options[name] is not False for name in DRAWN)
     named = system is not None or options["variables"] or options["rhs"]
@@ -202,34 +191,28 @@ def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile
     return drawn_file(options)
 
 
-def _checks(file: SystemFile, settings: Settings) -> tuple[list[Report], list[str]]:
+def _checks(file: lib.SystemFile, settings: lib.Settings) -> tuple[list[lib.Report], list[str]]:
     """The reports of the checks that apply, and a sentence for each that does not."""
-    from kahanmaps.checks.commute import check_commute
-    from kahanmaps.checks.conserve import check_integrals
-    from kahanmaps.checks.preserve import check_measure, check_poisson
-    from kahanmaps.errors import InputError
-
-    checks: dict[str, Callable[[], Report]] = {
-        "check-integrals": lambda: check_integrals(file, settings),
-        "check-measure": lambda: check_measure(file, settings),
-        "check-poisson": lambda: check_poisson(file, settings),
-        "check-commute": lambda: check_commute(file, None, settings),
+    checks: dict[str, Callable[[], lib.Report]] = {
+        "check-integrals": lambda: lib.check_integrals(file, settings),
+        "check-measure": lambda: lib.check_measure(file, settings),
+        "check-poisson": lambda: lib.check_poisson(file, settings),
+        "check-commute": lambda: lib.check_commute(file, None, settings),
     }
-    reports: list[Report] = []
+    reports: list[lib.Report] = []
     left_out: list[str] = []
     for name, check in checks.items():
         settings.progress(name)
         try:
             reports.append(check())
-        except InputError as error:
+        except lib.InputError as error:
             left_out.append(f"{name} does not apply: {error}")
     if not reports:
-        raise InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
+        raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
     return reports, left_out
 
 
-def _status(reports: list[Report]) -> int:
-    from kahanmaps.checks.claims import Verdict, combined
+def _status(reports: list[lib.Report]) -> int:
 
-    verdict = combined(report.verdict for report in reports)
-    return {Verdict.REFUTED: 1, Verdict.UNDECIDED: 3}.get(verdict, 0)
+    verdict = lib.combined(report.verdict for report in reports)
+    return {lib.Verdict.REFUTED: 1, lib.Verdict.UNDECIDED: 3}.get(verdict, 0)
