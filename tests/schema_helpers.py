@@ -21,6 +21,11 @@ def mistakes(name: str, data: Any) -> list[str]:
     return [f"{error.json_path}: {error.message[:300]}" for error in validator(name).iter_errors(data)]
 
 
+def is_wrong(name: str, data: Any) -> bool:
+    """Whether anything is wrong with data: as soon as one mistake is found."""
+    return not validator(name).is_valid(data)
+
+
 def schema_of(line: str) -> str:
     """The schema of what a command line prints."""
     words = line.split()

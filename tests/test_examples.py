@@ -36,29 +36,18 @@ def test_an_example_prints_what_stands_beside_it(script, tmp_path):
     assert done.stdout == script.with_suffix(".out").read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory):
-    """The demo run in a folder of its own (it writes beside the folder it is in): the outcome and that folder."""
-    home = tmp_path_factory.mktemp("demo")
-    (home / "examples").mkdir()
-    (home / "bin").mkdir()
-    shutil.copy(EXAMPLES / "demo.sh", home / "examples")
-    command = home / "bin" / "kahanmaps"
+def test_the_demo_proves_what_it_promises_and_leaves_files_to_play_with(tmp_path):
+    # It writes beside the folder it is in. One test, so that only one process runs it.
+    (tmp_path / "examples").mkdir()
+    (tmp_path / "bin").mkdir()
+    shutil.copy(EXAMPLES / "demo.sh", tmp_path / "examples")
+    command = tmp_path / "bin" / "kahanmaps"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m kahanmaps_cli.main "$@"\n')
     command.chmod(0o755)
-    path = f"{home / 'bin'}{os.pathsep}{os.environ['PATH']}"
-    script = ["bash", str(home / "examples" / "demo.sh")]
-    return subprocess.run(script, env={**os.environ, "PATH": path}, capture_output=True, text=True), home
-
-
-def test_the_demo_runs_through(demo):
-    assert demo[0].returncode == 0, demo[0].stderr
-
-
-def test_the_demo_proves_what_it_promises(demo):
-    assert "verdict\tproved" in demo[0].stdout
-    assert "refuted (as expected)" in demo[0].stdout
-
-
-def test_the_demo_leaves_files_to_play_with(demo):
-    assert {"pair.toml", "pair-ppp.toml", "pair-pmm.toml"} <= {path.name for path in (demo[1] / ".demo").iterdir()}
+    path = f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    script = ["bash", str(tmp_path / "examples" / "demo.sh")]
+    done = subprocess.run(script, env={**os.environ, "PATH": path}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "verdict\tproved" in done.stdout
+    assert "refuted (as expected)" in done.stdout
+    assert {"pair.toml", "pair-ppp.toml", "pair-pmm.toml"} <= {path.name for path in (tmp_path / ".demo").iterdir()}

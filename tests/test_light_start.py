@@ -10,7 +10,7 @@ import json
 import subprocess
 import sys
 
-HEAVY = {"numpy", "flint", "rich", "numba", "matplotlib", "pydantic", "distributed"}
+HEAVY = {"numpy", "flint", "rich", "numba", "matplotlib", "distributed"}
 
 COMMAND = """
 from kahanmaps_cli.main import main
@@ -39,7 +39,7 @@ def test_an_exact_orbit_does_not_load_numpy():
     inline = ["--vars", "x,y", "--rhs", "y", "--rhs", "-x"]
     arguments = ["orbit", *inline, "--start", "1,0", "--eps", "1/10", "--steps", "2"]
     loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
-    assert loaded & {"numpy", "numba", "matplotlib", "pydantic", "distributed"} == set()
+    assert loaded & {"numpy", "numba", "matplotlib", "distributed"} == set()
     assert "flint" in loaded
 
 
@@ -69,4 +69,4 @@ def test_a_dry_run_of_a_batch_loads_no_numpy(tmp_path):
     arguments = ["batch", "run", str(spec), "--dry-run"]
     loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
     assert loaded & {"numpy", "numba", "distributed", "pyarrow", "matplotlib"} == set()
-    assert {"flint", "pydantic"} <= loaded
+    assert "flint" in loaded

@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 import subprocess
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,14 @@ def files_of_the_project() -> list[Path]:
 def python_files(*folders: str) -> list[Path]:
     """The Python files below some folders of the project."""
     return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+
+
+def opens_with_a_docstring(path: Path) -> bool:
+    """Whether a text is the first statement of a file; all other lines are left unread."""
+    remarks = (tokenize.COMMENT, tokenize.NL)
+    with tokenize.open(path) as lines:
+        tokens = tokenize.generate_tokens(lines.readline)
+        return next(token for token in tokens if token.type not in remarks).type == tokenize.STRING
 
 
 def undocumented(source: str) -> list[str]:
@@ -57,11 +66,16 @@ def test_a_folder_below_another_one_is_not_taken_for_a_machines(before):
 
 
 def test_every_python_file_starts_with_a_docstring():
-    silent = []
-    for path in python_files(*CODE):
-        if not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))):
-            silent.append(str(path.relative_to(ROOT)))
+    silent = [str(path.relative_to(ROOT)) for path in python_files(*CODE) if not opens_with_a_docstring(path)]
     assert not silent, f"files that do not open by saying what they are: {silent}"
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"), [("# a\n\n'One.'\n", True), ("import re\n'One.'\n", False), ("", False)]
+)
+def test_a_file_without_a_docstring_is_found(source, expected, tmp_path):
+    (tmp_path / "a.py").write_text(source)
+    assert opens_with_a_docstring(tmp_path / "a.py") == expected
 
 
 def test_every_public_function_and_class_of_the_library_has_a_docstring():
@@ -88,3 +102,7 @@ def test_every_test_that_is_left_to_the_thorough_runs_exists():
     for line in (ROOT / "tests" / "thorough.txt").read_text(encoding="utf-8").splitlines():
         path, name = line.split("[")[0].split("::")
         assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), line
+
+
+def test_of_a_test_whose_cases_are_left_to_the_thorough_runs_others_run_each_day(wrongly_left):
+    assert wrongly_left == []

@@ -66,6 +66,7 @@ class Copy:
         os.close(asked[0])
         os.close(answer[1])
         self.ask, self.answers = os.fdopen(asked[1], "w"), os.fdopen(answer[0])
+        self.has_collected = False
 
     def close(self) -> None:
         """Let the waiting pytest end."""
@@ -75,6 +76,9 @@ class Copy:
 
     def tried(self, file: str, source: str, line: int, tests: list[str], seconds: Seconds, again: bool) -> str:
         """What saw the mutant, "" for nothing; `again` where a new pytest is to try what nothing has seen."""
+        if not self.has_collected:  # what it collects has to be the unchanged project
+            self.answers.readline()
+            self.has_collected = True
         path = self.root / file
         times = path.stat()
         try:
@@ -175,6 +179,7 @@ def pytest_runtestloop(session: pytest.Session) -> bool:
     del known
     gc.freeze()
     with os.fdopen(asked) as requests, os.fdopen(answer, "w") as answers:
+        print("collected", file=answers, flush=True)
         for request in requests:
             file, line, tests, patience = json.loads(request)
             code = changed(Path(file), line)

@@ -32,14 +32,11 @@ from kahanmaps.checks.claims import Finding as Finding
 from kahanmaps.checks.claims import Report as Report
 from kahanmaps.checks.claims import Verdict as Verdict
 from kahanmaps.checks.claims import combined as combined
-from kahanmaps.checks.commute import check_commute as check_commute
-from kahanmaps.checks.conserve import check_integrals as check_integrals
 from kahanmaps.checks.conserve import known_integrals as known_integrals
-from kahanmaps.checks.preserve import check_measure as check_measure
-from kahanmaps.checks.preserve import check_poisson as check_poisson
 from kahanmaps.checks.settings import Settings as Settings
 from kahanmaps.checks.settings import eps_record as eps_record
 from kahanmaps.checks.settings import eps_words as eps_words
+from kahanmaps.checks.table import CHECKS as CHECKS
 from kahanmaps.display.experiments import summary_markdown as summary_markdown
 from kahanmaps.display.laboratory import analysis_head as analysis_head
 from kahanmaps.display.laboratory import analysis_title as analysis_title
@@ -166,7 +163,6 @@ from kahanmaps.maps.floats.lyapunov import lyapunov_exponents as lyapunov_expone
 from kahanmaps.maps.floats.stream import NpyFile as NpyFile
 from kahanmaps.maps.implicit import det_of as det_of
 from kahanmaps.maps.kahan import Kahan as Kahan
-from kahanmaps.maps.kahan import KahanMap as KahanMap
 from kahanmaps.maps.kernels import processors as processors
 from kahanmaps.maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from kahanmaps.maps.normal_form.division import text_in_gamma as text_in_gamma

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kahanmaps.checks.table import CHECKS
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
@@ -37,12 +38,7 @@ SECTIONS = {
         "period": ("period", "The exact period of an orbit, modulo p or over Q."),
         "ensemble": ("ensemble", "Many orbits at once, in machine numbers or modulo p."),
     },
-    "Checks": {
-        "check-commute": ("check_commute", "Do two Kahan maps commute?"),
-        "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
-        "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),
-        "check-poisson": ("check_poisson", "Is J - eps^2 f'(x)^2 J, or a given tensor, invariant?"),
-    },
+    "Checks": {name: ("check", check.question) for name, check in CHECKS.items()},
     "Laboratory": {
         "analyze": ("analyze", "What a map preserves, how it grows: all of it, a verdict."),
         "degrees": ("degrees", "Degrees of the iterates, recurrence, dynamical degree."),
@@ -114,7 +110,7 @@ class LazyGroup(SuggestingGroup):
         if cmd_name not in COMMANDS:
             return None
         module = import_module(f"kahanmaps_cli.commands.{COMMANDS[cmd_name][0]}")
-        command: click.Command = module.command
+        command: click.Command = module.command(cmd_name) if cmd_name in CHECKS else module.command
         return with_colour_option(with_our_rules(command))
 
     def hint(self, written: str, known: list[str]) -> str:

@@ -137,11 +137,11 @@ backward_option: Callable[[F], F] = click.option(
 )
 
 
-def integral_option(help_text: str) -> Callable[[F], F]:
+def integral_option(help_text: str, flag: str = "--integral", into: str = "integrals") -> Callable[[F], F]:
     """--integral [NAME=]EXPR, repeatable; pairs of a name, which may be empty, and an expression."""
     return click.option(
-        "--integral",
-        "integrals",
+        flag,
+        into,
         type=NameValue(name_is_optional=True),
         multiple=True,
         metavar="[NAME=]EXPR",

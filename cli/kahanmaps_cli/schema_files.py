@@ -9,10 +9,12 @@ import json
 from importlib.resources import files
 from typing import Any
 
+from kahanmaps.checks.table import CHECKS
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 # Commands whose output has no schema of the command's own name.
 ALIASES = {
-    **{f"check-{what}": "check" for what in ("commute", "integrals", "measure", "poisson")},
+    **dict.fromkeys(CHECKS, "check"),
     "family-new": "system-file",
 }
 

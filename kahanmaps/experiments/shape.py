@@ -1,4 +1,4 @@
-"""The shape of a spec, checked by pydantic: which keys there are and what kind of value each has.
+"""The shape of a spec, which spec.schema.json describes: which keys there are and what kind of value each has.
 
 What the values mean depends on the task and is not checked here. Whoever reads the meaning of a part asks the document
 for it, and tells it what is wrong.
@@ -6,13 +6,12 @@ for it, and tells it what is wrong.
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
+from typing import Any
 
 from kahanmaps.errors import show, suggestion
 
@@ -68,44 +67,20 @@ def _read_system(value: Any) -> Any:
     return value
 
 
-def _amount(units: Mapping[str, int]) -> WithJsonSchema:
-    """How a schema says what `_with_unit` reads."""
-    number = r"\s*[0-9]{1,18}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?\s*"
-    text = {"type": "string", "pattern": f"^({number}({'|'.join(units)})?\\s*|{_NONE})$"}
-    return WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, text]})
+# What has more than a type, by its format in the schema; each raises ValueError with a sentence.
+_READERS: Mapping[str, Callable[[Any], Any]] = {
+    "systems": _read_system,
+    "time-limit": read_time,
+    "memory-limit": read_memory,
+}
+_TYPES: Mapping[str, type] = {"string": str, "integer": int, "array": list, "object": dict}
+_OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
-_TEXT = {"type": "string", "minLength": 1}
-_SYSTEM_SCHEMA = WithJsonSchema({"anyOf": [_TEXT, {"type": "array", "items": _TEXT, "minItems": 1}]})
-
-
-class _Shape(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class _LimitsShape(_Shape):
-    time: Annotated[Any, BeforeValidator(read_time), _amount(_TIME_UNITS)] = Field(
-        default=None, description="seconds, or a text like 90 s"
-    )
-    memory: Annotated[Any, BeforeValidator(read_memory), _amount(_MEMORY_UNITS)] = Field(
-        default=None, description="bytes, or a text like 2 GB"
-    )
-    digits: int | None = Field(default=None, ge=1, le=2**63 - 1, description="a whole number of digits, at least 1")
-
-
-class _ExperimentShape(_Shape):
-    task: str = Field(description="the name of a task, e.g. check-commute")
-    system: Annotated[Any, BeforeValidator(_read_system), _SYSTEM_SCHEMA] = Field(default=None, description=_SYSTEM)
-    options: dict[str, Any] = Field(default={}, description="a table of options with their values")
-    axes: dict[str, Any] = Field(default={}, description="a table of options with lists or ranges of values")
-    zip: list[list[str]] = Field(default=[], description='a list of lists of axes, e.g. [["m", "steps"]]')
-    limits: _LimitsShape | None = Field(default=None, description="a table with time, memory, digits")
-
-
-class _SpecShape(_Shape):
-    name: str = Field(default="", description="text")
-    limits: _LimitsShape | None = Field(default=None, description="a table with time, memory, digits")
-    experiments: dict[str, _ExperimentShape] = Field(min_length=1, description="at least one table [experiments.NAME]")
+def shape_schema() -> dict[str, Any]:
+    """The shape of a spec as a JSON schema, which is what a spec is checked against."""
+    found: dict[str, Any] = json.loads(Path(__file__).with_name("spec.schema.json").read_text(encoding="ascii"))
+    return found
 
 
 def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
@@ -114,46 +89,55 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
     """
-    try:
-        _SpecShape.model_validate(document)
-    except ValidationError as error:
-        return [_mistake(detail) for detail in error.errors(include_url=False)]
-    return []
+    schema = shape_schema()
+    found = _mistakes(document, schema, (), schema["$defs"], "")
+    return [(place, key_of(place), sentence) for place, sentence in found]
 
 
-_OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
+def _mistakes(
+    value: Any, shape: Mapping[str, Any], place: Place, shared: Mapping[str, Any], expected: str
+) -> Iterator[tuple[Place, str]]:
+    """The places in a value that are not as a part of the schema says, and what is wrong there."""
+    shape = shared.get(shape.get("$ref", "").rpartition("/")[2], shape)
+    expected = shape.get("description", expected)
+    if reader := _READERS.get(shape.get("format", "")):
+        try:
+            reader(value)
+        except ValueError as error:
+            yield place, str(error)
+        return
+    is_right = isinstance(value, _TYPES[shape["type"]]) and not isinstance(value, bool)
+    if is_right and isinstance(value, int):
+        is_right = shape["minimum"] <= value <= shape["maximum"]
+    if not is_right or (isinstance(value, dict) and len(value) < shape.get("minProperties", 0)):
+        yield place, f"found {show(value)}, expected {expected}"
+    elif isinstance(value, list):
+        for k, item in enumerate(value):
+            yield from _mistakes(item, shape["items"], (*place, k), shared, expected)
+    elif isinstance(value, dict):
+        yield from _mistakes_of_table(value, shape, place, shared)
 
 
-def shape_schema() -> dict[str, Any]:
-    """The shape as a JSON schema, with the parts `_ExperimentShape` and `_LimitsShape`."""
-    return _SpecShape.model_json_schema()
-
-
-def _mistake(detail: Any) -> tuple[Place, str, str]:
-    place: Place = detail["loc"]
-    shape, name = _field(place)
-    field = shape.model_fields.get(name)
-    expected = f"expected {field.description if field and field.description else 'a table'}"
-    if detail["type"] == "extra_forbidden":
-        known = list(shape.model_fields)
-        hint = " (a system file is for the other commands)" if place in _OF_SYSTEM_FILES else suggestion(name, known)
-        sentence = f"unknown key, expected one of {', '.join(known)}{hint}"
-    elif detail["type"] == "missing":
-        sentence = f"missing, {expected}"
-    elif detail["type"] == "value_error":  # ours, a sentence already
-        sentence = str(detail["ctx"]["error"])
-    else:
-        sentence = f"found {show(detail['input'])}, {expected}"
-    return place, key_of(place), sentence
-
-
-def _field(place: Place) -> tuple[type[BaseModel], str]:
-    """The shape that a place belongs to, and the name of its field."""
-    keys = [str(part) for part in place]
-    shape: type[BaseModel] = _SpecShape
-    if keys[0] == "experiments" and len(keys) > 1:
-        shape, keys = (_ExperimentShape, keys[2:]) if len(keys) > 2 else (shape, [""])
-    return (_LimitsShape, keys[1]) if keys[0] == "limits" and len(keys) > 1 else (shape, keys[0])
+def _mistakes_of_table(
+    table: Mapping[str, Any], shape: Mapping[str, Any], place: Place, shared: Mapping[str, Any]
+) -> Iterator[tuple[Place, str]]:
+    known, others = shape.get("properties", {}), shape.get("additionalProperties", True)
+    for name, part in known.items():
+        if name in table:
+            yield from _mistakes(table[name], part, (*place, name), shared, "")
+        elif name in shape.get("required", ()):
+            yield (*place, name), f"missing, expected {part['description']}"
+    for name in (name for name in table if name not in known):
+        here = (*place, name)
+        if isinstance(others, dict):
+            yield from _mistakes(table[name], others, here, shared, "")
+        elif not others:
+            hint = (
+                " (a system file is for the other commands)"
+                if here in _OF_SYSTEM_FILES
+                else suggestion(name, list(known))
+            )
+            yield here, f"unknown key, expected one of {', '.join(known)}{hint}"
 
 
 def key_of(place: Place) -> str:

@@ -25,7 +25,6 @@ shape.py.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -136,15 +135,13 @@ def spec_schema() -> dict[str, Any]:
     >>> "orbit" in spec_schema()["$defs"]["experiment"]["properties"]["task"]["enum"]
     True
     """
-    found: dict[str, Any] = _untitled(shape_schema())
-    text = json.dumps(found).replace("_ExperimentShape", "experiment").replace("_LimitsShape", "limits")
-    found = json.loads(text)
+    found = shape_schema()
     found["properties"]["experiments"]["propertyNames"] = {"pattern": f"^{EXPERIMENT_NAME}$"}
     experiment = found["$defs"]["experiment"]["properties"]
     experiment["task"]["enum"] = sorted(task_kinds())
     experiment["options"] |= _table(_VALUE)
     experiment["axes"] |= _table(_VALUES)
-    return {"description": "Experiments, each a task for many systems and many values of its options.", **found}
+    return found
 
 
 def _table(value: dict[str, Any]) -> dict[str, Any]:
@@ -161,10 +158,3 @@ def _table(value: dict[str, Any]) -> dict[str, Any]:
         "patternProperties": {f"^{PARAMETERS.replace('.', '[.]')}": value},
         "additionalProperties": False,
     }
-
-
-def _untitled(part: Any) -> Any:
-    """Without the titles that pydantic makes of the names of fields."""
-    if isinstance(part, dict):
-        return {key: _untitled(value) for key, value in part.items() if not (key == "title" and isinstance(value, str))}
-    return [_untitled(item) for item in part] if isinstance(part, list) else part

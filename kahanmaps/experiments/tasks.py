@@ -7,7 +7,6 @@ Results are small: counts, verdicts, numbers, and what a refutation needs to be 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable
 from hashlib import sha256
 from typing import Any
 
@@ -17,10 +16,9 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
-from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
-from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
+from kahanmaps.checks.table import CHECKS, Check
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, Whole, fields, task
@@ -55,8 +53,8 @@ def commute(
     return _of_report(check_commute(system, other, settings, eps2))
 
 
-def _of_one_system(name: str, check: Callable[[SystemFile, Settings], Report], question: str) -> None:
-    """The task of a check that asks `question` of one system, with the usual settings."""
+def _of_one_system(check: Check) -> None:
+    """The task of a check that asks something of one system, with the usual settings."""
 
     def perform(
         system: SystemFile,
@@ -69,13 +67,13 @@ def _of_one_system(name: str, check: Callable[[SystemFile, Settings], Report], q
     ) -> Whole:
         return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)))
 
-    perform.__doc__ = question
-    task(name, reports=True)(perform)
+    perform.__doc__ = check.for_batch or check.question
+    task(check.command, reports=True)(perform)
 
 
-_of_one_system("check-integrals", check_integrals, "Are the known or claimed integrals conserved?")
-_of_one_system("check-measure", check_measure, "Is the measure dx/phi invariant?")
-_of_one_system("check-poisson", check_poisson, "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?")
+for _check in CHECKS.values():
+    if not _check.is_of_pair:
+        _of_one_system(_check)
 
 
 @task("verify", needs=MEMBER, reports=True)

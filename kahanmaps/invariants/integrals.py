@@ -10,6 +10,7 @@ Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH).
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,15 +21,41 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 
-class ModifiedHamiltonian(PhaseFunction):
+class ImageFunction(PhaseFunction):
+    """A function of x and of its image x~ under the Kahan map of J grad H."""
+
+    def __init__(self, hamiltonian: CubicHamiltonian) -> None:
+        self.hamiltonian = hamiltonian
+        self.map = Kahan(hamiltonian.system)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        return self.of_image(self.map.at(eps, field), point)
+
+    @abstractmethod
+    def of_image(self, phi: MapOver, point: Sequence[Any]) -> Any:
+        """The value at a point, phi being the map over a field."""
+
+
+def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: MapOver, point: Sequence[Any]) -> Any:
+    """H + grad H . (x~ - x)/3 at a point, for any map."""
+    field, image = phi.field, phi.step(point)
+    with field.working():
+        total = field.zero
+        for x, after, slope in zip(point, image, gradient, strict=True):
+            total = total + evaluate(slope, field, point) * (after - x)
+        return evaluate(H, field, point) + total * field.convert(fmpq(1, 3))
+
+
+class ModifiedHamiltonian(ImageFunction):
     """H + grad H . (x~ - x)/3, which tends to H as eps -> 0; x~ is the image under the Kahan map of J grad H."""
 
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
-        self.hamiltonian = hamiltonian
+        super().__init__(hamiltonian)
         self.name = f"modified {letter}"
         self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f, f = J grad {letter}"
 
@@ -36,22 +63,17 @@ class ModifiedHamiltonian(PhaseFunction):
     def subject(self) -> tuple[Any, ...]:
         return ("modified", self.hamiltonian.H, self.hamiltonian.J)
 
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
-        with field.working():
-            total = field.zero
-            for x, after, slope in zip(point, image, self.hamiltonian.gradient, strict=True):
-                total = total + evaluate(slope, field, point) * (after - x)
-            return evaluate(self.hamiltonian.H, field, point) + total * field.convert(fmpq(1, 3))
+    def of_image(self, phi: MapOver, point: Sequence[Any]) -> Any:
+        return modified(self.hamiltonian.H, self.hamiltonian.gradient, phi, point)
 
 
-class PaperIntegral(PhaseFunction):
+class PaperIntegral(ImageFunction):
     """The paper's H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2), for homogeneous H and J = [[0, I], [-I, 0]]."""
 
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H", index: str = "") -> None:
         if not (hamiltonian.is_homogeneous and hamiltonian.is_standard):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
-        self.hamiltonian = hamiltonian
+        super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
         # x^, as in the paper: the map need not be the one whose integral this is, but another of its class.
         self.formula = (
@@ -63,17 +85,17 @@ class PaperIntegral(PhaseFunction):
     def subject(self) -> tuple[Any, ...]:
         return ("paper", self.hamiltonian.H)
 
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
+    def of_image(self, phi: MapOver, point: Sequence[Any]) -> Any:
+        image = phi.step(point)
         m = len(image) // 2
-        with field.working():
-            total = field.zero
+        with phi.field.working():
+            total = phi.field.zero
             for i in range(m):
                 total = total + point[i] * image[m + i] - point[m + i] * image[i]
-            return total / field.convert(eps)
+            return total / phi.eps
 
 
-class CommutantIntegral(PhaseFunction):
+class CommutantIntegral(ImageFunction):
     """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x): rational whatever the roots of chi are.
 
     With C = I this is H~; for k < m these span the same space as the K~_s of all associated systems, over the
@@ -81,7 +103,7 @@ class CommutantIntegral(PhaseFunction):
     """
 
     def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
-        self.hamiltonian = hamiltonian
+        super().__init__(hamiltonian)
         self.matrix = (A**power).transpose()
         self.name = f"{letter}~_{power}"
         self.formula = f"{self.name} = eps^(-1) x^T J {'A^T' if power == 1 else f'(A^T)^{power}'} x~"
@@ -90,11 +112,11 @@ class CommutantIntegral(PhaseFunction):
     def subject(self) -> tuple[Any, ...]:
         return ("commutant", self.hamiltonian.H, self.hamiltonian.J, self.matrix)
 
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
+    def of_image(self, phi: MapOver, point: Sequence[Any]) -> Any:
+        field, image = phi.field, phi.step(point)
         with field.working():
             column = field.convert_matrix(self.hamiltonian.J * self.matrix) * field.column(image)
-            return (field.column(point).transpose() * column)[0, 0] / field.convert(eps)
+            return (field.column(point).transpose() * column)[0, 0] / phi.eps
 
 
 class ClaimedIntegral(ClaimedFunction):

@@ -21,7 +21,7 @@ from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
 from kahanmaps.maps.implicit import MapOver
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -33,14 +33,14 @@ class DeterminantDensity(PhaseFunction):
     # No condition: it is 1 at eps = 0, and where it is 0 at an eps, the map has no value and nothing is claimed.
 
     def __init__(self, system: QuadraticSystem) -> None:
-        self.system = system
+        self.map = Kahan(system)
 
     @property
     def subject(self) -> tuple[Any, ...]:
-        return (self.formula, self.system.rhs)
+        return (self.formula, self.map.system.rhs)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        return KahanMap(self.system, eps, field).determinant(point)
+        return self.map.at(eps, field).determinant(point)
 
 
 class ClaimedDensity(ClaimedFunction):

@@ -90,8 +90,8 @@ def test_a_batch_runs_and_says_where_the_results_are(batch):
     assert Path("study.db").exists()
 
 
+@pytest.mark.usefixtures("space")
 def test_the_second_run_has_nothing_to_do(batch):
-    batch("run", SPACE)
     done = batch("run", SPACE)
     assert done.status == 0
     assert done.err == "nothing to do: every task has a result in study.db\n"
@@ -391,7 +391,11 @@ def test_a_second_ctrl_c_is_immediate(batch):
     process = subprocess.Popen(
         [*COMMAND, "batch", "run", "study.toml", "-j", "2"], stderr=subprocess.PIPE, text=True, env=environment()
     )
-    time.sleep(2)
+    children = ["pgrep", "-cP", str(process.pid)]
+    while subprocess.run(children, capture_output=True, text=True).stdout.strip() != "2":
+        assert process.poll() is None
+        time.sleep(0.1)
+    time.sleep(1)
     process.send_signal(signal.SIGINT)
     time.sleep(0.5)
     assert process.poll() is None  # waits for the tasks in flight

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from cli_helpers import Outcome
 from helpers import table
-from schema_helpers import mistakes, schema_of
+from schema_helpers import is_wrong, mistakes, schema_of
 
 Run = Callable[..., Outcome]
 
@@ -112,17 +112,17 @@ def test_a_key_left_out_added_or_a_misspelt_verdict_is_refused(lines: Callable[[
         for place in list(_objects(one)):
             spoilt = copy.deepcopy(one)
             _at(spoilt, place)["surprise"] = 1
-            assert mistakes(name, spoilt), ("surprise", place)
+            assert is_wrong(name, spoilt), ("surprise", place)
             for key in _at(one, place):
                 is_detail = {"evidence", "also"} & set(place) and key not in OF_EVIDENCE
                 if is_detail or key in AT_WILL.get(name, ()):
                     continue
                 spoilt = copy.deepcopy(one)
                 del _at(spoilt, place)[key]
-                assert mistakes(name, spoilt), (key, place)
+                assert is_wrong(name, spoilt), (key, place)
                 if key == "verdict" and isinstance(_at(one, place)[key], str):
                     _at(spoilt, place)[key] = "proven"
-                    assert mistakes(name, spoilt), (key, place)
+                    assert is_wrong(name, spoilt), (key, place)
 
 
 def _objects(data: Any, place: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:

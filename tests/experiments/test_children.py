@@ -59,13 +59,23 @@ def outcome_of(job: Job) -> Record:
     return records[job.task.key]
 
 
-@pytest.fixture(scope="module")
-def faulty() -> dict[int, Record]:
+def among_others(orders: list[int]) -> dict[int, Record]:
     """What became of a task of each fault, in one batch, with as many between them that are done."""
-    orders = [order for order in range(1, 22) if order not in (HANG, 16)]
     records = done([fault(order, seed) for order in orders for seed in (0, 1)])
     assert all(records[fault(order, 0).task.key].is_ok for order in orders)
     return {order: records[fault(order).task.key] for order in orders}
+
+
+@pytest.fixture(scope="module")
+def faulty() -> dict[int, Record]:
+    """Every fault but that of a child that hangs."""
+    return among_others([order for order in range(1, 22) if order not in (HANG, 16)])
+
+
+@pytest.fixture(scope="module")
+def few() -> dict[int, Record]:
+    """A fault of each kind: a signal, want of memory, a bug, a large answer, and what is started and left."""
+    return among_others([KILL, FLINT_BOMB, BUG, LARGE, STARTER])
 
 
 @pytest.mark.parametrize(
@@ -111,17 +121,28 @@ def test_the_time_of_one_task_is_not_that_of_its_group():
     assert all(record.is_ok for record in records.values())  # 1.8 seconds in one child
 
 
-def test_the_end_of_what_a_dying_child_printed_is_kept(faulty):
-    assert faulty[KILL].stderr == "about to die of 9"
-    assert "Unable to allocate memory" in faulty[FLINT_BOMB].stderr
+def test_faults_of_each_kind_are_told_of_their_tasks_alone(few):
+    kinds = {order: record.outcome for order, record in few.items()}
+    assert kinds == {
+        KILL: Outcome.LOST,
+        FLINT_BOMB: Outcome.OUT_OF_MEMORY,
+        BUG: Outcome.FAILED,
+        LARGE: Outcome.OK,
+        STARTER: Outcome.OK,
+    }
 
 
-def test_what_a_bug_leaves_is_the_end_of_its_traceback(faulty):
-    assert faulty[BUG].stderr.rstrip().endswith("ZeroDivisionError: integer division or modulo by zero")
+def test_the_end_of_what_a_dying_child_printed_is_kept(few):
+    assert few[KILL].stderr == "about to die of 9"
+    assert "Unable to allocate memory" in few[FLINT_BOMB].stderr
 
 
-def test_what_a_task_has_started_ends_with_its_child(faulty):
-    result = faulty[STARTER].result
+def test_what_a_bug_leaves_is_the_end_of_its_traceback(few):
+    assert few[BUG].stderr.rstrip().endswith("ZeroDivisionError: integer division or modulo by zero")
+
+
+def test_what_a_task_has_started_ends_with_its_child(few):
+    result = few[STARTER].result
     assert result is not None
     deadline = time.monotonic() + 5
     while is_running(result["pid"]) and time.monotonic() < deadline:
@@ -145,8 +166,8 @@ def test_an_error_nobody_expected_is_tried_again_in_a_new_child():
     assert all(record.is_ok for record in done(jobs, children=1).values())
 
 
-def test_answers_of_megabytes_come_whole(faulty):
-    result = faulty[LARGE].result
+def test_answers_of_megabytes_come_whole(few):
+    result = few[LARGE].result
     assert result is not None
     assert result["digits"] == "7" * 3_000_000
 

@@ -371,3 +371,9 @@ def test_more_tasks_may_be_allowed_and_are_not_enumerated():
     assert experiment[10**18].options["seed"] == 10**18
     assert [task.options["seed"] for task in islice(experiment.tasks(), 2)] == [0, 1]
     assert len(experiment.definition) < 1000
+
+
+@pytest.mark.parametrize("name", ["time", "memory", "system", "digits", "limits"])
+def test_an_experiment_may_be_called_as_a_key_is(name: str):
+    table = f'[experiments.{name}]\ntask = "family-space"\nsystem = "family"\naxes = {{m = "2..3"}}'
+    assert [experiment.name for experiment in parse_spec(table).experiments] == [name]

@@ -52,7 +52,7 @@ def test_an_algebraic_parameter_is_an_argument_of_the_functions():
     for t, is_it in ((sympy.sqrt(2), True), (-sympy.sqrt(2), True), (sympy.Integer(2), False)):
         image = made["kahan_map"](x, sympy.Rational(1, 4), t)
         wanted = [sympy.sympify(entry).subs("t", t) for entry in point]
-        assert all(sympy.simplify(a - b) == 0 for a, b in zip(image, wanted, strict=True)) is is_it
+        assert all(sympy.expand(sympy.radsimp(a - b)) == 0 for a, b in zip(image, wanted, strict=True)) is is_it
     for language in LANGUAGES:
         assert "a1" in convert(file, language)
     with pytest.raises(km.InputError, match="found symbols beside a root"):

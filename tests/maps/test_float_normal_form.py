@@ -424,7 +424,7 @@ def plane(abcd, U, V):
     return ((1 + B) * U + C * V) / w, ((1 - B) * V - A * U) / w, w, A * C, (A * U + 2 * B * V) * U + C * V * V
 
 
-def parts(*numbers):
+def parts_of(*numbers):
     return [part for number in map(complex, numbers) for part in (number.real, number.imag)]
 
 
@@ -434,7 +434,7 @@ def test_a_real_step_is_that_of_the_formulas(name):
     for _ in range(20):
         U, V = rng.uniform(-2, 2), rng.uniform(-2, 2)
         *step, h = plane(BLOCKS[name], U, V)
-        k = parts(*BLOCKS[name])
+        k = parts_of(*BLOCKS[name])
         assert getattr(float_steps, f"real_{name}")(U, V, k) == pytest.approx(step, rel=1e-9)
         assert float_steps.real_integral(U, V, k, 0.3) == pytest.approx(0.3 * h / step[2], rel=1e-9)
 
@@ -446,34 +446,42 @@ def test_a_complex_step_is_that_of_the_formulas(name):
     for _ in range(20):
         U, V, kappa = (complex(rng.uniform(-2, 2), rng.uniform(-2, 2)) for _ in range(3))
         x, y, w, g, h = plane(BLOCKS[name], U, V)
-        k = parts(*BLOCKS[name])
-        found = function(*parts(U, V), k)
-        assert found == pytest.approx([*parts(x, y), abs(w) ** 2, abs(g) ** 2], rel=1e-9)
-        assert float_steps.complex_integral(*parts(U, V), k, *parts(kappa)) == pytest.approx(
-            parts(kappa * h / w), rel=1e-9
+        k = parts_of(*BLOCKS[name])
+        found = function(*parts_of(U, V), k)
+        assert found == pytest.approx([*parts_of(x, y), abs(w) ** 2, abs(g) ** 2], rel=1e-9)
+        assert float_steps.complex_integral(*parts_of(U, V), k, *parts_of(kappa)) == pytest.approx(
+            parts_of(kappa * h / w), rel=1e-9
         )
 
 
 @pytest.mark.parametrize(
-    ("reals", "others"),
-    quick([(r, k) for r in range(6) for k in range(4) if r + k], [(0, 1), (1, 0), (1, 1), (2, 2), (5, 3)]),
+    ("name", "parts", "count", "width"),
+    quick(
+        [(n, p, c, w) for n in ("lines", "cubes", "general") for p in (2, 4) for c in (1, 2, 5) for w in (1, 3, 300)],
+        [("lines", 2, 3, 1), ("cubes", 2, 2, 5), ("general", 2, 1, 3), ("lines", 4, 3, 1), ("lines", 4, 2, 300)],
+    ),
 )
-def test_compiled_loops_over_the_blocks_of_a_lane_do_what_they_do_uncompiled(reals, others):
+def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(name, parts, count, width):
     pytest.importorskip("numba")
-    from kahanmaps.maps.floats.numba_kernel import Blocks, _single
+    from kahanmaps.maps.floats.numba_kernel import _sweep
 
-    rng = np.random.default_rng(reals + 10 * others)
-    kinds = np.array([LINES, CUBES, GENERAL, LINES, LINES][:reals] + [GENERAL, LINES, LINES][:others], dtype=np.int64)
-    coefficients = np.array(
-        [parts(*BLOCKS[("lines", "cubes", "general")[[LINES, CUBES, GENERAL].index(kind)]]) for kind in kinds]
-    )
-    z = rng.uniform(-0.3, 0.3, (2 * reals + 4 * others, 2))
-    compiled, plain, before = z.copy(), z.copy(), z.copy()
-    blocks = Blocks(kinds, coefficients, reals, np.zeros((len(kinds), 2)))
-    assert _single(compiled, 1, blocks, 3) == _single.py_func(plain, 1, blocks, 3)
-    assert compiled == pytest.approx(plain, rel=1e-15)
-    assert np.array_equal(plain[:, 0], before[:, 0])
-    assert (plain[:, 1] != before[:, 1]).all()
+    kind = {"lines": LINES, "cubes": CUBES, "general": GENERAL}[name]
+    if (kind == GENERAL and count > 1) or (kind == CUBES and parts == 4):
+        return  # there are no such runs
+    run = float_steps.Run(kind, parts, 1, count, 0)
+    k = parts_of(*BLOCKS[name])
+    state = np.random.default_rng(3).uniform(-0.3, 0.3, (2 + parts * count, width))
+    expected, usual = state.copy(), np.ones(count * width)
+    for _ in range(3):
+        *image, _, _ = float_steps.FORMULAS[kind, parts](*run.of(expected.copy()), k)
+        for rows, after in zip(run.of(expected), image, strict=True):
+            rows[:] = after
+    flat = state.ravel().copy()
+    for sweep in (_sweep, _sweep.py_func):
+        found = flat.copy()
+        sweep(found, width, np.array(run), np.array([k]), 3, usual)
+        assert np.array_equal(found.reshape(state.shape), expected)
+    assert usual.all()
 
 
 LINEAR_FORMS = [(1, 0), (0, 1), (1, -1), (1, 1), (3, 2)]

@@ -134,9 +134,9 @@ def psi_and_chi(block, until):
     chi_scales = {n: start.chi.scale(n) for n in range(-2, 3)}
     for scales, t, first in ((psi_scales, table.psi_t, 5), (chi_scales, table.chi_t, 3)):
         for n in range(first, until + 1):
-            scales[n] = t(n - 1) * scales[n - 1] ** 2 / scales[n - 2]
-    psi = {n: table.psi(n) * psi_scales[n] for n in range(1, until + 1)}
-    chi = {n: table.chi(n) * chi_scales[n] for n in range(-1, until + 1)}
+            scales[n] = t[n - 1] * scales[n - 1] ** 2 / scales[n - 2]
+    psi = {n: table.psi[n] * psi_scales[n] for n in range(1, until + 1)}
+    chi = {n: table.chi[n] * chi_scales[n] for n in range(-1, until + 1)}
     return start.gamma, psi, {**chi, -2: start.chi[-2] * start.chi.scale(-2)}
 
 
@@ -205,7 +205,7 @@ def test_psi_n_is_zero_modulo_a_prime_where_n_T_is_zero():
 def test_the_values_are_about_a_third_as_long_as_the_points(name):
     block = integer_block(*STARTS[name])
     table = tau_table.TauTable(tau.start_near(block))
-    psi, chi, (_, _, W) = table.psi(80), table.chi(80), table.point(80)
+    psi, chi, (_, _, W) = table.psi[80], table.chi[80], table.point(80)
     # psi_80 and chi_80 against P_80; bad primes and the neighbours' lengths account for the rest
     assert abs(psi.bit_length() - W.bit_length() / 3) < 0.05 * W.bit_length()
     assert abs(chi.bit_length() - W.bit_length() / 3) < 0.05 * W.bit_length()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.scan.scan import scan
@@ -46,7 +45,7 @@ def test_curves_are_the_zeros_of_the_conditions(found):
 
 def test_a_plane_is_drawn_and_nothing_else():
     with pytest.raises(InputError, match="expected two parameters"):
-        draw_scan(scan(load("henon_heiles"), ["c"], terms=2, primes=[5, 7, 11]))
+        draw_scan(scan(parse_system(PLANE), ["a"], terms=1, primes=[5, 7, 11], seconds=1e-6))
 
 
 def test_a_scan_without_conditions_is_an_empty_plane():

@@ -142,7 +142,7 @@ def _arithmetic(options: dict[str, Any]) -> str:
 
 def _require_point(file: lib.SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
     """The same demands on eps, prime and start as orbits make, in the same words."""
-    lib.KahanMap(file.system, eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(start)
+    file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(start)
 
 
 def _structure(file: lib.SystemFile) -> lib.Structure | str:

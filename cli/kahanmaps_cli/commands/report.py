@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -23,10 +23,6 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.progress import Progress, say
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 
 _ONLY_FOR = {
     "symbolic": ("analyze",),
@@ -193,18 +189,12 @@ def _system_or_member(system: str | None, options: dict[str, Any]) -> lib.System
 
 def _checks(file: lib.SystemFile, settings: lib.Settings) -> tuple[list[lib.Report], list[str]]:
     """The reports of the checks that apply, and a sentence for each that does not."""
-    checks: dict[str, Callable[[], lib.Report]] = {
-        "check-integrals": lambda: lib.check_integrals(file, settings),
-        "check-measure": lambda: lib.check_measure(file, settings),
-        "check-poisson": lambda: lib.check_poisson(file, settings),
-        "check-commute": lambda: lib.check_commute(file, None, settings),
-    }
     reports: list[lib.Report] = []
     left_out: list[str] = []
-    for name, check in checks.items():
+    for name, check in sorted(lib.CHECKS.items(), key=lambda named: named[1].is_of_pair):
         settings.progress(name)
         try:
-            reports.append(check())
+            reports.append(check(file, None, settings) if check.is_of_pair else check(file, settings))
         except lib.InputError as error:
             left_out.append(f"{name} does not apply: {error}")
     if not reports:

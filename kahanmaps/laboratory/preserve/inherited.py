@@ -18,12 +18,12 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field
-from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.errors import counted
+from kahanmaps.invariants.integrals import modified
 from kahanmaps.laboratory.modular_points import ModularMap, Point, rank
 from kahanmaps.laboratory.preserve.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, closed_forms, hamiltonian_function
-from kahanmaps.maps.kahan import KahanMap, KahanMapOver
+from kahanmaps.maps.kahan import Kahan, KahanMapOver
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -86,12 +86,8 @@ class InheritedIntegrals:
     def modified(self, k: int, field: Field, eps: Any, x: tuple[Any, ...]) -> Any:
         """The integral that belongs to the k-th form, at a point over a field."""
         H = self.hamiltonian(k)
-        image = KahanMap(self.system, eps, field).step(x)
-        total = evaluate(H, field, x)
-        third = field.convert(fmpq(1, 3))
-        for i, (before, after) in enumerate(zip(x, image, strict=True)):
-            total = total + evaluate(H.derivative(i), field, x) * (after - before) * third
-        return total
+        slopes = [H.derivative(i) for i in range(self.system.dim)]
+        return modified(H, slopes, Kahan(self.system).at(eps, field), x)
 
 
 def inherited_integrals(system: QuadraticSystem, *, seed: int = 0) -> InheritedIntegrals:

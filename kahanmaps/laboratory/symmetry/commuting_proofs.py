@@ -28,7 +28,7 @@ from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings
 from kahanmaps.laboratory.symmetry.commuting_equations import coefficients_of, combination
 from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, field_at
-from kahanmaps.maps.kahan import KahanMap, KahanMapOver
+from kahanmaps.maps.kahan import Kahan, KahanMapOver
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
 _FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
@@ -118,13 +118,13 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Componen
     n, free = f.dim, family.free
     zero = family.values[0].context().constant(0)
     table = combination(space.fields, family.values, zero)
-    count = len(family.values)
+    count, first = len(family.values), Kahan(f)
 
     def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides:
         parameters = [field.zero] * count
         for i, value in zip(free, point[n:], strict=True):
             parameters[i] = value
-        phi_f, phi_g = KahanMap(f, eps, field), KahanMapOver(_over(field, table, parameters, n), eps)
+        phi_f, phi_g = first.at(eps, field), KahanMapOver(_over(field, table, parameters, n), eps)
         x = point[:n]
         return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
 

@@ -1,8 +1,8 @@
 """Many float orbits at once, and the choice of the kernel that computes them.
 
 Two methods: "normal form" where a NormalForm of the system is given (blocks.py), "generic" elimination for any
-quadratic system. Two kernels: numpy, always there, and numba (the extra `fast`). Method and start settle the
-numbers; the kernel, the threads and the way steps are portioned only settle how fast they come (steps.py).
+quadratic system. Two kernels: numpy, always there, and numba (the extra `fast`). Method, kernel and start settle the
+numbers; threads, and the way steps are portioned, only settle how fast they come (steps.py).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from flint import fmpq
@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.floats.blocks import PlanarBlocks, planar_blocks, require_same_system
+from kahanmaps.maps.floats.advance import NOTHING, Engine, Kept, Word
+from kahanmaps.maps.floats.blocks import planar_blocks, require_same_system
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.steps import (
     RUNNING,
     SINGULAR,
     STATUS,
+    GenericEquation,
     Lanes,
-    block_integrals,
-    distances,
+    PlanarRows,
     generic_equation,
 )
 from kahanmaps.maps.floats.stream import NpyFile
@@ -61,35 +62,6 @@ class Drift:
         return Drift(self.name, self.initial[orbit], self.largest[orbit], self.last[orbit])
 
 
-class Engine(Protocol):
-    """Advances lanes; the numbers do not depend on which engine does it."""
-
-    def advance(
-        self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None
-    ) -> None:
-        """Take all lanes `steps` steps from the index `first`, recording and sampling at multiples."""
-
-
-class WordEngine:
-    """Advances lanes by several engines one after the other, each for a step."""
-
-    def __init__(self, engines: Sequence[Engine]) -> None:
-        self.engines = engines
-
-    def advance(
-        self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None
-    ) -> None:
-        """Take all lanes `steps` steps from the index `first`."""
-        row = 0
-        for index in range(first, first + steps):
-            for engine in self.engines:
-                engine.advance(lanes, index, 1, 0, sampled, None)
-            if record is not None and every and (index + 1) % every == 0:
-                record[row] = lanes.z
-                record[row][:, lanes.status != RUNNING] = np.nan
-                row += 1
-
-
 class Stepping:
     """A map, eps and a method, with the kernel that advances lanes: what orbits and ensembles are made of.
 
@@ -118,62 +90,74 @@ class Stepping:
         self._map = map_over.inverse if backward else map_over
         self.matrix_name = map_over.denominator_name(backward)
         self.dim = system.dim
-        self.blocks: PlanarBlocks | None = None
+        self.rows: PlanarRows | None = None
         if form is not None:
             require_same_system(form, map_)
-            self.blocks = planar_blocks(form, -eps if backward else eps)
+            self.rows = PlanarRows(planar_blocks(form, -eps if backward else eps))
         self.compiled = compiled
         self.threads = (threads or processors()) if compiled else 1
         method = "generic" if form is None else "normal form"
         self.name = f"numba {method}, {counted(self.threads, 'thread')}" if compiled else f"numpy {method}"
         self._engine = self._made()
+        self._engine.threads = self.threads
 
     def _made(self) -> Engine:
-        equations = [] if self.blocks is not None else [generic_equation(one) for one in self._map.factors]
-        engines: list[Engine]
+        planar: Callable[[PlanarRows], Engine]
+        generic: Callable[[GenericEquation], Engine]
         if self.compiled:
-            from kahanmaps.maps.floats.numba_kernel import GenericNumba, PlanarNumba
-
-            if self.blocks is not None:
-                return PlanarNumba(self.blocks, self.threads)
-            engines = [GenericNumba(equation, self.threads) for equation in equations]
+            from kahanmaps.maps.floats.numba_kernel import GenericNumba as generic
+            from kahanmaps.maps.floats.numba_kernel import PlanarNumba as planar
         else:
-            from kahanmaps.maps.floats.numpy_kernel import GenericNumpy, PlanarNumpy
-
-            if self.blocks is not None:
-                return PlanarNumpy(self.blocks)
-            engines = [GenericNumpy(equation) for equation in equations]
-        return engines[0] if len(engines) == 1 else WordEngine(engines)
+            from kahanmaps.maps.floats.numpy_kernel import GenericNumpy as generic
+            from kahanmaps.maps.floats.numpy_kernel import PlanarNumpy as planar
+        if self.rows is not None:
+            return planar(self.rows)
+        engines = [generic(generic_equation(one)) for one in self._map.factors]
+        return engines[0] if len(engines) == 1 else Word(engines)
 
     def lanes(self, starts: FloatArray) -> Lanes:
         """Lanes at the starts, an array (n, dim) of finite numbers."""
-        if self.blocks is None:
+        if self.rows is None:
             return Lanes.of(np.ascontiguousarray(starts.T))
-        lanes = Lanes.of(_product(self.blocks.into, starts.T), len(self.blocks.kinds))
-        lanes.base[:] = block_integrals(self.blocks, lanes.z)
+        lanes = Lanes.of(_product(self.rows.into, starts.T), len(self.rows.blocks.kinds))
+        lanes.base[:] = self.rows.integrals(lanes.z)
         return lanes
 
     def advance(
         self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None = None
     ) -> None:
-        """Take all lanes `steps` steps from the index `first`."""
-        self._engine.advance(lanes, first, steps, every, sampled, record)
+        """Take all lanes `steps` steps from the index `first`, with states at multiples of `every` in `record`.
+
+        The distances of the block integrals from the start are looked at every `sampled` steps.
+        """
+        kept = [] if record is None else [Kept(every, record)]
+        if self.rows is None:
+            self._engine.advance(lanes, first, steps, kept)
+            return
+        samples = Kept(sampled, NOTHING)
+        samples = samples._replace(table=np.empty((samples.rows(first, steps), *lanes.z.shape)))
+        self._engine.advance(lanes, first, steps, [*kept, samples])
+        if len(samples.table):
+            seen = self.rows.distances(samples.table, lanes.base)
+            seen[:, np.isnan(samples.table).any(axis=1)] = 0.0  # the orbit has ended
+            np.maximum(lanes.largest, seen.max(axis=1), out=lanes.largest)
 
     def points(self, record: FloatArray) -> FloatArray:
         """The points x (count, n, dim) of recorded states (count, rows, n)."""
         count, _, n = record.shape
-        if self.blocks is None:
+        if self.rows is None:
             return np.ascontiguousarray(record.transpose(0, 2, 1))
         if n == 1:  # numbers side by side are multiplied fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
-        x = _product(self.blocks.out, record)
+        x = _product(self.rows.blocks.out, record, self.rows.places)
         return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.dim)
 
     def piece(self, n: int) -> int:
         """How many steps of n lanes take about a tenth of a second."""
         # row steps a second, roughly, of one core
-        speed = 1e10 if self.compiled and self.blocks else 8e8 if self.compiled else 1e8 if n > 64 else 1e6
-        work = n * self.dim * (1 if self.blocks else len(self._map.factors) * self.dim**2 / 8)
+        planar = self.rows is not None
+        speed = 1e10 if self.compiled and planar else 8e8 if self.compiled else 1e8 if n > 64 else 1e6
+        work = n * self.dim * (1 if planar else len(self._map.factors) * self.dim**2 / 8)
         return max(1, int(0.1 * speed * self.threads / work))
 
 
@@ -321,7 +305,7 @@ class FloatEnsemble:
     def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray | None]:
         self._interrupted = False
         stepping, lanes, stop = self._stepping, self._lanes, self.step + steps
-        for first, count, rows in portions(stepping, self.n, self.step, stop, every):
+        for first, count, rows in portions(stepping, self.n, self.step, stop, every, self._sampled):
             record = np.empty((rows, len(lanes.z), self.n)) if rows else None
             stepping.advance(lanes, first, count, every, self._sampled, record)
             self.step = first + count
@@ -332,11 +316,14 @@ class FloatEnsemble:
                 return
 
 
-def portions(stepping: Stepping, n: int, step: int, stop: int, every: int) -> Iterator[tuple[int, int, int]]:
+def portions(
+    stepping: Stepping, n: int, step: int, stop: int, every: int, sampled: int
+) -> Iterator[tuple[int, int, int]]:
     """First index, steps and recorded rows of portions that take a tenth of a second and some megabytes."""
     piece = stepping.piece(n)
-    if every:
-        piece = min(piece, every * max(1, 1_000_000 // (n * stepping.dim)))
+    for interval in (every, sampled if stepping.rows is not None else 0):
+        if interval:
+            piece = min(piece, interval * max(1, 1_000_000 // (n * stepping.dim)))
     while step < stop:
         count = min(piece, stop - step)
         yield step, count, (step + count) // every - step // every if every else 0
@@ -393,15 +380,15 @@ def ensemble(
 
 def block_drifts(stepping: Stepping, lanes: Lanes) -> Iterator[Drift]:
     """The drift of every block integral h/(1 + eps^2 D), up to now."""
-    if stepping.blocks is None:
+    if stepping.rows is None:
         return
-    n = lanes.z.shape[1]
-    now = distances(stepping.blocks, lanes, 0, n)
+    blocks = stepping.rows.blocks
+    now = stepping.rows.distances(lanes.z[None], lanes.base)[:, 0]
     now[:, lanes.status != RUNNING] = np.nan
     largest = np.fmax(lanes.largest, now)
-    for r, label in enumerate(stepping.blocks.labels):
+    for r, label in enumerate(blocks.labels):
         initial: NDArray[Any] = lanes.base[r, 0].copy()
-        if r >= stepping.blocks.reals:
+        if r >= blocks.reals:
             initial = initial + 1j * lanes.base[r, 1]
         yield Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], now[r])
 
@@ -437,10 +424,14 @@ def _points(starts: Any, system: QuadraticSystem | BirationalMap) -> FloatArray:
     return points
 
 
-def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
-    """matrix columns (..., rows, n), every sum from left to right: BLAS orders them by the shape of the arrays."""
+def _product(matrix: FloatArray, columns: FloatArray, places: Sequence[int] | None = None) -> FloatArray:
+    """matrix columns (..., rows, n), every sum from left to right: BLAS orders them by the shape of the arrays.
+
+    `places` says which row stands where, if they are in another order.
+    """
+    first, *rest = range(matrix.shape[1]) if places is None else places
     with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
-        total: FloatArray = matrix[:, :1] * columns[..., :1, :]
-        for j in range(1, matrix.shape[1]):
-            total += matrix[:, j, None] * columns[..., j : j + 1, :]
+        total: FloatArray = matrix[:, :1] * columns[..., first : first + 1, :]
+        for j, place in enumerate(rest, 1):
+            total += matrix[:, j, None] * columns[..., place : place + 1, :]
     return total

@@ -1,11 +1,11 @@
-"""What a step in machine numbers is, operation by operation; every kernel does these operations in this order.
+"""What a step in machine numbers is, operation by operation, and what is kept of many orbits side by side.
 
-So it makes no difference, to the last bit, which kernel ran: plain Python (this file), whole numpy arrays
-(numpy_kernel.py) or compiled loops (numba_kernel.py); one orbit or many; one thread or two; in one piece or in
-portions. The formulas are written so that they can be given floats or arrays. No product is contracted with a sum, and
-no sum reordered.
+The formulas are written so that they can be given floats or arrays; plain Python and whole numpy arrays
+(numpy_kernel.py) and compiled loops (numba_kernel.py) run them as they stand. A result names its kernel; with the same
+one it comes out the same, to the last bit: one orbit or many, one thread or two, in one piece or in portions.
 
-In normal form a state holds the rows of blocks.py. A step is *near-singular* in a block if
+In normal form a state holds the rows of blocks.py, those of one kind together (`PlanarRows`). A step is
+*near-singular* in a block if
 
     |w| <= 2^-40 (1 + |A C|),     w = (1 + B)(1 - B) + A C = 1 + eps^2 D,
 
@@ -23,17 +23,14 @@ number.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
-from math import isfinite
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.blocks import LINES, PlanarBlocks
+from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, PlanarBlocks
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.maps.implicit import StepOver
 from kahanmaps.maps.kahan import KahanMapOver
@@ -46,6 +43,7 @@ NEAR_SQUARED = NEAR * NEAR
 # not near-singular, whatever A C is.
 CLEAR = 4 * NEAR
 MUCH = 8.0
+_CACHED = 512  # lanes whose integrals are computed together
 LARGEST = float(np.finfo(np.float64).max)
 
 RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
@@ -167,6 +165,91 @@ def complex_integral(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, kappa_r: Any, k
 
 # What the kernels are given, and what they keep.
 
+FORMULAS: dict[tuple[int, int], Any] = {
+    (LINES, 2): real_lines,
+    (CUBES, 2): real_cubes,
+    (GENERAL, 2): real_general,
+    (LINES, 4): complex_lines,
+    (GENERAL, 4): complex_general,
+}  # by kind and the number of rows of a block
+
+
+class Run(NamedTuple):
+    """Neighbouring blocks of one kind that take their steps together; a general one is alone, for its coefficients.
+
+    Its rows are those from `row` on: of all `blocks` of them the first coordinate, of all the second, ... (`parts`).
+    """
+
+    kind: int
+    parts: int
+    row: int
+    blocks: int
+    first: int
+
+    def of(self, z: FloatArray) -> list[FloatArray]:
+        """The coordinates, each an array (blocks, n), views of the state z (rows, n)."""
+        return [z[self.row + k * self.blocks : self.row + (k + 1) * self.blocks] for k in range(self.parts)]
+
+    @property
+    def near(self) -> float:
+        """What w, or |w|^2, is compared with."""
+        return NEAR if self.parts == 2 else NEAR_SQUARED
+
+
+class PlanarRows:
+    """The blocks of a normal form in runs; `places` says where in a state each row of the blocks is."""
+
+    def __init__(self, blocks: PlanarBlocks) -> None:
+        self.blocks = blocks
+        self.runs: list[Run] = []
+        order: list[int] = []
+        first = 0
+        while first < len(blocks.kinds):
+            kind, real, end = int(blocks.kinds[first]), first < blocks.reals, first + 1
+            last = blocks.reals if real else len(blocks.kinds)
+            while end < last and kind != GENERAL and blocks.kinds[end] == kind:
+                end += 1
+            parts, count = 2 if real else 4, end - first
+            start = 2 * first if real else 4 * first - 2 * blocks.reals  # of the rows in the order of the blocks
+            self.runs.append(Run(kind, parts, len(order), count, first))
+            order += [start + parts * b + k for k in range(parts) for b in range(count)]
+            first = end
+        self.places = np.argsort(order).tolist()
+        self.into = blocks.into[order]
+
+    def coefficients(self, run: Run) -> tuple[FloatArray, ...]:
+        """Re a, Im a, Re b, ... of the blocks of a run, columns."""
+        return tuple(self.blocks.coefficients[run.first : run.first + run.blocks].T[:, :, None])
+
+    def integrals(self, z: FloatArray) -> FloatArray:
+        """The integrals h/(1 + eps^2 D) at the states z (rows, n): an array (blocks, 2, n), Re and Im."""
+        found = np.zeros((len(self.blocks.kinds), 2, z.shape[1]))
+        numbers = [(run, self.coefficients(run), slice(run.first, run.first + run.blocks)) for run in self.runs]
+        with np.errstate(all="ignore"):
+            for low in range(0, z.shape[1], _CACHED):
+                lanes = slice(low, low + _CACHED)
+                for run, k, here in numbers:
+                    kappa = self.blocks.kappa[here].T[:, :, None]
+                    integral: Any = real_integral if run.parts == 2 else complex_integral
+                    value = integral(*run.of(z[:, lanes]), k, *kappa[: run.parts // 2])
+                    if run.parts == 2:
+                        found[here, 0, lanes] = value
+                    else:
+                        found[here, 0, lanes], found[here, 1, lanes] = value
+        return found
+
+    def distances(self, states: FloatArray, base: FloatArray) -> FloatArray:
+        """How far the block integrals at states (count, rows, n) are from `base`: an array (blocks, count, n)."""
+        count, rows, n = states.shape
+        moved = self.integrals(states.transpose(1, 0, 2).reshape(rows, count * n)).reshape(-1, 2, count, n)
+        with np.errstate(all="ignore"):
+            moved -= base[:, :, None]
+            distance: FloatArray = np.abs(moved[:, 0])
+            if self.blocks.reals < len(distance):
+                distance = np.sqrt(distance * distance + moved[:, 1] * moved[:, 1])
+        distance[np.isnan(distance)] = np.inf
+        return distance
+
 
 class GenericEquation(NamedTuple):
     """The equation M(x) x~ = r(x) in doubles, with the terms that are there; r is the last column of (M | r).
@@ -272,209 +355,3 @@ class Lanes(NamedTuple):
             np.zeros((blocks, 2, n)),
             np.zeros((blocks, n)),
         )
-
-
-def block_integrals(blocks: PlanarBlocks, z: FloatArray) -> FloatArray:
-    """The integrals h/(1 + eps^2 D) of every block at the points `z` (rows, n): an array (blocks, 2, n), Re and Im."""
-    found = np.zeros((len(blocks.kinds), 2, z.shape[1]))
-    with np.errstate(all="ignore"):
-        for r, (k, kappa) in enumerate(zip(blocks.coefficients.tolist(), blocks.kappa.tolist(), strict=True)):
-            at = 2 * r if r < blocks.reals else 4 * r - 2 * blocks.reals
-            if r < blocks.reals:
-                found[r, 0] = real_integral(z[at], z[at + 1], k, kappa[0])
-            else:
-                found[r] = complex_integral(z[at], z[at + 1], z[at + 2], z[at + 3], k, kappa[0], kappa[1])
-    return found
-
-
-def distances(blocks: PlanarBlocks, lanes: Lanes, lo: int, hi: int) -> FloatArray:
-    """How far the block integrals of the lanes lo, ..., hi - 1 are from their start: an array (blocks, hi - lo)."""
-    with np.errstate(all="ignore"):
-        moved = block_integrals(blocks, lanes.z[:, lo:hi]) - lanes.base[:, :, lo:hi]
-        found: FloatArray = np.sqrt(moved[:, 0] * moved[:, 0] + moved[:, 1] * moved[:, 1])
-    found[np.isnan(found)] = np.inf
-    return found
-
-
-def sample(blocks: PlanarBlocks, lanes: Lanes, lo: int, hi: int) -> None:
-    """Keep the largest distance of the block integrals from their start, for the lanes lo, ..., hi - 1 that run."""
-    alive = lanes.status[lo:hi] == RUNNING
-    largest = lanes.largest[:, lo:hi]
-    largest[:, alive] = np.maximum(largest[:, alive], distances(blocks, lanes, lo, hi)[:, alive])
-
-
-def segments(first: int, steps: int, longest: int, every: int, sampled: int) -> Iterator[tuple[int, int]]:
-    """Cuts `steps` steps from the index `first` on at the multiples of `every` and `sampled` (0: none).
-
-    Yields the index at which a piece begins and the number of its steps, at most `longest`.
-    """
-    stop = first + steps
-    while first < stop:
-        end = min(stop, first + longest)
-        for interval in (every, sampled):
-            if interval:
-                end = min(end, first - first % interval + interval)
-        yield first, end - first
-        first = end
-
-
-def walk(
-    stepper: Stepper,
-    lanes: Lanes,
-    lane: int,
-    z: list[float],
-    first: int,
-    steps: int,
-    every: int = 0,
-    record: FloatArray | None = None,
-) -> None:
-    """Take one lane through `steps` steps from its state z at the index `first`, and note what happens to it.
-
-    Writes the states at multiples of `every` to the rows of `record` (count, rows), NaN where there is none.
-    """
-    row = 0
-    for index in range(first, first + steps):
-        image, status, near = stepper.step(z)
-        if status != RUNNING:
-            lanes.status[lane] = status
-            lanes.failed_at[lane] = index + 1
-            z = [0.0] * len(z)
-            if record is not None:
-                record[row:] = np.nan
-            break
-        if near:
-            if not lanes.near[lane]:
-                lanes.near_at[lane] = index
-            lanes.near[lane] += near
-        z = image
-        if record is not None and (index + 1) % every == 0:
-            record[row] = z
-            row += 1
-    lanes.z[:, lane] = z
-
-
-# One orbit in plain Python. 2 to 5 microseconds a planar block, and no waiting for a compiler.
-
-
-class Stepper(Protocol):
-    """Takes the state of a lane to its image."""
-
-    def step(self, z: list[float]) -> tuple[list[float], int, int]:
-        """The image, its status code, and how many blocks were near-singular."""
-
-
-class PythonPlanar:
-    """Steps of single lanes in normal form, in Python's own floats."""
-
-    def __init__(self, blocks: PlanarBlocks) -> None:
-        formulas = (real_lines, real_cubes, real_general)
-        self._real = [
-            (2 * r, formulas[blocks.kinds[r]], tuple(blocks.coefficients[r].tolist())) for r in range(blocks.reals)
-        ]
-        self._complex = [
-            (
-                2 * blocks.reals + 4 * s,
-                complex_lines if blocks.kinds[blocks.reals + s] == LINES else complex_general,
-                tuple(blocks.coefficients[blocks.reals + s].tolist()),
-            )
-            for s in range(len(blocks.kinds) - blocks.reals)
-        ]
-
-    def step(self, z: list[float]) -> tuple[list[float], int, int]:
-        """The image, the status code and the number of near-singular blocks."""
-        image: list[float] = []
-        near = 0
-        try:
-            for at, formula, k in self._real:
-                U, V, w, g = formula(z[at], z[at + 1], k)
-                image += (U, V)
-                if not abs(w) > NEAR + NEAR * abs(g):
-                    if not isfinite(w):
-                        return image, OVERFLOW, near
-                    near += 1
-                elif w in (_INFINITY, -_INFINITY):
-                    return image, OVERFLOW, near
-            for at, planar, k in self._complex:
-                *parts, w, g = planar(z[at], z[at + 1], z[at + 2], z[at + 3], k)
-                image += parts
-                if not w > NEAR_SQUARED + NEAR_SQUARED * g:
-                    if not isfinite(w):
-                        return image, OVERFLOW, near
-                    near += 1
-                elif w == _INFINITY:
-                    return image, OVERFLOW, near
-        except ZeroDivisionError:  # where numpy and compiled code get an infinity
-            return image, SINGULAR, near
-        return image, RUNNING if all(map(isfinite, image)) else OVERFLOW, near
-
-
-_INFINITY = float("inf")
-
-
-class PythonGeneric:
-    """Steps of single lanes of any map, in Python's own floats."""
-
-    def __init__(self, equation: GenericEquation) -> None:
-        n = equation.rows
-        first: list[int] = equation.first.tolist()
-        columns: list[int] = equation.columns.tolist()
-        factors: list[float] = equation.factors.tolist()
-        constants: list[list[float]] = equation.constants.tolist()
-        terms = [list(zip(columns[s:e], factors[s:e], strict=True)) for s, e in pairwise(first)]
-        rows = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
-        self._entries = [(row[:n], *row[n]) for row in rows]
-        self._products: list[list[int]] = equation.products.tolist()
-
-    def step(self, x: list[float]) -> tuple[list[float], int, int]:
-        """The image, the status code and whether the step is near-singular."""
-        y = x if not self._products else [*x]
-        for a, b in self._products:
-            y.append(y[a] * y[b])
-        matrix, right, sizes = [], [], []
-        for row, side, side_terms in self._entries:
-            entries, size = [], 1.0
-            for total, terms in row:
-                for k, factor in terms:
-                    total += factor * y[k]
-                entries.append(total)
-                if abs(total) > size:
-                    size = abs(total)
-            for k, factor in side_terms:
-                side += factor * y[k]
-            matrix.append(entries)
-            right.append(side)
-            sizes.append(size)
-        return _solved(matrix, right, sizes)
-
-
-def _solved(matrix: list[list[float]], right: list[float], sizes: list[float]) -> tuple[list[float], int, int]:
-    """The solution, its status code and whether a pivot was small; `sizes` has the largest of 1 and each row."""
-    n, near = len(right), 0
-    if not max(sizes) <= LARGEST:
-        return right, OVERFLOW, near
-    for p in range(n):
-        for i in range(p + 1, n):
-            if abs(matrix[i][p]) > MUCH * abs(matrix[p][p]):
-                matrix[p], matrix[i] = matrix[i], matrix[p]
-                right[p], right[i] = right[i], right[p]
-                sizes[p], sizes[i] = sizes[i], sizes[p]
-        upper = matrix[p]
-        pivot = upper[p]
-        if pivot == 0.0:
-            return right, SINGULAR, near
-        if not abs(pivot) <= LARGEST:
-            return right, OVERFLOW, near
-        if abs(pivot) <= NEAR * sizes[p]:
-            near = 1
-        inverse = 1.0 / pivot
-        for i in range(p + 1, n):
-            row = matrix[i]
-            factor = row[p] * inverse
-            for j in range(p + 1, n):
-                row[j] -= factor * upper[j]
-            right[i] -= factor * right[p]
-    for j in range(n - 1, -1, -1):
-        right[j] /= matrix[j][j]
-        for i in range(j):
-            right[i] -= matrix[i][j] * right[j]
-    return right, RUNNING if all(map(isfinite, right)) else OVERFLOW, near

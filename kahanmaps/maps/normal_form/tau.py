@@ -27,7 +27,7 @@ Source: ward-1948, for such sequences.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,13 +68,7 @@ class TauStart:
     def __init__(self, numbers: Any, gamma: Any, lifts: Sequence[Triple], base: int) -> None:
         self.base, self.numbers, self.gamma = base, numbers, gamma
         P = dict(zip(range(-2, 3), lifts, strict=True))
-        chi = {
-            0: 3 * determinant(P[-1], P[0], P[1]),
-            1: determinant(P[-1], P[0], P[2]),
-            -1: determinant(P[-2], P[0], P[1]),
-            2: determinant(P[-1], P[1], P[2]),
-            -2: determinant(P[-2], P[-1], P[1]),
-        }
+        chi = first_chi(P)
         self.usable = all(value != 0 for value in chi.values())
         if not self.usable:
             return
@@ -95,6 +89,17 @@ class TauStart:
         terms = [products[0] * chi[1], products[1] * chi[0], products[2] * chi[2]]
         found: Triple = self.numbers.combined([self._one, ratio, 1 / next_ratio], terms, self._lifts, self._divisor)
         return found
+
+
+def first_chi(P: Mapping[int, Triple]) -> dict[int, Any]:
+    """chi_{-2}, ..., chi_2 from natural lifts of P_{-2}, ..., P_2."""
+    return {
+        0: 3 * determinant(P[-1], P[0], P[1]),
+        1: determinant(P[-1], P[0], P[2]),
+        -1: determinant(P[-2], P[0], P[1]),
+        2: determinant(P[-1], P[1], P[2]),
+        -2: determinant(P[-2], P[-1], P[1]),
+    }
 
 
 def _window(first: int, values: Sequence[Any], numbers: Any) -> Window:

@@ -15,8 +15,9 @@ chi). All these are small rational numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
+from types import MappingProxyType
 from typing import Any
 
 from kahanmaps.maps.normal_form.planar_block import Triple
@@ -71,10 +72,23 @@ def _second_ratio(rho: Callable[[int], Any], n: int) -> Any:
     return rho(n + 1) * rho(n - 1) / (middle * middle)
 
 
+class _Table(dict[int, Any]):
+    """Values by index, each worked out by a rule when it is first asked for."""
+
+    def __init__(self, rule: Callable[[int], Any], known: Mapping[int, Any] = MappingProxyType({})) -> None:
+        super().__init__(known)
+        self._rule = rule
+
+    def __missing__(self, n: int) -> Any:
+        found = self[n] = self._rule(n)
+        return found
+
+
 class TauTable:
     """psi_n and chi_n, n >= 1, and the points P_n, n >= 4, relative to the base point of a start; all as needed.
 
-    The dictionaries are the tables; `_psi_rho` and the like hold the small rational numbers of the module's head.
+    Values of psi and chi are over their scales; `_psi_rho` and the like hold the small rational numbers of the
+    module's head: t_n = s_{n+1} s_{n-1} / s_n^2, and r_n = (s_n / s_{n-1} of psi) / (that of chi).
     """
 
     def __init__(self, start: TauStart) -> None:
@@ -84,68 +98,60 @@ class TauTable:
         psi, chi = start.psi, start.chi
         s = {n: psi.scale(n) for n in range(1, 5)}
         c = {n: chi.scale(n) for n in range(-1, 3)}
-        self._psi = {n: psi[n] for n in range(1, 5)}
+        self.psi = _Table(self._new_psi, {n: psi[n] for n in range(1, 5)})
+        self.chi = _Table(self._new_chi, {n: chi[n] for n in range(-1, 3)})
         self._psi_rho = {3: s[3] / s[2] ** 2, 4: s[4] / s[3] ** 2}
-        self._psi_t = {2: psi.t(2), 3: psi.t(3)}
-        self._chi = {n: chi[n] for n in range(-1, 3)}
         self._chi_rho = {1: c[1] / c[0] ** 2, 2: c[2] / c[1] ** 2}
-        self._chi_t = {n: chi.t(n) for n in (0, 1)}
-        self._r = {2: s[2] / s[1] * c[1] / c[2]}
-        self._r_next = {1: s[2] / s[1] * c[0] / c[1]}  # (s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi)
+        self.psi_t = _Table(self._new_psi_t, {2: psi.t(2), 3: psi.t(3)})
+        self.chi_t = _Table(self._new_chi_t, {n: chi.t(n) for n in (0, 1)})
+        self._r = _Table(self._new_r, {2: s[2] / s[1] * c[1] / c[2]})
+        # (s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi)
+        self._r_next = _Table(lambda n: self._r[n] * self.psi_t[n], {1: s[2] / s[1] * c[0] / c[1]})
         self._divisors = tuple(start.numbers.divisor(chi[n]) for n in (0, -1))
         self._divisor_scales = (c[0], c[-1])
-        # Squares and products of neighbours, of psi and of chi.
-        self._psi_square: dict[int, Any] = {}
-        self._psi_around: dict[int, Any] = {}
-        self._chi_square: dict[int, Any] = {}
-        self._chi_around: dict[int, Any] = {}
+        self._psi_square = _Table(lambda n: self.psi[n] * self.psi[n])
+        self._psi_around = _Table(lambda n: self.psi[n + 1] * self.psi[n - 1])
+        self._chi_square = _Table(lambda n: self.chi[n] * self.chi[n])
+        self._chi_around = _Table(lambda n: self.chi[n + 1] * self.chi[n - 1])
 
     def points(self) -> Iterator[Triple]:
         """P_4, P_5, ..., primitive, as long as the map has a value."""
-        n, before = _FIRST, self.psi(_FIRST - 1) * self.psi(_FIRST)
+        n, before = _FIRST, self.psi[_FIRST - 1] * self.psi[_FIRST]
         while True:
-            after = self.psi(n) * self.psi(n + 1)
-            chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
-            point = self._start.point(chi, [self.psi_around(n), after, before], self.r(n), self.r(n + 1))
+            after = self.psi[n] * self.psi[n + 1]
+            chi = [self.chi[n - 1], self.chi[n], self.chi[n + 1]]
+            point = self._start.point(chi, [self._psi_around[n], after, before], self._r[n], self._r[n + 1])
             if point[2] == 0:
                 return
             yield point
             n, before = n + 1, after
             for products in (self._psi_square, self._psi_around, self._chi_square, self._chi_around):
                 products.pop(n // 2 - 4, None)
-            self._psi.pop(n // 2 - 6, None)
-            self._chi.pop(n // 2 - 6, None)
+            self.psi.pop(n // 2 - 6, None)
+            self.chi.pop(n // 2 - 6, None)
 
     def point(self, n: int) -> Triple:
         """P_n for n >= 4, primitive."""
         self.points_taken += 1
-        before, here, after = self.psi(n - 1), self.psi(n), self.psi(n + 1)
-        chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
-        return self._start.point(chi, [before * after, here * after, before * here], self.r(n), self.r(n + 1))
+        before, here, after = self.psi[n - 1], self.psi[n], self.psi[n + 1]
+        chi = [self.chi[n - 1], self.chi[n], self.chi[n + 1]]
+        return self._start.point(chi, [before * after, here * after, before * here], self._r[n], self._r[n + 1])
 
-    def psi(self, n: int) -> Any:
-        """psi_n over its scale."""
-        value = self._psi.get(n)
-        if value is None:
-            k = n // 2
-            a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
-            left = self.psi_around(a) * self.psi_square(b)
-            right = self.psi_around(b) * self.psi_square(a) if b > 1 else left * 0  # psi_0 = 0
-            value, part = self._difference(self.psi_t(a), left, self.psi_t(b) if b > 1 else self._one, right, a, b)
-            self._psi[n] = value
-            self._psi_rho[n] = part if n % 2 else part / 2
+    def _new_psi(self, n: int) -> Any:
+        k = n // 2
+        a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
+        left = self._psi_around[a] * self._psi_square[b]
+        right = self._psi_around[b] * self._psi_square[a] if b > 1 else left * 0  # psi_0 = 0
+        value, part = self._difference(self.psi_t[a], left, self.psi_t[b] if b > 1 else self._one, right, a, b)
+        self._psi_rho[n] = part if n % 2 else part / 2
         return value
 
-    def chi(self, n: int) -> Any:
-        """chi_n over its scale."""
-        value = self._chi.get(n)
-        if value is None:
-            a = n // 2
-            b = n - a
-            left, right = self.chi_around(a) * self.psi_square(b), self.psi_around(b) * self.chi_square(a)
-            value, part = self._difference(self.chi_t(a), left, self.psi_t(b), right, a, b, self._divisors[b - a])
-            self._chi[n] = value
-            self._chi_rho[n] = part / self._divisor_scales[b - a]
+    def _new_chi(self, n: int) -> Any:
+        a = n // 2
+        b = n - a
+        left, right = self._chi_around[a] * self._psi_square[b], self._psi_around[b] * self._chi_square[a]
+        value, part = self._difference(self.chi_t[a], left, self.psi_t[b], right, a, b, self._divisors[b - a])
+        self._chi_rho[n] = part / self._divisor_scales[b - a]
         return value
 
     def _difference(
@@ -157,81 +163,30 @@ class TauTable:
         found: tuple[Any, Any] = self._start.numbers.difference(t_a, left, t_b, right, divisor)
         return found
 
-    def psi_square(self, n: int) -> Any:
-        """psi_n^2."""
-        found = self._psi_square.get(n)
-        if found is None:
-            value = self.psi(n)
-            found = self._psi_square[n] = value * value
-        return found
+    def _new_psi_t(self, n: int) -> Any:
+        k = n // 2
+        root = self.psi_t[k] * self.psi_t[k + 1] if n % 2 else 1 / self.psi_t[k]
+        return root * root * _second_ratio(self._rho_of_psi, n)
 
-    def psi_around(self, n: int) -> Any:
-        """psi_{n+1} psi_{n-1}."""
-        found = self._psi_around.get(n)
-        if found is None:
-            found = self._psi_around[n] = self.psi(n + 1) * self.psi(n - 1)
-        return found
+    def _new_chi_t(self, n: int) -> Any:
+        k = n // 2
+        root = 1 / self._r[k + 1] if n % 2 else self._r_next[k]
+        return root * root * _second_ratio(self._rho_of_chi, n)
 
-    def chi_square(self, n: int) -> Any:
-        """chi_n^2."""
-        found = self._chi_square.get(n)
-        if found is None:
-            value = self.chi(n)
-            found = self._chi_square[n] = value * value
-        return found
-
-    def chi_around(self, n: int) -> Any:
-        """chi_{n+1} chi_{n-1}."""
-        found = self._chi_around.get(n)
-        if found is None:
-            found = self._chi_around[n] = self.chi(n + 1) * self.chi(n - 1)
-        return found
-
-    def psi_t(self, n: int) -> Any:
-        """t_n = s_{n+1} s_{n-1} / s_n^2 of psi, n >= 2."""
-        found = self._psi_t.get(n)
-        if found is None:
-            k = n // 2
-            root = self.psi_t(k) * self.psi_t(k + 1) if n % 2 else 1 / self.psi_t(k)
-            found = self._psi_t[n] = root * root * _second_ratio(self._rho_of_psi, n)
-        return found
-
-    def chi_t(self, n: int) -> Any:
-        """t_n of chi, n >= 0."""
-        found = self._chi_t.get(n)
-        if found is None:
-            k = n // 2
-            root = 1 / self.r(k + 1) if n % 2 else self._next(k)
-            found = self._chi_t[n] = root * root * _second_ratio(self._rho_of_chi, n)
-        return found
-
-    def r(self, n: int) -> Any:
-        """(s_n / s_{n-1} of psi) / (s_n / s_{n-1} of chi), n >= 2."""
-        found = self._r.get(n)
-        if found is None:
-            if n == 3:
-                found = self.r(2) * self.psi_t(2) / self.chi_t(2)
-            else:
-                k = n // 2
-                root = 1 / self.psi_t(k) if n % 2 else self._next(k)
-                of_psi = self._rho_of_psi(n) / self._rho_of_psi(n - 1)
-                found = root * root * of_psi * self._rho_of_chi(n - 1) / self._rho_of_chi(n)
-            self._r[n] = found
-        return found
-
-    def _next(self, n: int) -> Any:
-        """(s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi) = r_n t_n."""
-        found = self._r_next.get(n)
-        if found is None:
-            found = self._r_next[n] = self.r(n) * self.psi_t(n)
-        return found
+    def _new_r(self, n: int) -> Any:
+        if n == 3:
+            return self._r[2] * self.psi_t[2] / self.chi_t[2]
+        k = n // 2
+        root = 1 / self.psi_t[k] if n % 2 else self._r_next[k]
+        of_psi = self._rho_of_psi(n) / self._rho_of_psi(n - 1)
+        return root * root * of_psi * self._rho_of_chi(n - 1) / self._rho_of_chi(n)
 
     def _rho_of_psi(self, n: int) -> Any:
         if n not in self._psi_rho:
-            self.psi(n)
+            _ = self.psi[n]
         return self._psi_rho[n]
 
     def _rho_of_chi(self, n: int) -> Any:
         if n not in self._chi_rho:
-            self.chi(n)
+            _ = self.chi[n]
         return self._chi_rho[n]

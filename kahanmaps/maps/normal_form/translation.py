@@ -22,7 +22,8 @@ from functools import lru_cache
 from typing import Any
 
 from kahanmaps.errors import SingularStep
-from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, determinant, same_point
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
+from kahanmaps.maps.normal_form.tau import first_chi
 
 # Base points that are tried until no small value vanishes that has to be divided by.
 _BASES = 12
@@ -163,13 +164,8 @@ def _power_applied(matrix: tuple[Any, Any, Any, Any], n: int) -> tuple[Any, Any]
 def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
     """P_n relative to the third of five consecutive points, n > 0; None where a value vanishes that should not."""
     P = dict(zip(range(-2, 3), points, strict=False))
-    chi = {
-        -1: determinant(P[-2], P[0], P[1]),
-        0: 3 * determinant(P[-1], P[0], P[1]),
-        1: determinant(P[-1], P[0], P[2]),
-        2: determinant(P[-1], P[1], P[2]),
-    }
-    if any(is_zero(value) for value in chi.values()):
+    chi = first_chi(P)
+    if any(is_zero(chi[k]) for k in (-1, 0, 1, 2)):
         return None
     Q = _multiple_of_T(gamma, n, is_zero)
     if Q is None:
@@ -255,13 +251,7 @@ def _small_values(
         below = P[k - 1][2]
         U, V, W = block.image(P[k])
         P[k + 1] = (U / below, V / below, W / below)
-    chi = {
-        0: 3 * determinant(P[-1], P[0], P[1]),
-        1: determinant(P[-1], P[0], P[2]),
-        -1: determinant(P[-2], P[0], P[1]),
-        2: determinant(P[-1], P[1], P[2]),
-        -2: determinant(P[-2], P[-1], P[1]),
-    }
+    chi = first_chi(P)
     if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
         return None
     return chi, (P[-1], P[0], P[1])
@@ -273,18 +263,10 @@ def _doubled(small: tuple[dict[int, Any], Sequence[Triple]], gamma: Any, n: int)
     one = gamma / gamma
     half = one / 2
     inverse = {k: one / chi[k] for k in (-2, -1, 0, 1)}
-    psi = {1: one, 2: 2 * one, 3: 3 * one, 4: 4 * one}
-    centre = n >> (n.bit_length() - 3)
-    values = dict(chi)
-
-    for k in range(5, centre + 5):
-        psi[k] = _psi(k, lambda j: psi[j] * psi[j], lambda j: psi[j + 1] * psi[j - 1], gamma, half)
-    for k in range(3, centre + 2):
-        i = k // 2
-        values[k] = _chi(i, k - i, values, lambda j: psi[j] * psi[j], lambda j: psi[j + 1] * psi[j - 1], gamma, inverse)
-    window = [psi[k] for k in range(centre - 3, centre + 5)]
-    middle = [values[k] for k in range(centre - 1, centre + 2)]
-    for digit in f"{n:b}"[3:]:
+    # psi_{-2}, ..., psi_5 and chi_0, chi_1, chi_2 are those around 1.
+    window = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
+    middle, centre = [chi[k] for k in range(3)], 1
+    for digit in f"{n:b}"[1:]:
         odd = int(digit)
         window, middle = _next(window, middle, centre, odd, gamma, half, inverse)
         centre = 2 * centre + odd
@@ -325,28 +307,3 @@ def _next(
             value = around * special[k] - neighbours[k] * (gamma * square if by_three else square)
         values.append(value * inverse[centre - b])
     return new, values
-
-
-def _psi(n: int, square: Callable[[int], Any], neighbours: Callable[[int], Any], gamma: Any, half: Any) -> Any:
-    """psi_n from psi around n/2."""
-    k = n // 2
-    a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
-    left, right = neighbours(a) * square(b), neighbours(b) * square(a)
-    value = (gamma * left if b % 3 == 0 else left) - (gamma * right if a % 3 == 0 else right)
-    return value if n % 2 else value * half
-
-
-def _chi(
-    i: int,
-    b: int,
-    values: dict[int, Any],
-    square: Callable[[int], Any],
-    neighbours: Callable[[int], Any],
-    gamma: Any,
-    inverse: dict[int, Any],
-) -> Any:
-    """chi_{i+b} from chi around i and psi around b."""
-    left, right = values[i + 1] * values[i - 1] * square(b), neighbours(b) * (values[i] * values[i])
-    if (i % 3 == 0) != (b % 3 == 0):
-        left, right = (gamma * left, right) if b % 3 == 0 else (left, gamma * right)
-    return (left - right) * inverse[i - b]

@@ -1,0 +1,108 @@
+"""kahanmaps check-commute, check-integrals, ...: one command for each row of kahanmaps/checks/table.py."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from inspect import cleandoc
+from itertools import count
+from typing import Any
+
+import click
+
+from kahanmaps.checks.table import CHECKS, Check, ClaimOption
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.complete import complete_system
+from kahanmaps_cli.options import (
+    check_options,
+    inline_options,
+    integral_option,
+    is_inline,
+    load_pair,
+    load_system,
+    settings_from,
+    system_argument,
+    system_options,
+)
+from kahanmaps_cli.params import ExactNumber
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.render import print_report
+
+_STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
+
+
+def command(name: str) -> click.Command:
+    """The command of a check."""
+    check = CHECKS[name]
+
+    def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
+        if check.is_of_pair:
+            system, other = _pair(system, other, options)
+        with Progress(options["quiet"]) as progress:
+            settings = settings_from(options, progress)
+            if check.is_of_pair:
+                file, second = load_pair(system, other, options)
+                report = check(file, second, settings, eps2)
+            else:
+                file = load_system(system, options)
+                report = check(file, settings, _claimed(file, check.claim, claim))
+        return print_report(report, options["as_json"], options["verbose"], options["quiet"])
+
+    run = check_options(run)
+    if check.is_of_pair:
+        run = click.option(
+            "--eps2", type=ExactNumber(), metavar="E", help="Another eps for the second map (needs --eps)."
+        )(run)
+        run = inline_options(run)
+        run = click.argument("other", required=False, shell_complete=complete_system)(run)
+        run = system_argument(run)
+    else:
+        run = _option(check.claim)(run) if check.claim is not None else run
+        run = system_options(run)
+    made: click.Command = click.command(name, help=_help(check))(run)
+    return made
+
+
+def _option(claim: ClaimOption) -> Any:
+    if claim.many:
+        return integral_option(claim.help, claim.flag, "claim")
+    kind = click.Path() if claim.metavar == "FILE" else None
+    return click.option(claim.flag, "claim", type=kind, metavar=claim.metavar, help=claim.help)
+
+
+def _help(check: Check) -> str:
+    lines = [line for example in check.examples for line in f"kahanmaps {check.command} {example}".split("\n")]
+    shown = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
+    examples = "\n".join(["\b", *(f"  {line}" for line in shown)])
+    return "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
+
+
+def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tuple[str | None, str | None]:
+    """An inline system is the first, and the argument the second."""
+    if is_inline(options) and system is not None and other is None:
+        system, other = None, system
+    if system == other == "-":
+        raise click.UsageError("found - twice, but standard input holds one system only")
+    return system, other
+
+
+def _claimed(file: lib.SystemFile, option: ClaimOption | None, claim: Any) -> Any:
+    """What the check takes, from what was given on the line."""
+    if option is None or claim is None:
+        return None
+    if option.many:
+        return {name: option.read(file, text) for name, text in _named(claim, file)}
+    return option.read(file, claim)
+
+
+def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
+    """The claims with their names; those without one are called I1, I2, ..., as far as these are free.
+
+    The bare name of an integral of the file adds nothing: all of these are checked anyway.
+    """
+    claims = [(name, text) for name, text in claims if name or text not in file.integrals]
+    taken = [*file.integrals, *(name for name, _ in claims if name)]
+    for name in taken:
+        if taken.count(name) > 1:
+            raise click.UsageError(f"found two integrals of the name {name}, expected a name of its own for each")
+    free = (f"I{k}" for k in count(1) if f"I{k}" not in taken)
+    return [(name or next(free), text) for name, text in claims]

@@ -1,0 +1,164 @@
+"""All checks: what each asks, of what, and where the function is that answers.
+
+The commands check-..., the tasks of batches, the pages of reports and the schemas follow this table. It loads nothing
+before a check is run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from kahanmaps.checks.claims import Report
+    from kahanmaps.documents.files import SystemFile
+
+
+def _as_it_is(file: SystemFile, text: str) -> Any:
+    return text
+
+
+@dataclass(frozen=True)
+class ClaimOption:
+    """The option of a command that takes a claim; `read` makes of its text what the check takes as `extra`.
+
+    With `many` it may be given several times, as EXPR or NAME=EXPR, and the check takes texts by name.
+    """
+
+    flag: str
+    metavar: str
+    help: str
+    read: Callable[[SystemFile, str], Any] = _as_it_is
+    many: bool = False
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check. `question` is asked in lists, `headline` and `text` in the help of its command.
+
+    `function` is "module:name", of a function (file, settings, extra) that returns a Report; where the question is of a
+    pair of systems, (file, other, settings, eps2). `examples` are command lines without "kahanmaps check-NAME".
+    """
+
+    name: str
+    function: str
+    question: str
+    headline: str
+    examples: tuple[str, ...]
+    text: str
+    outcome: str
+    claim: ClaimOption | None = None
+    is_of_pair: bool = False
+    for_batch: str = ""  # the question as batches ask it, where no claim can be given
+
+    @property
+    def command(self) -> str:
+        """The name of its command and of its task."""
+        return f"check-{self.name}"
+
+    def __call__(self, *arguments: Any) -> Report:
+        """The report. Raises InputError where the check does not apply."""
+        module, _, name = self.function.partition(":")
+        report: Report = getattr(import_module(module), name)(*arguments)
+        return report
+
+
+def _tensor(file: SystemFile, path: str) -> Any:
+    from kahanmaps.invariants.poisson import GivenTensor
+
+    return GivenTensor.read(path, file.variables, file.parameters)
+
+
+_CHECKS = [
+    Check(
+        "commute",
+        "kahanmaps.checks.commute:check_commute",
+        "Do two Kahan maps commute?",
+        "Do the maps of SYSTEM and OTHER commute?",
+        (
+            "paper_m3        # its associated maps, pairwise",
+            "f.toml g.toml --eps 1/10",
+            "f.toml g.toml --eps 1/10 --eps2 1/7",
+            "--vars x,y --rhs y --rhs=-x harmonic",
+            "paper_m2 --json | jq .verdict",
+        ),
+        """
+        Without --eps the question is asked for every eps.
+
+        For one SYSTEM of kind [family] the maps of H_0 and H_1, grad H_1 = A grad H_0, come along as a control: they
+        are expected NOT to commute, and this does not change the exit status.
+
+        SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p
+        sets a parameter of both, or of the one that has it.
+        """,
+        "they commute",
+        is_of_pair=True,
+    ),
+    Check(
+        "integrals",
+        "kahanmaps.checks.conserve:check_integrals",
+        "Are the known or claimed integrals conserved?",
+        "Are the integrals of SYSTEM conserved by its map?",
+        (
+            "paper_m3",
+            "euler_top -p a1=1 -p a2=2 -p a3=-3",
+            "my.toml --eps 1/10 \\\n--integral 'I1=(x^2+y^2)/(1-eps^2*z^2)'",
+            "--vars x,y --rhs y --rhs=-x --integral x^2+y^2",
+        ),
+        """
+        Without --eps the question is asked for every eps.
+
+        Known ones: the modified Hamiltonian of Hamiltonian systems, in both normalisations of the paper, and for
+        members of the family the K~ of all rational associated systems. Claimed ones: the [integrals] of the file, and
+        --integral.
+        """,
+        "conserved",
+        ClaimOption(
+            "--integral", "[NAME=]EXPR", "A claimed integral: a rational function of the variables and eps.", many=True
+        ),
+    ),
+    Check(
+        "measure",
+        "kahanmaps.checks.preserve:check_measure",
+        "Is the measure dx/phi invariant?",
+        "Is the measure dx/phi invariant under the map of SYSTEM?",
+        (
+            "paper_m3",
+            "lotka_volterra --eps 1/10",
+            "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y",
+        ),
+        """
+        Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)); otherwise
+        the [density] of the file, or --density.
+        """,
+        "invariant",
+        ClaimOption("--density", "EXPR", "A claimed density phi: a rational function of the variables and eps."),
+    ),
+    Check(
+        "poisson",
+        "kahanmaps.checks.preserve:check_poisson",
+        "Is J - eps^2 f'(x)^2 J, or a given tensor, invariant?",
+        "Is Pi(x) = J - eps^2 f'(x)^2 J, or the tensor P of a file, a Poisson tensor that the map of SYSTEM preserves?",
+        (
+            "paper_m3",
+            "henon_heiles    # Hamiltonian, and it fails",
+            "lotka_volterra --tensor p.toml",
+        ),
+        """
+        Both the transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are put to the test. Without --eps
+        the question is asked for every eps. Without --tensor P is Pi, for Hamiltonian systems.
+        """,
+        "it is",
+        ClaimOption(
+            "--tensor",
+            "FILE",
+            "A claimed tensor P: a section [poisson] with rows of functions, as find-poisson --toml prints it.",
+            _tensor,
+        ),
+        for_batch="Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?",
+    ),
+]
+
+CHECKS = {check.command: check for check in _CHECKS}

@@ -1,0 +1,287 @@
+"""How orbits side by side are advanced, by whatever kernel: all together, and what is unusual again in smaller pieces.
+
+A kernel takes many lanes through many steps and says in which of them every step was usual. The others are taken again
+from where they were, in halves, until a single step is left, which `Engine.one` looks at: it may be near-singular, or
+the last one. So kernels need no test that ends an orbit, and what is unusual costs as much as it is rare.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.steps import (
+    FORMULAS,
+    LARGEST,
+    MUCH,
+    NEAR,
+    OVERFLOW,
+    RUNNING,
+    SINGULAR,
+    GenericEquation,
+    Lanes,
+    PlanarRows,
+)
+
+_SHARES = 8  # of the lanes for each thread: other programs run too
+NOTHING = np.empty((0, 0, 0))
+
+Outcome = tuple[FloatArray, NDArray[np.int8], NDArray[np.int64]]
+
+
+class Kept(NamedTuple):
+    """The states at multiples of `every` (0: none) go to `table[row:, :, lane:]`."""
+
+    every: int
+    table: FloatArray
+    row: int = 0
+    lane: int = 0
+
+    def rows(self, first: int, count: int) -> int:
+        """How many come in `count` steps from the index `first`."""
+        return (first + count) // self.every - first // self.every if self.every else 0
+
+    def of(self, lanes: int, first: int, count: int) -> Kept:
+        """The same for lanes that are taken apart, to a table of their own."""
+        return Kept(self.every, np.empty((self.rows(first, count), self.table.shape[1], lanes)))
+
+
+class Engine(ABC):
+    """Takes states (rows, n) to their images."""
+
+    piece = 64  # steps that are taken together in many lanes,
+    long_piece = 4096  # and in few
+    few = 16
+    group = 4096  # lanes that are taken together by one thread
+    threads = 1
+
+    @abstractmethod
+    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+        """Take the states `count` steps from the index `first`, in place; for each lane whether all were usual.
+
+        Where one was not, what stands in z and in the tables afterwards does not count.
+        """
+
+    @abstractmethod
+    def one(self, z: FloatArray) -> Outcome:
+        """One step: the images, the status of each lane, and how many blocks or pivots were near-singular."""
+
+    def advance(self, lanes: Lanes, first: int, steps: int, kept: Sequence[Kept]) -> None:
+        """Take all lanes `steps` steps from the index `first`; states after the end of an orbit become NaN."""
+        n = lanes.z.shape[1]
+
+        def run(lo: int, hi: int) -> None:
+            piece = self.long_piece if hi - lo <= self.few else self.piece
+            rows = [one.row for one in kept]
+            for index in range(first, first + steps, piece):
+                count = min(piece, first + steps - index)
+                here = [one._replace(row=row, lane=lo) for one, row in zip(kept, rows, strict=True)]
+                self._take(lanes, slice(lo, hi), index, count, here)
+                rows = [row + one.rows(index, count) for one, row in zip(kept, rows, strict=True)]
+
+        in_ranges(run, n, self.threads, self.group)
+        for one in kept:
+            if len(one.table):
+                at = (first // one.every + 1 + np.arange(len(one.table))) * one.every
+                gone = (lanes.failed_at >= 0) & (at[:, None] >= lanes.failed_at)
+                one.table.transpose(0, 2, 1)[gone] = np.nan
+
+    def _take(self, lanes: Lanes, which: Any, index: int, count: int, kept: Sequence[Kept]) -> None:
+        """Take some lanes, a slice of them or an array of numbers, through a piece."""
+        before = np.array(lanes.z[:, which], order="C")
+        z = before.copy()
+        fine = self.take(z, index, count, kept)
+        lanes.z[:, which] = z
+        if fine.all():
+            return
+        bad = np.flatnonzero(~fine)
+        lost = bad + which.start if isinstance(which, slice) else which[bad]
+        if count == 1:
+            self._look(lanes, lost, index, before[:, bad], kept, bad)
+            return
+        lanes.z[:, lost] = before[:, bad]
+        done = [0] * len(kept)
+        for start, part in ((index, count // 2), (index + count // 2, count - count // 2)):
+            apart = [one.of(len(bad), start, part) for one in kept]
+            self._take(lanes, lost, start, part, apart)
+            for k, (one, other) in enumerate(zip(kept, apart, strict=True)):
+                at = one.row + done[k]
+                one.table[at : at + len(other.table), :, one.lane + bad] = other.table
+                done[k] += len(other.table)
+
+    def _look(self, lanes: Lanes, lost: Any, index: int, before: FloatArray, kept: Sequence[Kept], places: Any) -> None:
+        """One step of lanes in which it is unusual."""
+        with np.errstate(all="ignore"):
+            image, status, near = self.one(before)
+        ended = lanes.status[lost] != RUNNING
+        image[:, ended | (status != RUNNING)] = 0.0
+        lanes.z[:, lost] = image
+        for one in kept:
+            if one.rows(index, 1):
+                one.table[one.row, :, one.lane + places] = image.T
+        ends = ~ended & (status != RUNNING)
+        lanes.status[lost[ends]] = status[ends]
+        lanes.failed_at[lost[ends]] = index + 1
+        close = ~ended & (status == RUNNING) & (near > 0)
+        seen = lost[close]
+        lanes.near_at[seen] = np.where(lanes.near[seen] == 0, index, lanes.near_at[seen])
+        lanes.near[seen] += near[close]
+
+
+class Planar(Engine):
+    """Engines in normal form."""
+
+    def __init__(self, rows: PlanarRows) -> None:
+        self.rows = rows
+
+    def one(self, z: FloatArray) -> Outcome:
+        """One step of all blocks; an orbit ends as the first of its blocks does."""
+        status, near = np.zeros(z.shape[1], dtype=np.int8), np.zeros(z.shape[1], dtype=np.int64)
+        image = np.empty_like(z)
+        for run in self.rows.runs:
+            *parts, w, g = FORMULAS[run.kind, run.parts](*run.of(z), self.rows.coefficients(run))
+            for row, part in zip(run.of(image), parts, strict=True):
+                row[:] = part
+            near += (~(np.abs(w) > run.near + run.near * np.abs(g))).sum(axis=0)
+            for of_block in np.atleast_2d(w):
+                ends = np.where(of_block == 0.0, SINGULAR, np.where(np.isfinite(of_block), RUNNING, OVERFLOW))
+                status = np.where(status == RUNNING, ends, status).astype(np.int8)
+        status[(status == RUNNING) & ~np.isfinite(image).all(axis=0)] = OVERFLOW
+        return image, status, near
+
+
+def sound(z: FloatArray, before: FloatArray) -> Any:
+    """Which lanes are finite and have not fallen to 0.
+
+    Where w overflows and the numerators do not, the image is 0, and stays there: a point that all planar maps keep.
+    """
+    return np.isfinite(z).all(axis=0) & ~(((z == 0.0) & (before != 0.0)).any(axis=0))
+
+
+class Generic(Engine):
+    """Engines for any map with an equation."""
+
+    def __init__(self, equation: GenericEquation) -> None:
+        self.equation = equation
+        n = equation.rows
+        # By row and column, and then either one by one or, where there are many, in whole matrices.
+        self._places = [
+            (*divmod(entry, n + 1), int(equation.columns[t]), float(equation.factors[t]))
+            for entry in range(n * (n + 1))
+            for t in range(equation.first[entry], equation.first[entry + 1])
+        ]
+        self._terms: FloatArray | None = None
+        if 3 * len(self._places) > n * n * (n + 1):
+            self._terms = np.zeros((n + len(equation.products), n, n + 1, 1))
+            for i, j, k, factor in self._places:
+                self._terms[k, i, j] = factor
+
+    def one(self, z: FloatArray) -> Outcome:
+        """One elimination."""
+        n = self.equation.rows
+        full = self._matrices(z)
+        matrix, right = full[:, :n], full[:, n].copy()
+        sizes = np.fmax(np.fmax.reduce(np.abs(matrix), axis=1), 1.0)  # of the rows
+        near = np.zeros(z.shape[1], dtype=bool)
+        status = np.where(np.fmax.reduce(sizes) <= LARGEST, RUNNING, OVERFLOW).astype(np.int8)
+        for p in range(n):
+            for i in range(p + 1, n):
+                wanted = np.abs(matrix[i, p]) > MUCH * np.abs(matrix[p, p])
+                if wanted.any():
+                    for table in (matrix, right, sizes):
+                        _exchange(table, p, i, wanted)
+            size = np.abs(matrix[p, p])
+            ends = np.where(size == 0.0, SINGULAR, np.where(size <= LARGEST, RUNNING, OVERFLOW))
+            status = np.where(status == RUNNING, ends, status).astype(np.int8)
+            near |= size <= NEAR * sizes[p]
+            if p + 1 < n:
+                factors = matrix[p + 1 :, p] * (1.0 / matrix[p, p])
+                matrix[p + 1 :, p + 1 :] -= factors[:, None] * matrix[p, None, p + 1 :]
+                right[p + 1 :] -= factors * right[p]
+        for j in range(n - 1, -1, -1):
+            right[j] /= matrix[j, j]
+            right[:j] -= matrix[:j, j] * right[j]
+        status[(status == RUNNING) & ~np.isfinite(right).all(axis=0)] = OVERFLOW
+        return right, status, near.astype(np.int64)
+
+    def _matrices(self, z: FloatArray) -> FloatArray:
+        """(M | r) at the states."""
+        y = list(z)
+        for a, b in self.equation.products:
+            y.append(y[a] * y[b])
+        full: FloatArray = np.repeat(self.equation.constants[:, :, None], z.shape[1], axis=2)
+        if self._terms is None:
+            for i, j, k, factor in self._places:
+                full[i, j] += factor * y[k]
+        else:
+            product = np.empty_like(full)
+            for terms, value in zip(self._terms, y, strict=True):
+                full += np.multiply(terms, value, out=product)
+        return full
+
+
+def _exchange(rows: FloatArray, p: int, i: int, wanted: Any) -> None:
+    """Rows p and i in the lanes that want it."""
+    rows[p, ..., wanted], rows[i, ..., wanted] = rows[i, ..., wanted], rows[p, ..., wanted]
+
+
+class Word(Engine):
+    """Several engines one after the other, each for a step."""
+
+    def __init__(self, engines: Sequence[Engine]) -> None:
+        self.engines = engines
+
+    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+        fine = np.ones(z.shape[1], dtype=bool)
+        places = [one.row for one in kept]
+        for index in range(first, first + count):
+            for engine in self.engines:
+                fine &= engine.take(z, index, 1, ())
+            keep(z, index + 1, kept, places)
+        return fine
+
+    def one(self, z: FloatArray) -> Outcome:
+        """One step of each; an orbit ends as the first of them does."""
+        status, near = np.zeros(z.shape[1], dtype=np.int8), np.zeros(z.shape[1], dtype=np.int64)
+        for engine in self.engines:
+            z, ends, close = engine.one(z)
+            near += np.where(status == RUNNING, close, 0)
+            status = np.where(status == RUNNING, ends, status).astype(np.int8)
+        return z, status, near
+
+
+def keep(z: FloatArray, index: int, kept: Sequence[Kept], places: list[int]) -> None:
+    """Write the states at an index to the tables that want them; `places` are the next rows."""
+    for k, one in enumerate(kept):
+        if one.every and index % one.every == 0:
+            one.table[places[k], :, one.lane : one.lane + z.shape[1]] = z
+            places[k] += 1
+
+
+def segments(first: int, count: int, kept: Sequence[Kept]) -> Iterator[int]:
+    """How many steps it is each time to the next index at which something is kept, or to the end."""
+    index = first
+    while index < first + count:
+        ends = [index - index % one.every + one.every for one in kept if one.every]
+        end = min([first + count, *ends])
+        yield end - index
+        index = end
+
+
+def in_ranges(run: Callable[[int, int], None], lanes: int, threads: int, width: int) -> None:
+    """Run on ranges of lanes that are multiples of `width` long, on several threads in several for each."""
+    share = -(-lanes // (threads * _SHARES * width)) * width if threads > 1 else width
+    ranges = [(lo, min(lanes, lo + share)) for lo in range(0, lanes, share)]
+    if threads == 1 or len(ranges) == 1:
+        for lo, hi in ranges:
+            run(lo, hi)
+        return
+    with ThreadPoolExecutor(min(threads, len(ranges))) as pool:
+        for done in [pool.submit(run, lo, hi) for lo, hi in ranges]:
+            done.result()
