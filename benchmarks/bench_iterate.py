@@ -20,7 +20,7 @@ from flint import fmpz, nmod, nmod_mat
 from work import Absent, Row, Work, require_equal, row, run_gp, say, table, timed, work
 
 from kahanmaps.algebra.fields import GF, QQ, RR
-from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.steps import NormalSteps
 
@@ -31,10 +31,10 @@ ALONE = "kahanmaps: doublings, x over one denominator"
 ELLIPTIC = "PARI/GP: ellmul, n T on the elliptic curves alone"
 
 
-def jump(work: Work, n: int) -> tuple[float, PlanesPoint]:
+def iterate(work: Work, n: int) -> tuple[float, PlanesPoint]:
     """The iterate by doublings, from the start in x to primitive triples."""
     # A new one each time, since tables of values are kept for the next iterate.
-    seconds, value = timed(lambda: Jump(work.structure, work.eps, QQ).value(work.start, n))
+    seconds, value = timed(lambda: NthIterate(work.structure, work.eps, QQ).value(work.start, n))
     assert isinstance(value, PlanesPoint)
     return seconds, value
 
@@ -87,8 +87,8 @@ def elliptic_curve_modulo(work: Work, n: int, repeat: int = 2000) -> float:
 
 def jump_modulo(work: Work, n: int) -> tuple[float, list[int]]:
     """The iterate over GF(2^61 - 1) by doublings, x to x."""
-    jump = Jump(work.structure, work.eps, GF(PRIME))
-    seconds, value = timed(lambda: jump.value(work.start, n), enough=0.3, most=100)
+    iterate = NthIterate(work.structure, work.eps, GF(PRIME))
+    seconds, value = timed(lambda: iterate.value(work.start, n), enough=0.3, most=100)
     return seconds, [int(entry) for entry in value]
 
 
@@ -116,10 +116,10 @@ def step_modulo(work: Work, n: int) -> tuple[float, list[int]]:
 
 
 def over_rationals(work: Work, steps: list[int]) -> list[Row]:
-    """Jumps against stepping and against ellmul; the results have to be equal."""
+    """Iterates against stepping and against ellmul; the results have to be equal."""
     rows: list[Row] = []
     for n in steps:
-        seconds, point = jump(work, n)
+        seconds, point = iterate(work, n)
         count = seconds / multiplication(point)
         digits = max(W.bit_length() for _, _, W in point.triples) * 0.30103
         what = f"m = {work.m}, n = {n}, {digits:,.0f} digits in the largest plane"
@@ -139,7 +139,7 @@ def over_rationals(work: Work, steps: list[int]) -> list[Row]:
 
 
 def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
-    """Jumps of three lengths; stepping up to `short`, where the results have to be equal."""
+    """Iterates of three lengths; stepping up to `short`, where the results have to be equal."""
     slow, stepped = step_modulo(work, short)
     seconds, found = jump_modulo(work, short)
     require_equal("nmod_mat.solve", stepped, found)
@@ -167,16 +167,16 @@ def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
 
 
 def in_balls(work: Work, n: int = 10**6, bits: int = 400, check: int = 80) -> list[Row]:
-    """One long jump in balls; a short one has to contain the exact iterate."""
+    """One long iterate in balls; a short one has to contain the exact iterate."""
     field = RR(bits)
-    jump = Jump(work.structure, work.eps, field)
-    exact = Jump(work.structure, work.eps, QQ).value(work.start, check)
+    iterate = NthIterate(work.structure, work.eps, field)
+    exact = NthIterate(work.structure, work.eps, QQ).value(work.start, check)
     assert isinstance(exact, PlanesPoint)
-    short = jump.value(work.start, check)
+    short = iterate.value(work.start, check)
     with field.working():
         good = all(ball.overlaps(field.convert(x)) for ball, x in zip(short, exact.rationals(), strict=True))
-    require_equal("the jump in balls", good, True)
-    seconds, value = timed(lambda: jump.value(work.start, n), enough=0.3, most=100)
+    require_equal("the iterate in balls", good, True)
+    seconds, value = timed(lambda: iterate.value(work.start, n), enough=0.3, most=100)
     accuracy = min(ball.rel_accuracy_bits() for ball in value)
     say(f"  balls: {seconds * 1e3:.2f} ms, {accuracy} bits")
     note = f"{accuracy} of {bits} bits left"
@@ -195,7 +195,7 @@ def whole_process(n: int = 2000) -> list[Row]:
 
 def alone(n: int) -> None:
     """What `whole_process` starts: prints seconds, megabytes and digits."""
-    value = Jump(work().structure, work().eps, QQ).value(work().start, n)
+    value = NthIterate(work().structure, work().eps, QQ).value(work().start, n)
     assert isinstance(value, PlanesPoint)
     _, below = value.common()
     used = resource.getrusage(resource.RUSAGE_SELF)

@@ -49,11 +49,11 @@ from kahanmaps.family.cubics import cubic_space as cubic_space
 from kahanmaps.family.draw import draw_generic as draw_generic
 from kahanmaps.family.draw import draw_with_chi as draw_with_chi
 from kahanmaps.family.draw import draw_with_eigenvalues as draw_with_eigenvalues
-from kahanmaps.family.hidden import HiddenMember as HiddenMember
-from kahanmaps.family.hidden import hidden_member as hidden_member
-from kahanmaps.family.hidden import hidden_member_of as _hidden_member_of
 from kahanmaps.family.planar import NormalForm as NormalForm
 from kahanmaps.family.planar import normal_form as normal_form
+from kahanmaps.family.recognise import RecognisedMember as RecognisedMember
+from kahanmaps.family.recognise import recognised_member as recognised_member
+from kahanmaps.family.recognise import recognised_member_of as _recognised_member_of
 from kahanmaps.family.structure import Structure as Structure
 from kahanmaps.family.structure import structure_of as _structure_of
 from kahanmaps.family.tensor import TensorStructure as TensorStructure
@@ -116,7 +116,7 @@ from kahanmaps.maps.implicit import BirationalMap as BirationalMap
 from kahanmaps.maps.implicit import ImplicitMap as ImplicitMap
 from kahanmaps.maps.kahan import Kahan as Kahan
 from kahanmaps.maps.kahan import KahanMap as KahanMap
-from kahanmaps.maps.normal_form.iterate import Jump as Jump
+from kahanmaps.maps.normal_form.iterate import NthIterate as NthIterate
 from kahanmaps.maps.normal_form.periods import orbit_period as orbit_period
 from kahanmaps.maps.normal_form.periods import period as _period
 from kahanmaps.maps.normal_form.periods import period_over_rationals as period_over_rationals
@@ -143,7 +143,7 @@ check_integrals = opened(_check_integrals)
 check_measure = opened(_check_measure)
 check_poisson = opened(_check_poisson)
 tensor_file = opened(_tensor_file)
-hidden_member_of = opened(_hidden_member_of)
+recognised_member_of = opened(_recognised_member_of)
 structure_of = opened(_structure_of)
 tensor_structure = opened(_tensor_structure)
 analyze = opened(_analyze)

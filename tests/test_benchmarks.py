@@ -88,8 +88,8 @@ def test_the_jump_the_steps_and_nmod_mat_agree():
     import work
 
     # Long enough to be reached by doublings.
-    assert bench_iterate.jump(work.work(), 30)[1] == bench_iterate.step(work.work(), 30)[1]
-    assert bench_iterate.jump_modulo(work.work(), 50)[1] == bench_iterate.step_modulo(work.work(), 50)[1]
+    assert bench_iterate.iterate(work.work(), 30)[1] == bench_iterate.step(work.work(), 30)[1]
+    assert bench_iterate.iterate_modulo(work.work(), 50)[1] == bench_iterate.step_modulo(work.work(), 50)[1]
     assert bench_iterate.in_balls(work.work(), n=100, bits=200, check=8)
 
 

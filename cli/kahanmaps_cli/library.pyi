@@ -99,12 +99,12 @@ from kahanmaps.family.draw import draw_with_chi as draw_with_chi
 from kahanmaps.family.draw import draw_with_eigenvalues as draw_with_eigenvalues
 from kahanmaps.family.draw import parse_chi as parse_chi
 from kahanmaps.family.draw import random_eigenvalues as random_eigenvalues
-from kahanmaps.family.hidden import HiddenMember as HiddenMember
-from kahanmaps.family.hidden import hidden_hamiltonian as hidden_hamiltonian
-from kahanmaps.family.hidden import hidden_member as hidden_member
-from kahanmaps.family.hidden import reason_against as reason_against
 from kahanmaps.family.planar import NormalForm as NormalForm
 from kahanmaps.family.planar import normal_form as normal_form
+from kahanmaps.family.recognise import RecognisedMember as RecognisedMember
+from kahanmaps.family.recognise import reason_against as reason_against
+from kahanmaps.family.recognise import recognised_hamiltonian as recognised_hamiltonian
+from kahanmaps.family.recognise import recognised_member as recognised_member
 from kahanmaps.family.skew_hamiltonian import chi as chi
 from kahanmaps.family.skew_hamiltonian import diagnosis as diagnosis
 from kahanmaps.family.structure import NoStructure as NoStructure

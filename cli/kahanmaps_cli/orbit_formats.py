@@ -240,7 +240,7 @@ class Npz(Writer):
         import numpy as np
 
         meta = {"header": self._header, "columns": self.columns, "integrals": self.integrals, "end": end}
-        # Steps that were jumped to may be longer than machine integers.
+        # Steps that were reached directly may be longer than machine integers.
         are_short = max(self._steps, default=0) < 2**63
         steps: list[Any] = self._steps if are_short else [str(step).encode() for step in self._steps]
         n = len(self._x)

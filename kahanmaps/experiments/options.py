@@ -185,7 +185,7 @@ VOCABULARY = {
         whole("seed", "seed of everything drawn at random"),
         whole("error_bits", "random points until the probability of error is below 2^-BITS", 1, 10_000),
         whole("max_digits", "digit budget of exact orbits", least=1),
-        choice("method", "how an exact orbit is computed", ("generic", "normal-form", "jump")),
+        choice("method", "how an exact orbit is computed", ("generic", "normal-form", "doubling")),
         Option("arithmetic", "exact, float, mod:P or ball:BITS", _read_arithmetic, str),
         Option("prime", "the prime of modular arithmetic", _read_prime, int),
         whole_numbers(

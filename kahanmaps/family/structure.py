@@ -1,7 +1,7 @@
 """The normal form of a system, declared or found: what fast orbits and the n-th iterate are made from.
 
 A member of the family has a normal form where chi has no repeated root. A system that was not declared a member is
-one all the same if linear algebra finds an A for its Hamiltonian (`hidden`).
+one all the same if linear algebra finds an A for its Hamiltonian (`recognise`).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Structure:
 
     @property
     def A(self) -> fmpq_mat:
-        """A in the system's own coordinates, as in `HiddenMember`."""
+        """A in the system's own coordinates, as in `RecognisedMember`."""
         return self.form.A if self.T is None else self.T.inv().transpose() * self.form.A * self.T.transpose()
 
 
@@ -59,15 +59,15 @@ def structure_of(
     >>> structure_of(system).text
     'a hidden member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
     """
-    from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
     from kahanmaps.family.planar import normal_form
+    from kahanmaps.family.recognise import reason_against, recognised_hamiltonian, recognised_member
 
     if system.dim > _MAX_DIMENSION:
         return NoStructure(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
     declared, T = member is not None, None
     if member is None:
-        hamiltonian = hamiltonian or hidden_hamiltonian(system)
-        found = None if hamiltonian is None else hidden_member(hamiltonian)
+        hamiltonian = hamiltonian or recognised_hamiltonian(system)
+        found = None if hamiltonian is None else recognised_member(hamiltonian)
         if found is None:
             return NoStructure(reason_against(hamiltonian))
         member = found.member

@@ -247,7 +247,7 @@ def height_growth(
         return HeightGrowth((first,), end, every)
     structure = _NOT_GIVEN if structure is None else structure
     method = choose_method(None, "exact", structure, None if every == 1 else at).name
-    if method == "jump" and isinstance(structure, Structure):
+    if method == "doubling" and isinstance(structure, Structure):
         iterates = Iterates(kahan_map, start, at, structure=structure, max_digits=max_digits)
         heights, end = _reached(iterates, deadline)
     else:

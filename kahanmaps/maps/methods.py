@@ -1,8 +1,8 @@
-"""Which way an orbit is computed: generic, in normal form, or by jumps; chosen from what is asked for, with the reason.
+"""Which way an orbit is computed: generic, in normal form, or by doublings; chosen from the wish, with the reason.
 
 * generic: linear solves; for every quadratic system.
 * normal-form: plane by plane, for members of the family with distinct roots.
-* jump: each point wanted directly, by doublings; the same members, any chi.
+* doubling: each point wanted directly, by doublings; the same members, any chi.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from kahanmaps.algebra.fields import Field
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.structure import NoStructure, Structure
 
-METHODS = ("generic", "normal-form", "jump")
-# From here on a jump is faster than steps: over Q, and modulo p, where steps do not pass poles silently.
+METHODS = ("generic", "normal-form", "doubling")
+# From here on doublings are faster than steps: over Q, and modulo p, where steps do not pass poles silently.
 JUMP_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
 
 
@@ -50,10 +50,10 @@ def choose_method(
         if wish is not None:
             raise InputError(f"the method {wish} needs a normal form, and there is none: {structure.reason}")
         return Method("generic", f"no normal form ({structure.reason})")
-    if wish == "jump" and (at is None or arithmetic == "float"):
-        raise InputError("the method jump is for --at N1,N2,... in exact, mod:P or ball arithmetic")
+    if wish == "doubling" and (at is None or arithmetic == "float"):
+        raise InputError("the method doubling is for --at N1,N2,... in exact, mod:P or ball arithmetic")
     if wish == "normal-form" and arithmetic == "mod":
-        raise InputError("modulo P there are the methods generic and jump")
+        raise InputError("modulo P there are the methods generic and doubling")
     if wish is not None:
         return Method(wish, structure.text)
     if arithmetic == "float":
@@ -61,18 +61,18 @@ def choose_method(
     if at is not None and max(at, default=0) >= JUMP_FROM[arithmetic]:
         dense = arithmetic == "exact" and len(at) * 10 > max(at)
         if not dense:
-            return Method("jump", f"{structure.text}; each iterate by doublings")
+            return Method("doubling", f"{structure.text}; each iterate by doublings")
     if arithmetic == "mod":
         return Method("generic", "few steps modulo P")
     return Method("normal-form", structure.text)
 
 
 def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:
-    """Empty where jumps are possible over the field, otherwise the reason (a bad prime)."""
-    from kahanmaps.maps.normal_form.iterate import Jump
+    """Empty where iterates can be reached by doublings over the field, otherwise the reason (a bad prime)."""
+    from kahanmaps.maps.normal_form.iterate import NthIterate
 
     try:
-        Jump(structure, eps, field)
+        NthIterate(structure, eps, field)
     except BadPrime as error:
         return str(error)
     return ""

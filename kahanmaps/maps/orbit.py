@@ -73,7 +73,7 @@ def orbit(
         steps: how many steps to take, or
         at: which iterates alone are wanted.
         arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field such as GF(p).
-        method: "generic", "normal-form" or "jump"; chosen by itself unless given.
+        method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
         backward: step by the inverse map.
         every: float orbits deliver only multiples of it; `wanted` tells for all.
         max_digits: the digit budget in exact arithmetic (200,000 unless given).
@@ -118,7 +118,7 @@ def orbit(
     if structure is None:
         structure = _structure(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
     chosen = choose_method(method, arithmetic.kind, structure, at)
-    if chosen.name != "jump" and far > _TOO_FAR:
+    if chosen.name != "doubling" and far > _TOO_FAR:
         raise InputError(
             f"step {far} is too far to be reached one step after the other (more than {_TOO_FAR:.0e}), "
             f"and there is no other way here: {chosen.reason}"
@@ -135,7 +135,7 @@ def orbit(
                 map_.rounded, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval
             )
         over, budget = map_.at(exact_eps, numbers.field), max_digits or DEFAULT_MAX_DIGITS
-        if chosen.name == "jump" and used is not None:
+        if chosen.name == "doubling" and used is not None:
             return Iterates(over, start, at or [], structure=used, backward=backward, max_digits=budget)
         normal = used if chosen.name == "normal-form" else None
         return Orbit(over, start, far, backward=backward, max_digits=budget, structure=normal)

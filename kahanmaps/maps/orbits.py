@@ -187,14 +187,14 @@ class Orbit(Displayed):
 
             yield from NormalSteps(self.structure, self.map.eps).points(self.start)
         elif self.structure is not None and isinstance(field, BallField):
-            from kahanmaps.maps.normal_form.iterate import Jump
+            from kahanmaps.maps.normal_form.iterate import NthIterate
 
-            jump = Jump(self.structure, self.map.eps, field)
+            iterates = NthIterate(self.structure, self.map.eps, field)
             value: Any = self.start
             yield value
             for step in count(1):
                 try:
-                    value = jump.value(self.start, step)
+                    value = iterates.value(self.start, step)
                 except PrecisionLost:  # for tiny eps a step from the last point may need fewer bits
                     value = self.map.step(value)
                 yield value
@@ -255,9 +255,9 @@ class Iterates:
             require_steps(step)
         self.max_digits = max_digits
         self.end: OrbitEnd | None = None
-        from kahanmaps.maps.normal_form.iterate import Jump
+        from kahanmaps.maps.normal_form.iterate import NthIterate
 
-        self._jump = Jump(structure, self.map.eps, self.map.field)
+        self._jump = NthIterate(structure, self.map.eps, self.map.field)
         self._interrupted = False
         self._busy_in: int | None = None
 

@@ -15,7 +15,7 @@ from flint import arb, fmpq
 from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member
+from kahanmaps.family.recognise import recognised_hamiltonian, recognised_member
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -127,8 +127,8 @@ def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
     """
     member = file.member
     if member is None:
-        hamiltonian = file.hamiltonian or hidden_hamiltonian(file.system)
-        hidden = None if hamiltonian is None else hidden_member(hamiltonian)
+        hamiltonian = file.hamiltonian or recognised_hamiltonian(file.system)
+        hidden = None if hamiltonian is None else recognised_member(hamiltonian)
         if hidden is None or not hidden.is_standard:
             raise InputError(
                 f"{file.name} is of kind [{file.kind}], and one system commutes with itself: give a second system, "

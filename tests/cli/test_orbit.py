@@ -428,7 +428,7 @@ def test_all_methods_print_the_same_points(kahanmaps, extra):
 @pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "mod:2305843009213693951"])
 def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
     line = f"{system} --at 0,3,30 --format jsonl --arithmetic {arithmetic}"
-    assert points(kahanmaps(f"{line} --method jump")) == points(kahanmaps(f"{line} --method generic"))
+    assert points(kahanmaps(f"{line} --method doubling")) == points(kahanmaps(f"{line} --method generic"))
 
 
 @pytest.mark.parametrize(
@@ -436,11 +436,11 @@ def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
     [
         (f"{MEMBER} --steps 20", "normal-form"),
         (f"{MEMBER} --steps 2", "generic"),  # looking for a structure costs more
-        (f"{MEMBER} --at 30", "jump"),
+        (f"{MEMBER} --at 30", "doubling"),
         (f"{IRREDUCIBLE} --steps 20", "normal-form"),
-        (f"{IRREDUCIBLE} --at 30", "jump"),
+        (f"{IRREDUCIBLE} --at 30", "doubling"),
         (f"{MEMBER} --steps 20 --arithmetic mod:10007", "generic"),
-        (f"{MEMBER} --at 100000 --arithmetic mod:10007", "jump"),
+        (f"{MEMBER} --at 100000 --arithmetic mod:10007", "doubling"),
         (f"{MEMBER} --steps 20 --arithmetic ball:200", "normal-form"),
         (f"{MEMBER} --steps 20 --arithmetic float", "normal-form"),
         ("orbit lotka_volterra --start 1,2 --eps 1/10 --steps 8", "generic"),
@@ -465,7 +465,7 @@ def test_an_iterate_modulo_p_may_have_a_number_of_thirty_digits(kahanmaps):
 @pytest.mark.parametrize("suffix", ["jsonl", "csv", "npz"])
 def test_steps_beyond_machine_integers_are_written_in_every_format(kahanmaps, tmp_path, suffix):
     path = tmp_path / f"far.{suffix}"
-    line = f"{MEMBER} --at 5,{10**30} --arithmetic mod:10007 --method jump -o {path}"
+    line = f"{MEMBER} --at 5,{10**30} --arithmetic mod:10007 --method doubling -o {path}"
     assert kahanmaps(line).status == 0
     assert path.stat().st_size > 0
 
@@ -540,7 +540,7 @@ def test_balls_that_no_precision_makes_accurate_end_with_that_status(kahanmaps):
     assert "give 15 digits at every point" in run.records[-1]["message"]
 
 
-@pytest.mark.parametrize("method", ["generic", "normal-form", "jump"])
+@pytest.mark.parametrize("method", ["generic", "normal-form", "doubling"])
 def test_the_budget_is_kept_by_every_method(kahanmaps, method):
     run = kahanmaps(f"{MEMBER} --at 0,5,30 --max-digits 10 --format jsonl --method {method}")
     assert run.status == 3

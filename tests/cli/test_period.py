@@ -118,7 +118,7 @@ def test_a_start_where_the_map_has_no_value_gives_3(kahanmaps):
     assert "cannot be continued" in outcome.err
 
 
-def test_hidden_members_have_periods(kahanmaps):
+def test_recognised_members_have_periods(kahanmaps):
     # the right-hand sides of paper_m3, with nothing said of A
     rhs = kahanmaps("systems paper_m3 --json").json["rhs"]
     words = " ".join(f"--rhs='{text}'" for text in rhs)

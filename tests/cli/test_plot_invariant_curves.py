@@ -30,7 +30,7 @@ def test_dots_outside_are_counted_unless_the_whole_plane_is_shown(kahanmaps, tmp
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_a_hidden_member_is_said_to_be_one(kahanmaps, tmp_path):
+def test_a_recognised_member_is_said_to_be_one(kahanmaps, tmp_path):
     outcome = kahanmaps(
         "plot invariant-curves --vars x,y --rhs=-6*x*y --rhs '3*y^2 - 3*x^2' --start 1,1/3 --eps 1/6 -o",
         tmp_path / "a.png",

@@ -140,7 +140,7 @@ def test_two_dots_in_a_text_make_a_range(raw, expected):
         (STEPS, "0..2", [0, 1, 2]),
         (STEPS, ["4..2 step -1", "10..11"], [4, 3, 2, 10, 11]),
         (STEPS, "1/2..1 step 1/2", None),
-        (METHOD, ["jump", "generic"], ["jump", "generic"]),
+        (METHOD, ["doubling", "generic"], ["doubling", "generic"]),
     ],
 )
 def test_values_come_canonical_and_in_the_order_written(option, raw, values):

@@ -178,7 +178,7 @@ def test_an_orbit_ends_where_the_library_does(system, arithmetic):
     assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
 
 
-@pytest.mark.parametrize("asked", [{"steps": 6}, {"at": "6"}, {"at": "2,6"}, {"at": 6, "method": "jump"}])
+@pytest.mark.parametrize("asked", [{"steps": 6}, {"at": "6"}, {"at": "2,6"}, {"at": 6, "method": "doubling"}])
 @pytest.mark.parametrize("method", [None, "generic", "normal-form"])
 def test_every_method_comes_to_the_same_point(method, asked):
     asked = {"method": method, **asked} if method else asked
@@ -207,7 +207,7 @@ def test_a_member_is_walked_in_normal_form_also_by_machine_numbers():
 
 def test_a_long_orbit_modulo_a_prime_is_reached_directly():
     result = perform("orbit", MEMBER, eps="1/10", at=10**18, arithmetic="mod:10007")
-    assert (result["method"], result["reached"]) == ("jump", 10**18)
+    assert (result["method"], result["reached"]) == ("doubling", 10**18)
 
 
 @pytest.mark.parametrize(("steps", "digits"), [(0, 1), (2, None)])
@@ -314,7 +314,7 @@ def test_a_period_is_that_of_the_orbit_itself():
         ("family-space", LORENZ, {}, "lorenz is of kind \\[system\\], expected one of kind \\[family\\]"),
         ("orbit", LORENZ, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 3"),
         ("orbit", LORENZ, {"eps": 1, "start": "1,2", "arithmetic": "float"}, "found a point with 2 coordinates"),
-        ("orbit", LORENZ, {"eps": 1, "at": 5, "method": "jump"}, "needs a normal form, and there is none"),
+        ("orbit", LORENZ, {"eps": 1, "at": 5, "method": "doubling"}, "needs a normal form, and there is none"),
         ("orbit", LORENZ, {"eps": 1, "at": 5, "arithmetic": "float"}, "need exact, mod:P or ball:BITS arithmetic"),
         ("orbit", MEMBER, {"eps": "1/7", "arithmetic": "mod:7"}, "the prime 7 divides the denominator of 1/7"),
         ("heights", LORENZ, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 3"),

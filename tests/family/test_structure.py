@@ -125,7 +125,7 @@ def test_a_member_with_a_repeated_root_has_no_normal_form():
     assert structure_of(member.chosen.system, member=member) == NoStructure("chi has a repeated root")
 
 
-def test_a_hidden_member_with_a_repeated_root_has_none_either():
+def test_a_recognised_member_with_a_repeated_root_has_none_either():
     # H depends on x1 and x2 alone, and does not split: A is nilpotent or a multiple of I, up to the rest.
     system = hamiltonian("x1^2*x2", 4).system
     assert structure_of(system) == NoStructure("chi has a repeated root")

@@ -135,9 +135,9 @@ def test_integer_points_of_orbits_are_in_lowest_terms(name):
     [
         ("m = 2", 2, "normal-form"),
         ("m = 2", 7, "normal-form"),
-        ("m = 2", 20, "jump"),
+        ("m = 2", 20, "doubling"),
         ("m = 2, sqrt 2", 2, "normal-form"),
-        ("m = 2, sqrt 2", 20, "jump"),
+        ("m = 2, sqrt 2", 20, "doubling"),
     ],
 )
 def test_heights_at_some_steps_are_those_of_all_steps(name, every, method):
@@ -396,7 +396,7 @@ def test_eigenvalues_1_minus_2_3_at_a_few_far_steps_have_the_constant_of_the_nea
     structure = structure_of(system)
     near = growth(system, START, 40, structure=structure)
     far = growth(system, START, 200, structure=structure, every=25, max_digits=None)
-    assert (near.method, far.method) == ("normal-form", "jump")
+    assert (near.method, far.method) == ("normal-form", "doubling")
     assert (near.kind, far.kind) == (Q, Q)
     assert abs(far.constant / near.constant - 1) < Fraction(1, 1000)
 
@@ -515,7 +515,7 @@ def test_a_start_above_the_budget_is_the_only_height():
 def test_a_period_is_seen_in_jumps_too():
     structure, system = structure_and_system("m = 2")
     found = growth(system, [0] * 4, 500, structure=structure, every=100)
-    assert (found.method, found.kind) == ("jump", P)
+    assert (found.method, found.kind) == ("doubling", P)
 
 
 # Output

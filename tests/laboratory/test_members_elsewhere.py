@@ -1,4 +1,4 @@
-"""Members of the commuting family in other coordinates: affine changes of variables hide them from `hidden_member_of`.
+"""Members of the commuting family in other coordinates: affine changes hide them from `recognised_member_of`.
 
 Specified here: `analyze` finds A, T and the centre, says what the theorems give, and what it says holds at exact points
 in the coordinates of the system; a Hamiltonian that is no member is not taken for one.
@@ -21,7 +21,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.cubics import belongs, default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.hidden import hidden_member_of
+from kahanmaps.family.recognise import recognised_member_of
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.consistency import contradictions
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -61,7 +61,7 @@ def proved(found) -> list[str]:
 def test_a_member_in_other_coordinates_is_recognised_with_what_follows(name):
     member = MEMBERS[name]
     system = elsewhere(member.H, 5)
-    assert hidden_member_of(system) is None  # not as long as these coordinates are kept
+    assert recognised_member_of(system) is None  # not as long as these coordinates are kept
     found, m = analysed(system), member.m
     lines = proved(found)
     (line,) = (line for line in lines if line.startswith("belongs to the commuting family: a hidden member"))

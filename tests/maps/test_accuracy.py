@@ -1,7 +1,7 @@
 """Automatic precision of balls: every point that is shown is as accurate as asked for, or the orbit ended otherwise.
 
 A first version took the first precision at which a point was NOT accurate enough; the cases here are those that showed
-it: members with nearly equal eigenvalues, generic stepping, several jumps.
+it: members with nearly equal eigenvalues, generic stepping, far iterates.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.orbit import orbit
 from kahanmaps.maps.orbits import Iterates, Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -58,8 +58,8 @@ def test_jumps_are_as_accurate_as_asked_for(at, digits):
 def test_the_balls_contain_the_exact_point():
     system = NEAR.chosen.system
     structure = structure_of(system, member=NEAR)
-    exact = Jump(structure, "1/20", QQ).value(START, 40).rationals()
-    found = Jump(structure, "1/20", RR(200)).value(START, 40)
+    exact = NthIterate(structure, "1/20", QQ).value(START, 40).rationals()
+    found = NthIterate(structure, "1/20", RR(200)).value(START, 40)
     with RR(4000).working():  # FLINT rounds the number to the precision at hand before it compares
         assert all(ball.contains(arb(number)) for ball, number in zip(found, exact, strict=True))
 

@@ -443,7 +443,7 @@ def test_iterates_given_up_within_the_first_jump_end_after_step_0(monkeypatch):
 
     def points():
         iterates._busy_in = get_ident()
-        iterates.interrupt()  # as a signal does in the middle of a jump
+        iterates.interrupt()  # as a signal does in the middle of a far iterate
         yield
 
     monkeypatch.setattr(iterates, "_points", points)

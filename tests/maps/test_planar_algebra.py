@@ -22,7 +22,7 @@ from kahanmaps.family.draw import draw_with_chi, parse_chi
 from kahanmaps.family.structure import structure_of
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planar_algebra, rational_iterate, tau_table
-from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock, ShortElements
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.steps import NormalSteps
@@ -129,7 +129,7 @@ def test_the_nth_iterate_is_the_point_of_the_orbit(chi):
     start = random_point(system.dim, 4)
     points = list(islice(NormalSteps(structure, fmpq(1, 10)).points(start), 121))
     for n in (30, 77, 120):
-        found = Jump(structure, "1/10", rational_iterate.QQ).value(start, n)
+        found = NthIterate(structure, "1/10", rational_iterate.QQ).value(start, n)
         assert found == points[n] != points[n - 1]
         assert hash(found) == hash(points[n])
         assert found.lowest_terms() == points[n].lowest_terms()
@@ -171,7 +171,7 @@ def test_a_wrong_iterate_does_not_pass(monkeypatch):
     iterate = tau_table.iterate
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        Jump(structure, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 700)
+        NthIterate(structure, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 700)
 
 
 def test_a_pole_over_a_field_ends_the_orbit():

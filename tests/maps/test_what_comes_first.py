@@ -17,7 +17,7 @@ from planar_helpers import STARTS, over_members, planar_system, side_by_side, st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.family.structure import Structure, structure_of
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.orbits import Iterates, Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -44,16 +44,16 @@ def event(system, structure, eps, start, steps, digits):
     kahan = KahanMap(system, eps)
     walks = [ended(Orbit(kahan, start, steps, structure=known, max_digits=digits)) for known in (None, structure)]
     assert walks[0] == walks[-1]
-    jump = ended(Iterates(kahan, start, [steps], structure=structure, max_digits=digits))
+    far = ended(Iterates(kahan, start, [steps], structure=structure, max_digits=digits))
     walk = walks[0]
     if walk.is_whole:
-        assert (jump.status, jump.steps) == ("completed", steps)
+        assert (far.status, far.steps) == ("completed", steps)
     elif walk.status == "singular":
         where = f"step {steps} cannot be reached: the map has no value at step {walk.steps}"
-        assert jump == OrbitEnd("singular", 0, where)
+        assert far == OrbitEnd("singular", 0, where)
     else:
-        assert jump.status == walk.status == "budget"
-        assert jump.message.endswith(walk.message)
+        assert far.status == walk.status == "budget"
+        assert far.message.endswith(walk.message)
     return walk
 
 
@@ -103,8 +103,8 @@ def test_members_end_alike_by_steps_and_by_jumps(name):
 def test_numbers_that_stay_short_are_delivered_however_far_the_step_is(names):
     system, structure, start = side_by_side(*names)
     n, field = 10**26, GF(2**61 - 1)
-    value = Jump(structure, "1/2", KahanMap(system, "1/2").field).value(start, n, 10**5)
-    expected = Jump(structure, "1/2", field).value(start, n)
+    value = NthIterate(structure, "1/2", KahanMap(system, "1/2").field).value(start, n, 10**5)
+    expected = NthIterate(structure, "1/2", field).value(start, n)
     assert tuple(map(field.convert, value.rationals())) == tuple(expected)
     assert value.height < 2000
 

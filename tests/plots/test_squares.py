@@ -117,7 +117,7 @@ def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
     assert found.g_after_f[1][1] == found.g_after_f[0][0]
 
 
-def test_a_hidden_member_is_found():
+def test_a_recognised_member_is_found():
     file = load("paper_m2")
     pair, _ = pairs_of_member(SystemFile.from_system(file.system))
     assert squares(pair, START, "1/50").closes is True

@@ -315,12 +315,12 @@ def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tup
     return file, file.member
 
 
-def _member_or_hidden(file: lib.SystemFile) -> tuple[lib.SystemFile, lib.FamilyMember, lib.HiddenMember | None]:
+def _member_or_hidden(file: lib.SystemFile) -> tuple[lib.SystemFile, lib.FamilyMember, lib.RecognisedMember | None]:
     """The member that a system is declared to be, or is found to be."""
     if file.member is not None:
         return file, file.member, None
-    hamiltonian = file.hamiltonian or lib.hidden_hamiltonian(file.system)
-    hidden = None if hamiltonian is None else lib.hidden_member(hamiltonian)
+    hamiltonian = file.hamiltonian or lib.recognised_hamiltonian(file.system)
+    hidden = None if hamiltonian is None else lib.recognised_member(hamiltonian)
     if hidden is None:
         raise lib.InputError(
             f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all the "

@@ -48,7 +48,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @click.option(
     "--method",
-    type=click.Choice(("generic", "normal-form", "jump")),
+    type=click.Choice(("generic", "normal-form", "doubling")),
     help="How to compute it; chosen by itself unless given (-v says which and why).",
 )
 @click.option("--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="For ball:auto; default 15.")

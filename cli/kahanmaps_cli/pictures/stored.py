@@ -160,7 +160,7 @@ def _lines(path: str) -> Iterator[str]:
 
 
 def _stored(steps: Sequence[Any], x: Any, header: dict[str, Any], end: dict[str, Any]) -> Stored:
-    """An orbit; its steps become doubles, for those that were jumped to may be longer than machine integers."""
+    """An orbit; its steps become doubles, for those that were reached directly may be longer than machine integers."""
     import numpy as np
 
     width = len(x[0]) if len(x) else 0

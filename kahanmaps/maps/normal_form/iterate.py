@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
 
 
-class Jump:
+class NthIterate:
     """Iterates of Phi(., eps) over QQ, GF(p) or real balls for a structure; the time step is 2 eps.
 
     Raises BadPrime where the structure has no reduction modulo p.
@@ -31,7 +31,7 @@ class Jump:
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
     >>> from kahanmaps.family.structure import structure_of
     >>> structure = structure_of(draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system)
-    >>> Jump(structure, "1/10", GF(10**9 + 7)).value([1, 2, 3, 4, 5, 6], 10**30)[0]
+    >>> NthIterate(structure, "1/10", GF(10**9 + 7)).value([1, 2, 3, 4, 5, 6], 10**30)[0]
     946728668
     """
 

@@ -27,18 +27,18 @@ from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import belongs, default_variables, third_derivatives
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.hidden import (
+from kahanmaps.family.planar import normal_form
+from kahanmaps.family.recognise import (
     _DRAWS,
     _candidates,
     _variants,
     darboux_coordinates,
-    hidden_hamiltonian,
-    hidden_member,
-    hidden_member_of,
     reason_against,
+    recognised_hamiltonian,
+    recognised_member,
+    recognised_member_of,
     structure_space,
 )
-from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi, defects, evaluate_at_matrix, random_symplectic
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -78,7 +78,7 @@ def cubic(text: str, n: int) -> CubicHamiltonian:
 
 def found_in(hamiltonian: CubicHamiltonian):
     """The member found, which has to be there."""
-    found = hidden_member(hamiltonian)
+    found = recognised_member(hamiltonian)
     assert found is not None
     return found
 
@@ -193,13 +193,13 @@ def test_a_cubic_without_structure_is_no_member(n, seed):
         X == X[0, 0] * fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
         for X in structure_space(hamiltonian.H)
     ] == [True]
-    assert hidden_member(hamiltonian) is None
+    assert recognised_member(hamiltonian) is None
     assert reason_against(hamiltonian).startswith("only the multiples of I")
 
 
 def test_one_term_that_couples_the_parts_destroys_the_splitting():
-    assert hidden_member(cubic("x1^3 + x3^3 + x2^3 + x4^3", 4)) is not None
-    assert hidden_member(cubic("x1^3 + x3^3 + x2^3 + x4^3 + x1*x3*x2", 4)) is None
+    assert recognised_member(cubic("x1^3 + x3^3 + x2^3 + x4^3", 4)) is not None
+    assert recognised_member(cubic("x1^3 + x3^3 + x2^3 + x4^3 + x1*x3*x2", 4)) is None
 
 
 @pytest.mark.parametrize(
@@ -213,7 +213,7 @@ def test_one_term_that_couples_the_parts_destroys_the_splitting():
 )
 def test_systems_of_another_kind_are_no_members(H, J, reason):
     hamiltonian = CubicHamiltonian(parse_polynomial(H, default_variables(len(J))), fmpq_mat(J))
-    assert hidden_member(hamiltonian) is None
+    assert recognised_member(hamiltonian) is None
     assert reason_against(hamiltonian).startswith(reason)
     with pytest.raises(InputError, match=reason):
         structure_space(hamiltonian.H, hamiltonian.J)
@@ -222,14 +222,14 @@ def test_systems_of_another_kind_are_no_members(H, J, reason):
 def test_the_size_is_limited():
     hamiltonian = cubic("x1^3", 34)
     with pytest.raises(InputError, match="in dimensions up to 32, found 34"):
-        hidden_member(hamiltonian)
+        recognised_member(hamiltonian)
     with pytest.raises(InputError, match="in dimensions up to 32, found 34"):
         structure_space(hamiltonian.H)
 
 
 @pytest.mark.parametrize("name", ["henon_heiles", "three_wave", "weierstrass", "harmonic", "planar_cubic_hamiltonian"])
 def test_these_systems_of_the_catalogue_are_no_members(name):
-    assert hidden_member(load(name).hamiltonian) is None
+    assert recognised_member(load(name).hamiltonian) is None
 
 
 # All solutions.
@@ -445,8 +445,8 @@ def test_a_lagrangian_cubic_has_nilpotent_structure_only():
 @over_generic
 def test_a_system_of_equations_is_recognised(member):
     system = forgotten(member).system
-    assert hidden_hamiltonian(system) == forgotten(member)
-    found = hidden_member_of(system)
+    assert recognised_hamiltonian(system) == forgotten(member)
+    found = recognised_member_of(system)
     assert found is not None
     assert found.A == found_in(forgotten(member)).A
 
@@ -455,20 +455,20 @@ def test_the_hamiltonian_may_have_terms_of_lower_degree():
     hamiltonian = CubicHamiltonian(
         parse_polynomial("x1^2*x4 - 1/2*x2*x3 + x4^2 + 3*x1 - x3 + x2^3", default_variables(4)), standard_structure(4)
     )
-    assert hidden_hamiltonian(hamiltonian.system) == hamiltonian
-    assert hidden_member_of(hamiltonian.system) is None
+    assert recognised_hamiltonian(hamiltonian.system) == hamiltonian
+    assert recognised_member_of(hamiltonian.system) is None
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz", "euler_top", "volterra_periodic_4"])
 def test_what_has_no_hamiltonian_is_no_member(name):
-    assert hidden_hamiltonian(load(name).system) is None
-    assert hidden_member_of(load(name).system) is None
-    assert reason_against(hidden_hamiltonian(load(name).system)) == "x' is not J grad H with J = [[0, I], [-I, 0]]"
+    assert recognised_hamiltonian(load(name).system) is None
+    assert recognised_member_of(load(name).system) is None
+    assert reason_against(recognised_hamiltonian(load(name).system)) == "x' is not J grad H with J = [[0, I], [-I, 0]]"
 
 
 def test_a_system_that_is_hamiltonian_for_twice_the_structure_has_half_the_hamiltonian():
     system = QuadraticSystem.from_text(["q", "p"], ["6*p^2", "-6*q^2"])
-    assert str(hidden_hamiltonian(system).H) == "2*q^3 + 2*p^3"
+    assert str(recognised_hamiltonian(system).H) == "2*q^3 + 2*p^3"
 
 
 # What was found is checked.

@@ -37,11 +37,11 @@ _T = fmpq_poly([0, 1])
 
 
 @dataclass(frozen=True, eq=False)
-class HiddenMember:
+class RecognisedMember:
     """A Hamiltonian system that was found to be a member: `member` is the system in the coordinates y with x = T y.
 
     T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
-    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `hidden_member`; that `member` is the system is
+    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `recognised_member`; that `member` is the system is
     verified at construction, exactly. Raises HypothesisError otherwise.
     """
 
@@ -127,7 +127,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     return _reduced([inverse * fmpq_mat(S) for S in found])
 
 
-def hidden_member(hamiltonian: CubicHamiltonian) -> HiddenMember | None:
+def recognised_member(hamiltonian: CubicHamiltonian) -> RecognisedMember | None:
     """The system as a member of the family, if it is one: with an A that splits H the furthest, of small entries.
 
     H must be a homogeneous cubic and J invertible, in dimension 2m; otherwise, and where only the multiples of I
@@ -139,13 +139,13 @@ def hidden_member(hamiltonian: CubicHamiltonian) -> HiddenMember | None:
 
     >>> from kahanmaps.algebra.text import parse_polynomial
     >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
-    >>> found = hidden_member(CubicHamiltonian(H, standard_structure(4)))
+    >>> found = recognised_member(CubicHamiltonian(H, standard_structure(4)))
     >>> found.text
     'H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)'
     >>> [g.label for g in found.member.associated()]
     ['++', '+-']
     >>> H = parse_polynomial("x1^3 + x1*x2*x3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
-    >>> hidden_member(CubicHamiltonian(H, standard_structure(4))) is None
+    >>> recognised_member(CubicHamiltonian(H, standard_structure(4))) is None
     True
     """
     if _reason_against(hamiltonian):
@@ -157,17 +157,17 @@ def hidden_member(hamiltonian: CubicHamiltonian) -> HiddenMember | None:
     space = structure_space(H)
     if len(space) == 1 and hamiltonian.dim > 2:
         return None
-    return HiddenMember(hamiltonian, FamilyMember(_furthest(space), H), T, len(space))
+    return RecognisedMember(hamiltonian, FamilyMember(_furthest(space), H), T, len(space))
 
 
-def hidden_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
+def recognised_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     """H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none. Exact.
 
     Other structures J are not searched for.
 
-    >>> print(hidden_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
+    >>> print(recognised_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
     1/3*q^3 + 1/2*p^2
-    >>> hidden_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "p^2"])) is None
+    >>> recognised_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "p^2"])) is None
     True
     """
     if system.dim % 2:
@@ -184,19 +184,19 @@ def hidden_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
 
-def hidden_member_of(system: QuadraticSystem) -> HiddenMember | None:
-    """`hidden_member` of the system, where x' = J grad H with the standard J; None otherwise.
+def recognised_member_of(system: QuadraticSystem) -> RecognisedMember | None:
+    """`recognised_member` of the system, where x' = J grad H with the standard J; None otherwise.
 
     >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
-    >>> print(hidden_member_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
+    >>> print(recognised_member_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
     H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)
     """
-    hamiltonian = hidden_hamiltonian(system)
-    return None if hamiltonian is None else hidden_member(hamiltonian)
+    hamiltonian = recognised_hamiltonian(system)
+    return None if hamiltonian is None else recognised_member(hamiltonian)
 
 
 def reason_against(hamiltonian: CubicHamiltonian | None) -> str:
-    """In a sentence why there is no hidden member; None stands for a system that `hidden_hamiltonian` has no H for."""
+    """In a sentence why the system is no member; None stands for one that `recognised_hamiltonian` has no H for."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
     return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"

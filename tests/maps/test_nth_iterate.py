@@ -30,10 +30,8 @@ from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.structure import structure_of
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import iterate as jump
-from kahanmaps.maps.normal_form import rational_iterate as rational_jump
-from kahanmaps.maps.normal_form import tau_table
-from kahanmaps.maps.normal_form.iterate import Jump, special_start
+from kahanmaps.maps.normal_form import iterate, rational_iterate, tau_table
+from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.rational_iterate import OverBudget
@@ -57,7 +55,7 @@ def walked(system, eps, field, start, steps):
     return [point.x for point in orbit], orbit.end
 
 
-def jumped(found, start, n):
+def reached(found, start, n):
     """The n-th iterate, None where it is singular."""
     try:
         return coordinates(found.value(start, n))
@@ -74,7 +72,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
     structure, system = structure_and_system(name)
     field, rng, eps = GF(prime), random.Random(prime), "3/13"
     try:
-        found = Jump(structure, eps, field)
+        found = NthIterate(structure, eps, field)
     except BadPrime:
         assert prime in (3, 5)  # of S or T
         return
@@ -82,7 +80,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
         start = [rng.randrange(prime) for _ in range(system.dim)]
         points, _ = walked(system, eps, field, start, NUMBERS[-1])
         for n in NUMBERS:
-            image = jumped(found, start, n)
+            image = reached(found, start, n)
             if n < len(points):
                 assert image == points[n]
             elif len(points) <= (16 if n <= 16 else 4):  # a pole among the first steps
@@ -95,10 +93,10 @@ def test_modulo_two_it_is_the_point_of_the_orbit_or_refused(name):
     start = [1] * system.dim
     points, _ = walked(system, 3, GF(2), start, 9)
     try:
-        found = Jump(structure, 3, GF(2))
+        found = NthIterate(structure, 3, GF(2))
     except BadPrime:
         return
-    assert [jumped(found, start, n) for n in range(len(points))] == points
+    assert [reached(found, start, n) for n in range(len(points))] == points
 
 
 @pytest.mark.parametrize("prime", quick([5, 7, 31, 10007, 2**61 - 1, 2**89 - 1], [5, 2**89 - 1]))
@@ -106,17 +104,17 @@ def test_modulo_two_it_is_the_point_of_the_orbit_or_refused(name):
 def test_modulo_a_prime_huge_iterates_compose(name, prime):
     structure, system = structure_and_system(name)
     try:
-        found = Jump(structure, "3/13", GF(prime))
+        found = NthIterate(structure, "3/13", GF(prime))
     except BadPrime:
         assert prime == 5
         return
     rng, passed = random.Random(prime), 0
     for _ in range(12):
         start = [rng.randrange(prime) for _ in range(system.dim)]
-        first = jumped(found, start, 10**15)
+        first = reached(found, start, 10**15)
         if first is None:
             continue
-        second, whole = jumped(found, first, 10**30 - 10**15), jumped(found, start, 10**30)
+        second, whole = reached(found, first, 10**30 - 10**15), reached(found, start, 10**30)
         if second is not None and whole is not None:
             assert second == whole
             passed += 1
@@ -126,7 +124,7 @@ def test_modulo_a_prime_huge_iterates_compose(name, prime):
 @pytest.mark.parametrize(("name", "prime"), [("m = 1", 43), ("m = 2", 31)])
 def test_after_the_period_the_start_is_back(name, prime):
     structure, system = structure_and_system(name)
-    found, rng, seen = Jump(structure, "3/13", GF(prime)), random.Random(prime), 0
+    found, rng, seen = NthIterate(structure, "3/13", GF(prime)), random.Random(prime), 0
     for _ in range(40):
         start = tuple(map(GF(prime).convert, [rng.randrange(prime) for _ in range(system.dim)]))
         _, end = walked(system, "3/13", GF(prime), start, 2500)
@@ -142,15 +140,15 @@ def test_with_minus_eps_the_way_leads_back():
     structure, system = structure_and_system("m = 3")
     field = GF(2**61 - 1)
     start = tuple(map(field.convert, random_point(system.dim, 1)))
-    there = Jump(structure, "1/10", field).value(start, 10**9)
-    assert coordinates(Jump(structure, "-1/10", field).value(there, 10**9)) == start
-    assert coordinates(Jump(structure, "1/10", field).value(there, 10**9)) != start
+    there = NthIterate(structure, "1/10", field).value(start, 10**9)
+    assert coordinates(NthIterate(structure, "-1/10", field).value(there, 10**9)) == start
+    assert coordinates(NthIterate(structure, "1/10", field).value(there, 10**9)) != start
 
 
 @pytest.mark.parametrize("prime", [3, 7, 11])
 def test_in_a_small_field_every_number_of_steps_has_an_answer(prime):
     structure, system = structure_and_system("m = 2, undisguised")
-    found, answers = Jump(structure, 1, GF(prime)), 0
+    found, answers = NthIterate(structure, 1, GF(prime)), 0
     rng = random.Random(prime)
     for _ in range(20):
         start = [rng.randrange(prime) for _ in range(system.dim)]
@@ -170,7 +168,7 @@ def test_over_q_it_is_the_point_of_the_orbit(name):
     structure, system = structure_and_system(name)
     start = random_point(system.dim, 6)
     points, _ = walked(system, "1/10", QQ, start, 30)
-    found = Jump(structure, "1/10", QQ)
+    found = NthIterate(structure, "1/10", QQ)
     for n in (0, 1, 7, 24, 25, 26, 29, 30):
         value = found.value(start, n)
         assert isinstance(value, PlanesPoint)
@@ -182,7 +180,7 @@ def test_where_chi_does_not_split_it_is_the_point_of_the_orbit_too(name):
     structure, system = structure_and_system(name)
     start = random_point(system.dim, 6, height=3)
     points, _ = walked(system, "1/10", QQ, start, 27)
-    found = Jump(structure, "1/10", QQ)
+    found = NthIterate(structure, "1/10", QQ)
     for n in (0, 1, 7, 16, 17, 24, 25, 27):
         assert coordinates(found.value(start, n)) == points[n]
 
@@ -204,7 +202,7 @@ KINDS = [
 def test_over_q_every_kind_of_plane_has_its_iterates(names):
     system, structure, start = side_by_side(*names)
     points, _ = walked(system, "1/2", QQ, start, 40)
-    found = Jump(structure, "1/2", QQ)
+    found = NthIterate(structure, "1/2", QQ)
     assert [coordinates(found.value(start, n)) for n in range(20, 41)] == points[20:]
 
 
@@ -225,7 +223,7 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
     start = (fmpq(U, W), u, fmpq(V, W), v)
     points, end = walked(system, "1/2", QQ, start, 60)
     assert (end.status, end.steps) == ("singular", last)
-    found = Jump(structure, "1/2", QQ)
+    found = NthIterate(structure, "1/2", QQ)
     for n in (last + 1, last + 2, last + 3, 57):
         with pytest.raises(SingularStep, match=f"no value at step {last}$"):
             found.value(start, n)
@@ -238,7 +236,7 @@ def test_the_pole_of_an_orbit_of_planes_is_where_it_is(more):
     name = "a pole at step 2"
     U, V, W = before(*STARTS[name], more)
     _, structure, (_, u, _, v) = side_by_side(name, "a double root")
-    planes = rational_jump.RationalOrbit(structure, fmpq(1, 2), (fmpq(U, W), u, fmpq(V, W), v), None)._planes
+    planes = rational_iterate.RationalOrbit(structure, fmpq(1, 2), (fmpq(U, W), u, fmpq(V, W), v), None)._planes
     pole = more + 2
     with pytest.raises(SingularStep, match=f"no value at step {pole - 1}$"):
         planes.point(pole)
@@ -249,7 +247,7 @@ def test_the_pole_of_an_orbit_of_planes_is_where_it_is(more):
 def test_a_start_without_an_image_is_singular_over_every_field():
     _, structure, start = side_by_side("no value at the start", "a double root")
     for field in (QQ, GF(10007), GF(2**89 - 1)):
-        found = Jump(structure, "1/2", field)
+        found = NthIterate(structure, "1/2", field)
         x = tuple(map(field.convert, start))
         assert coordinates(found.value(x, 0)) == x
         for n in (1, 2, 30, 10**6):
@@ -260,13 +258,13 @@ def test_a_start_without_an_image_is_singular_over_every_field():
 def test_modulo_a_prime_poles_on_the_way_are_passed_over():
     structure, system = structure_and_system("m = 2")
     field, rng, seen = GF(31), random.Random(4), 0
-    found = Jump(structure, "3/13", field)
+    found = NthIterate(structure, "3/13", field)
     for _ in range(60):
         start = tuple(map(field.convert, [rng.randrange(31) for _ in range(system.dim)]))
         points, end = walked(system, "3/13", field, start, 200)
-        beyond = None if end.status != "singular" or len(points) < 18 else jumped(found, start, len(points) + 20)
+        beyond = None if end.status != "singular" or len(points) < 18 else reached(found, start, len(points) + 20)
         if beyond is not None:
-            back = jumped(Jump(structure, "-3/13", field), beyond, len(points) + 20)
+            back = reached(NthIterate(structure, "-3/13", field), beyond, len(points) + 20)
             assert back is None or back == start
             seen += back == start
     assert seen > 3
@@ -280,7 +278,7 @@ def test_balls_enclose_the_exact_iterate(name):
     structure, system = structure_and_system(name)
     # Large numbers, so that the sixteen steps before the doublings already cost some hundred bits.
     start, field = random_point(system.dim, 6, height=3), RR(2000)
-    exact, found = Jump(structure, "1/10", QQ), Jump(structure, "1/10", field)
+    exact, found = NthIterate(structure, "1/10", QQ), NthIterate(structure, "1/10", field)
     for n in (0, 1, 10, 24, 30):
         try:
             balls = found.value(start, n)
@@ -296,7 +294,7 @@ def test_balls_enclose_the_exact_iterate(name):
 def test_balls_stay_narrow_for_many_steps(n):
     structure, system = structure_and_system("m = 2")
     x = random_point(system.dim, 1)
-    wide, narrow = (Jump(structure, "1/10", RR(bits)).value(x, n) for bits in (400, 600))
+    wide, narrow = (NthIterate(structure, "1/10", RR(bits)).value(x, n) for bits in (400, 600))
     assert all(a.overlaps(b) for a, b in zip(wide, narrow, strict=True))
     assert min(ball.rel_accuracy_bits() for ball in wide) > 200
 
@@ -304,7 +302,7 @@ def test_balls_stay_narrow_for_many_steps(n):
 def test_balls_too_wide_to_decide_say_so():
     structure, system = structure_and_system("m = 2")
     with pytest.raises(PrecisionLost):
-        Jump(structure, "1/10", RR(10)).value(random_point(system.dim, 1), 10**12)
+        NthIterate(structure, "1/10", RR(10)).value(random_point(system.dim, 1), 10**12)
 
 
 # What is refused.
@@ -314,13 +312,13 @@ def test_balls_too_wide_to_decide_say_so():
 def test_a_negative_number_of_steps_is_refused(field):
     structure, system = structure_and_system("m = 2")
     with pytest.raises(InputError, match="found the step -1, expected 0 or more"):
-        Jump(structure, "1/10", field).value([1] * system.dim, -1)
+        NthIterate(structure, "1/10", field).value([1] * system.dim, -1)
 
 
 @pytest.mark.parametrize("name", ["m = 2", "m = 2, sqrt 2"])
 def test_what_would_be_too_long_is_refused_with_the_first_step_that_is_too_long(name):
     structure, system = structure_and_system(name)
-    found, start = Jump(structure, "1/10", QQ), random_point(system.dim, 6, height=3)
+    found, start = NthIterate(structure, "1/10", QQ), random_point(system.dim, 6, height=3)
     points, _ = walked(system, "1/10", QQ, start, 40)
     bits = [IntegerPoint.from_rationals(point).bits for point in points]
     with pytest.raises(OverBudget) as refused:
@@ -332,20 +330,20 @@ def test_what_would_be_too_long_is_refused_with_the_first_step_that_is_too_long(
 def test_without_a_budget_there_is_a_limit_all_the_same():
     structure, _ = structure_and_system("m = 2")
     with pytest.raises(OverBudget):
-        Jump(structure, "1/10", QQ).value([1, "1/2", 3, 4], 10**9)
+        NthIterate(structure, "1/10", QQ).value([1, "1/2", 3, 4], 10**9)
 
 
 def test_modulo_a_prime_there_is_nothing_to_budget():
     structure, _ = structure_and_system("m = 2")
-    assert Jump(structure, "1/10", GF(10007)).value([1, 2, 3, 4], 10**30, max_bits=1)
+    assert NthIterate(structure, "1/10", GF(10007)).value([1, 2, 3, 4], 10**30, max_bits=1)
 
 
 def test_a_prime_without_reduction_is_refused():
     structure, _ = structure_and_system("m = 3")
     with pytest.raises(BadPrime):
-        Jump(structure, "1/10", GF(2))
+        NthIterate(structure, "1/10", GF(2))
     with pytest.raises(BadPrime):
-        Jump(structure, "1/7", GF(7))
+        NthIterate(structure, "1/7", GF(7))
 
 
 # That the tests can fail.
@@ -357,7 +355,7 @@ def test_a_wrong_doubling_is_noticed(monkeypatch):
     iterate = tau_table.iterate
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        Jump(structure, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
+        NthIterate(structure, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
 
 
 # A rational plane beside one over Q(i).
@@ -381,7 +379,7 @@ def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
     last = steps + 1
     points, end = walked(system, "1/2", QQ, start, last + 2)
     assert (end.status, end.steps) == ("singular", last)
-    found = Jump(structure, "1/2", QQ)
+    found = NthIterate(structure, "1/2", QQ)
     assert coordinates(found.value(start, last)) == points[last]
     for n in (last + 1, last + 2, last + 3, last + 4):
         with pytest.raises(SingularStep, match=f"step {last}$"):
@@ -413,27 +411,27 @@ def test_around_a_cycle_only_the_rest_of_the_steps_is_walked(block, start, perio
     for _ in range(period):
         orbit.append(cubic.image(orbit[-1]))
     assert [same_point(P, point) for P in orbit] == [True, *[False] * (period - 1), True]
-    monkeypatch.setattr(jump, "_CYCLE", period)
+    monkeypatch.setattr(iterate, "_CYCLE", period)
     for n in range(2 * period):
-        assert same_point(jump._around_cycle(cubic, point, n), orbit[n % period])
-        assert same_point(jump._around_cycle(cubic, point, 10**30 + n), orbit[n % period])
-    monkeypatch.setattr(jump, "_CYCLE", period - 1)
-    assert same_point(jump._around_cycle(cubic, point, period - 1), orbit[period - 1])
+        assert same_point(iterate._around_cycle(cubic, point, n), orbit[n % period])
+        assert same_point(iterate._around_cycle(cubic, point, 10**30 + n), orbit[n % period])
+    monkeypatch.setattr(iterate, "_CYCLE", period - 1)
+    assert same_point(iterate._around_cycle(cubic, point, period - 1), orbit[period - 1])
     with pytest.raises(InputError, match="cannot be reached directly"):
-        jump._around_cycle(cubic, point, period)
+        iterate._around_cycle(cubic, point, period)
 
 
 def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     structure, _ = structure_and_system("m = 2")
     start = [1, 2, 3, fmpq(1, 4)]
-    wanted = coordinates(Jump(structure, "1/10", QQ).value(start, 30))
-    steps_modulo, random_prime = rational_jump._steps_modulo, rational_jump._random_prime
+    wanted = coordinates(NthIterate(structure, "1/10", QQ).value(start, 30))
+    steps_modulo, random_prime = rational_iterate._steps_modulo, rational_iterate._random_prime
     drawn = [1000003, 1000033, 1000037]  # with a pole at step 2, as if these divided W there
-    monkeypatch.setattr(rational_jump, "_random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
+    monkeypatch.setattr(rational_iterate, "_random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
     monkeypatch.setattr(
-        rational_jump, "_steps_modulo", lambda *at: (2, (1, 1, 0)) if at[2] < 2**20 else steps_modulo(*at)
+        rational_iterate, "_steps_modulo", lambda *at: (2, (1, 1, 0)) if at[2] < 2**20 else steps_modulo(*at)
     )
-    assert coordinates(Jump(structure, "1/10", QQ).value(start, 30)) == wanted
+    assert coordinates(NthIterate(structure, "1/10", QQ).value(start, 30)) == wanted
     assert drawn == []
 
 
@@ -441,14 +439,14 @@ def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     ("ratio", "step"), [(None, None), (fmpq(1), 1), (fmpq(3), 3), (fmpq(0), None), (fmpq(-2), None), (fmpq(5, 2), None)]
 )
 def test_on_a_parabola_the_pole_is_where_the_ratio_is_a_positive_integer(ratio, step, monkeypatch):
-    monkeypatch.setattr(rational_jump.translation, "parabolic_ratio", lambda block, start: ratio)
-    assert rational_jump._parabolic_pole(None, None) == step
+    monkeypatch.setattr(rational_iterate.translation, "parabolic_ratio", lambda block, start: ratio)
+    assert rational_iterate._parabolic_pole(None, None) == step
 
 
 def test_modulo_a_prime_an_iterate_without_a_value_is_named():
     structure, system = structure_and_system("m = 2")
     field, rng, told = GF(31), random.Random(4), set()
-    found = Jump(structure, "3/13", field)
+    found = NthIterate(structure, "3/13", field)
     for _ in range(40):
         start = tuple(map(field.convert, [rng.randrange(31) for _ in range(system.dim)]))
         points, end = walked(system, "3/13", field, start, 40)
