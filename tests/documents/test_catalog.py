@@ -227,7 +227,7 @@ def test_the_member_with_irreducible_chi_has_three_rational_integrals():
 
 # The sources.
 
-KEY = re.compile(r"(?<![\w-])(?:petrera-suris-[a-z0-9]+|[a-z]+(?:-[a-z]+)*-(?:19|20)[0-9]{2})(?![\w-])")
+KEY = re.compile(r"(?<![\w-])(?:petrera-suris-[a-z0-9]+|[a-z]+(?:-[a-z]+)*-(?:18|19|20)[0-9]{2})(?![\w-])")
 
 
 def keys_in_the_package():
@@ -247,6 +247,7 @@ def test_every_source_that_is_cited_exists():
 
 def test_a_key_is_recognised_in_the_middle_of_a_sentence():
     assert KEY.findall("see kahan-1993, Sect. 2; (petrera-suris-4d); UTF-8-2010") == ["kahan-1993", "petrera-suris-4d"]
+    assert KEY.findall("halphen-1881, kowalevski-1889") == ["halphen-1881", "kowalevski-1889"]
     assert all(KEY.fullmatch(key) for key in SOURCES)
 
 
