@@ -85,7 +85,7 @@ def elliptic_curve_modulo(work: Work, n: int, repeat: int = 2000) -> float:
     return int(run_gp(program)[0]) / 1000 / repeat
 
 
-def jump_modulo(work: Work, n: int) -> tuple[float, list[int]]:
+def iterate_modulo(work: Work, n: int) -> tuple[float, list[int]]:
     """The iterate over GF(2^61 - 1) by doublings, x to x."""
     iterate = NthIterate(work.structure, work.eps, GF(PRIME))
     seconds, value = timed(lambda: iterate.value(work.start, n), enough=0.3, most=100)
@@ -141,7 +141,7 @@ def over_rationals(work: Work, steps: list[int]) -> list[Row]:
 def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
     """Iterates of three lengths; stepping up to `short`, where the results have to be equal."""
     slow, stepped = step_modulo(work, short)
-    seconds, found = jump_modulo(work, short)
+    seconds, found = iterate_modulo(work, short)
     require_equal("nmod_mat.solve", stepped, found)
     one = slow / short
     what = f"m = {work.m}, n = {short:,}"
@@ -151,7 +151,7 @@ def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
     ]
     for exponent in (6, 18, 30):
         n = 10**exponent
-        seconds, _ = jump_modulo(work, n)
+        seconds, _ = iterate_modulo(work, n)
         what = f"m = {work.m}, n = 10^{exponent}"
         rows.append(
             row(MODULO, JUMP, what, seconds, 1.0, f"as long as {seconds / one:.0f} single steps of nmod_mat.solve")

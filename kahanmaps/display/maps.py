@@ -107,8 +107,9 @@ def orbit_html(orbit: Orbit) -> str:
         status = "not walked yet: iterate over it"
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
-    eps = markup.shortened(field.format(orbit.map.eps))
-    title = f"orbit{direction}, eps = {eps} (the time step is 2 eps), over {field}"
+    eps = orbit.map.eps  # None where maps at several eps were composed
+    step = "" if eps is None else f" eps = {markup.shortened(field.format(eps))} (the time step is 2 eps),"
+    title = f"orbit{direction},{step} over {field}"
     return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
 
 

@@ -240,7 +240,7 @@ def height_growth(
     require_steps(steps)
     at = range(0, steps + 1, every)
     first = height(kahan_map.point(start))
-    bits = max(first, height([kahan_map.eps]))
+    bits = first if kahan_map.eps is None else max(first, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
         # One step may take minutes then, and its numbers are that long as a rule.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")

@@ -66,13 +66,14 @@ def _display(part: str, formulas: Formulas) -> list[str]:
     if part == "map-formulas":
         what = "Kahan map" if formulas.rhs else "map"
         return [f"The {what} as rational functions:\n" + _aligned(_components(formulas, formulas.closed_form()))]
+    claimed = "" if formulas.file.catalog else ", as the file claims"
     if part == "density":
         if formulas.density is None:
-            rows = [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
+            claimed, rows = "", [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
         else:
             rows = _quotient(r"\varphi", formulas.density)
-        return ["The invariant measure $\\mathrm{d}\\mathbf x/\\varphi$:\n" + _aligned(rows)]
-    return ["Integrals of the map:\n" + _aligned(_integrals(formulas))]
+        return [f"The invariant measure $\\mathrm{{d}}\\mathbf x/\\varphi${claimed}:\n" + _aligned(rows)]
+    return [f"Integrals of the map{claimed if formulas.integrals else ''}:\n" + _aligned(_integrals(formulas))]
 
 
 def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> list[tuple[str, str]]:

@@ -100,7 +100,8 @@ class MapOver(ABC):
             return NotImplemented
         if (self.field, self.dim) != (other.field, other.dim):
             raise InputError(f"found maps {self!r} and {other!r}, expected one field and one dimension")
-        return ComposedMapOver([other, self], self.eps, self.variables)
+        eps = self.eps if self.eps == other.eps else None
+        return ComposedMapOver([other, self], eps, self.variables)
 
     def __pow__(self, power: int) -> MapOver:
         """So many steps as one map, of the inverse for a negative number, the identity for 0."""
@@ -197,7 +198,7 @@ class MapOver(ABC):
 
 
 class ComposedMapOver(MapOver):
-    """Maps over one field at one eps, one after the other."""
+    """Maps over one field, one after the other; `eps` is that of all, or None where they differ."""
 
     def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
         self.parts, self.eps, self.variables = tuple(parts), eps, variables
@@ -213,7 +214,8 @@ class ComposedMapOver(MapOver):
         return ComposedMapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
 
     def __repr__(self) -> str:
-        return f"ComposedMapOver({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
+        eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
+        return f"ComposedMapOver({', '.join(self.variables)}; {eps}, over {self.field})"
 
 
 class StepOver(MapOver):

@@ -19,8 +19,10 @@ from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.display.maps import orbit_html
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.invariants.heights import height, height_growth
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
@@ -313,6 +315,17 @@ def test_a_map_and_its_inverse_compose_to_the_identity():
         if name != "quartic":
             map_ = MAPS[name]
             assert composed_map(map_, (map_, -1)).at(1).step(start_of(map_)) == tuple(start_of(map_))
+
+
+def test_maps_at_different_eps_compose_to_one_without_an_eps():
+    phi, psi = (KahanMap(LOTKA_VOLTERRA, eps) for eps in ("1/10", "1/7"))
+    both = phi @ psi
+    assert ((phi @ phi).eps, both.eps) == (phi.eps, None)
+    assert both.step([2, 3]) == phi.step(psi.step([2, 3]))
+    assert both.inverse.step(both.step([2, 3])) == both.point([2, 3])
+    assert "different eps" in repr(both)
+    assert "eps" not in orbit_html(Orbit(both, [2, 3], 2))
+    assert height_growth(both, [2, 3], 2).heights[1] == height(both.step([2, 3]))
 
 
 def test_what_cannot_be_composed_is_refused():

@@ -177,7 +177,7 @@ def singularities(
     grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
-    >>> run.denominator, run.verdict
+    >>> run.denominator, str(run.verdict)
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
     map_, exact_eps = as_map(system), rational(eps)
