@@ -6,14 +6,13 @@ minimum over all of them in a step. If there is something, the steps are taken o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from kahanmaps.maps.floats.advance import Generic, Kept, Planar, keep, segments, sound
+from kahanmaps.maps.floats.advance import Generic, Kept, Planar, segments, sound
 from kahanmaps.maps.floats.blocks import CUBES, LINES
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.maps.floats.steps import CLEAR, FORMULAS, LARGEST, MUCH, NEAR, RUNNING, GenericEquation, Run
@@ -22,7 +21,7 @@ from kahanmaps.maps.floats.steps import CLEAR, FORMULAS, LARGEST, MUCH, NEAR, RU
 class PlanarNumpy(Planar):
     """Steps in normal form. The two common kinds of block have their formulas here with buffers reused."""
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+    def take(self, z: FloatArray, first: int, count: int, kept: Kept) -> Any:
         if z.shape[1] <= self.few:
             return np.array([self._alone(z, lane, first, count, kept) for lane in range(z.shape[1])])
         before, good = z.copy(), np.ones(z.shape[1], dtype=bool)
@@ -33,17 +32,14 @@ class PlanarNumpy(Planar):
                 good &= sound(z, before)
         return good
 
-    def _together(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept], good: Any) -> bool:
+    def _together(self, z: FloatArray, first: int, count: int, kept: Kept, good: Any) -> bool:
         """Whether no lane met anything unusual; `good` tells which did, if given."""
-        places = [one.row for one in kept]
-        index = first
-        for steps in segments(first, count, kept):
+        for index, steps in segments(first, count, kept.every):
             for run in self.rows.runs:
                 sweep = _canonical if run.parts == 2 and run.kind in (LINES, CUBES) else self._any
                 if not sweep(run, run.of(z), steps, good):
                     return False
-            index += steps
-            keep(z, index, kept, places)
+            kept = kept.keep(z, index + steps)
         return True
 
     def _any(self, run: Run, parts: list[FloatArray], count: int, good: Any) -> bool:
@@ -56,10 +52,10 @@ class PlanarNumpy(Planar):
                 return False
         return True
 
-    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Sequence[Kept]) -> bool:
+    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Kept) -> bool:
         """One lane in Python's own floats, block by block."""
         before = z[:, lane].copy()
-        wanted = [one for one in kept if one.rows(first, count)]
+        wanted = kept.rows(first, count)
         for run in self.rows.runs:
             formula, near = FORMULAS[run.kind, run.parts], run.near
             for b in range(run.blocks):
@@ -77,9 +73,9 @@ class PlanarNumpy(Planar):
                 except ZeroDivisionError:  # where numpy and compiled code get an infinity
                     return False
                 z[rows, lane] = state
-                for one in wanted:
-                    states = path[one.every - first % one.every - 1 :: one.every]
-                    one.table[one.row : one.row + len(states), rows, one.lane + lane] = states
+                if wanted:
+                    states = path[kept.every - first % kept.every - 1 :: kept.every]
+                    kept.table[kept.row : kept.row + wanted, rows, kept.lane + lane] = states
         return bool(sound(z[:, lane : lane + 1], before[:, None])[0])
 
 
@@ -154,22 +150,21 @@ class GenericNumpy(Generic):
         self._entries = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
         self._products: list[list[int]] = equation.products.tolist()
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+    def take(self, z: FloatArray, first: int, count: int, kept: Kept) -> Any:
         if z.shape[1] <= self.few:
             return np.array([self._alone(z, lane, first, count, kept) for lane in range(z.shape[1])])
         good = np.ones(z.shape[1], dtype=bool)
-        places = [one.row for one in kept]
         with np.errstate(all="ignore"):
             for index in range(first, first + count):
                 z[:], status, near = self.one(z)
                 good &= (status == RUNNING) & (near == 0)
-                keep(z, index + 1, kept, places)
+                kept = kept.keep(z, index + 1)
         return good
 
-    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Sequence[Kept]) -> bool:
+    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Kept) -> bool:
         """One lane in Python's own floats."""
         x = z[:, lane].tolist()
-        places = [one.row for one in kept]
+        kept = kept._replace(lane=kept.lane + lane)
         for index in range(first, first + count):
             for a, b in self._products:
                 x.append(x[a] * x[b])
@@ -184,10 +179,8 @@ class GenericNumpy(Generic):
             if not _solved(rows):
                 return False
             x = [row[-1] for row in rows]
-            for k, one in enumerate(kept):
-                if one.every and (index + 1) % one.every == 0:
-                    one.table[places[k], :, one.lane + lane] = x
-                    places[k] += 1
+            if kept.every and (index + 1) % kept.every == 0:
+                kept = kept.keep(np.array(x)[:, None], index + 1)
         z[:, lane] = x
         return True
 
