@@ -31,6 +31,7 @@ from kahanmaps.maps.floats.steps import (
 )
 
 _SHARES = 8  # of the lanes for each thread: other programs run too
+_MULTIPLE = 256  # lanes that compiled kernels take together
 Outcome = tuple[FloatArray, NDArray[np.int8], NDArray[np.int64]]
 
 
@@ -68,7 +69,7 @@ NOTHING = Kept(0, np.empty((0, 0, 0)))
 class Engine(ABC):
     """Takes states (rows, n) to their images."""
 
-    group = 4096  # lanes that are taken together by one thread
+    group = 4096  # lanes that are taken together by a single thread
     threads = 1
 
     @abstractmethod
@@ -289,8 +290,8 @@ def segments(first: int, count: int, *intervals: int) -> Iterator[tuple[int, int
 
 
 def in_ranges(run: Callable[[int, int], None], lanes: int, threads: int, width: int) -> None:
-    """Run on ranges of lanes that are multiples of `width` long, on several threads in several for each."""
-    share = -(-lanes // (threads * _SHARES * width)) * width if threads > 1 else width
+    """Run on ranges of at most `width` lanes, or on several threads on several for each."""
+    share = -(-lanes // (threads * _SHARES * _MULTIPLE)) * _MULTIPLE if threads > 1 else width
     ranges = [(lo, min(lanes, lo + share)) for lo in range(0, lanes, share)]
     if threads == 1 or len(ranges) == 1:
         for lo, hi in ranges:

@@ -32,6 +32,7 @@ _WIDTH = 256
 _PIECE = 1024
 _FEW = 16  # blocks of a kind
 _LANES = 128
+_ALL = 1 << 62
 _ALONE = 8  # lanes, up to which the elimination takes them one by one
 
 NEAR = float_steps.NEAR
@@ -201,15 +202,13 @@ def _careful(
     state: Any, width: int, i: int, numbers: Numbers, first: int, count: int, lanes: Lanes, lane: int
 ) -> None:
     """Steps of one lane with all tests; an orbit ends as the first of its blocks does (advance.Planar.one)."""
-    runs = numbers.runs
+    runs, size = numbers.runs, len(lanes.z) * width
     for index in range(first, first + count):
         status, near = RUNNING, 0
         for r in range(len(runs)):
-            parts, blocks, k = runs[r, 1], runs[r, 3], _eight(numbers.coefficients[runs[r, 4]])
-            far = blocks * width
-            for b in range(blocks):
-                at = (runs[r, 2] + b) * width + i
-                if parts == 2:
+            low, far, k = runs[r, 2] * width, runs[r, 3] * width, _eight(numbers.coefficients[runs[r, 4]])
+            for at in range(low + i, low + far, width):
+                if runs[r, 1] == 2:
                     state[at], state[at + far], w, g = real_general(state[at], state[at + far], k)
                     unusual = not abs(w) > NEAR + NEAR * abs(g)
                 else:
@@ -220,13 +219,15 @@ def _careful(
                 if status == RUNNING:
                     status = SINGULAR if w == 0.0 else RUNNING if np.isfinite(w) else OVERFLOW
                     near += unusual
-        rows = state[i : len(lanes.z) * width : width]
         if status == RUNNING:
-            for x in rows:
-                status = status if np.isfinite(x) else OVERFLOW
-        _note(lanes, lane, index, status, near)
+            for at in range(i, size, width):
+                status = status if np.isfinite(state[at]) else OVERFLOW
         if status != RUNNING:
-            rows[:] = 0.0
+            for at in range(i, size, width):
+                state[at] = 0.0
+        if status != RUNNING or near:
+            _note(lanes, lane, index, status, near)
+        if status != RUNNING:
             return
 
 
@@ -269,14 +270,17 @@ def _sample(state: Any, width: int, at: int, numbers: Numbers, lanes: Lanes) -> 
 
 
 @_inner
-def _keep(state: Any, stride: int, at: int, width: int, index: int, row: int, kept: Kept) -> int:
-    """Write the states of the lanes from `at` on to the table, if they are wanted; the next row."""
-    if kept.every == 0 or index % kept.every:
-        return row
-    for j in range(kept.table.shape[1]):
+def _keep(state: Any, stride: int, at: int, width: int, row: int, table: Any) -> None:
+    """Write the states of the lanes from `at` on to a row of the table."""
+    for j in range(table.shape[1]):
         for i in range(width):
-            kept.table[row, j, at + i] = state[j * stride + i]
-    return row + 1
+            table[row, j, at + i] = state[j * stride + i]
+
+
+@_inner
+def _multiple(index: int, every: int) -> int:
+    """The next multiple (0: none)."""
+    return index - index % every + every if every else 1 << 62
 
 
 @_inner
@@ -284,22 +288,24 @@ def _again(
     state: Any, before: Any, usual: Any, width: int, at: int, numbers: Numbers, first: int, count: int, lanes: Lanes
 ) -> None:
     """Take the lanes that met anything unusual again: `before` has their states before these steps."""
-    blocks = 0
-    for r in range(len(numbers.runs)):
-        blocks = max(blocks, numbers.runs[r, 3])
-    fine = usual[:width]
-    for b in range(1, blocks):
-        for i in range(width):
-            fine[i] *= usual[b * width + i]
+    rows, blocks = len(lanes.z), len(usual) // _WIDTH
+    good = True
+    for i in range(blocks * width):
+        good &= usual[i] != 0.0
     # Where w overflows and the numerators do not, the image is 0, and stays there; see advance.sound.
-    for j in range(len(lanes.z)):
-        row, old = state[j * width : (j + 1) * width], before[j * width : (j + 1) * width]
-        for i in range(width):
-            if not ((abs(row[i]) <= LARGEST) & ((row[i] != 0.0) | (old[i] == 0.0))):
-                fine[i] = 0.0
+    for i in range(rows * width):
+        good &= (abs(state[i]) <= LARGEST) & ((state[i] != 0.0) | (before[i] == 0.0))
+    if good:
+        return
     for i in range(width):
-        if fine[i] == 0.0:
-            for j in range(len(lanes.z)):
+        good = True
+        for b in range(blocks):
+            good &= usual[b * width + i] != 0.0
+        for j in range(rows):
+            value, old = state[j * width + i], before[j * width + i]
+            good &= (abs(value) <= LARGEST) & ((value != 0.0) | (old == 0.0))
+        if not good:
+            for j in range(rows):
                 state[j * width + i] = before[j * width + i]
             _careful(state, width, i, numbers, first, count, lanes, at + i)
 
@@ -324,20 +330,23 @@ def _planar_kernel(stamp: int) -> Any:
                 for i in range(width):
                     state[j * width + i] = lanes.z[j, at + i]
             index, row = first, 0
+            to_keep, to_sample = _multiple(first, kept.every), _multiple(first, sampled)
             while index < last:
-                end = min(last, index + _PIECE, index - index % sampled + sampled)
-                if kept.every:
-                    end = min(end, index - index % kept.every + kept.every)
+                end = min(last, index + _PIECE, to_keep, to_sample)
                 for i in range(rows * width):
                     before[i] = state[i]
-                usual[: len(usual) // _WIDTH * width] = 1.0
+                for i in range(len(usual) // _WIDTH * width):
+                    usual[i] = 1.0
                 for r in range(len(runs)):
                     _sweep(state, width, runs[r], numbers.coefficients, end - index, usual)
                 _again(state, before, usual, width, at, numbers, index, end - index, lanes)
                 index = end
-                row = _keep(state, width, at, width, index, row, kept)
-                if index % sampled == 0:
+                if index == to_keep:
+                    _keep(state, width, at, width, row, kept.table)
+                    row, to_keep = row + 1, to_keep + kept.every
+                if index == to_sample:
                     _sample(state, width, at, numbers, lanes)
+                    to_sample += sampled
             for j in range(rows):
                 for i in range(width):
                     lanes.z[j, at + i] = state[j * width + i]
@@ -524,7 +533,7 @@ def _generic_kernel(stamp: int) -> Any:
             for j in range(n):
                 for i in range(wide):
                     x[j, i] = lanes.z[j, at + i] if i < width else lanes.z[j, at]  # lanes that nobody looks at
-            row = 0
+            row, to_keep = 0, _multiple(first, kept.every)
             for index in range(first, first + steps):
                 fine[0] = 0.0
                 if wide == 1 or not _together(x, right, equation, room):
@@ -532,14 +541,16 @@ def _generic_kernel(stamp: int) -> Any:
                         if fine[i] != 0.0:
                             continue
                         if status[at + i] == RUNNING:
-                            alone[:n] = x[:n, i]
+                            for j in range(n):
+                                alone[j] = x[j, i]
                             failed, near = _alone(alone, equation, M, image, sizes)
                             _note(lanes, at + i, index, failed, near)
                         for j in range(n):
                             right[j, i] = image[j] if status[at + i] == RUNNING else 0.0
                 x, right = right, x
-                if kept.every:
-                    row = _keep(x.ravel(), wide, at, width, index + 1, row, kept)
+                if index + 1 == to_keep:
+                    _keep(x.ravel(), wide, at, width, row, kept.table)
+                    row, to_keep = row + 1, to_keep + kept.every
             for i in range(width):
                 for j in range(n):
                     lanes.z[j, at + i] = x[j, i] if status[at + i] == RUNNING else 0.0
@@ -558,7 +569,7 @@ generic_advance = _kernel(_generic_kernel(_STAMP))
 class PlanarNumba(Engine):
     """Advances lanes in normal form."""
 
-    group = 8 * _WIDTH
+    group = _ALL
 
     def __init__(self, rows: PlanarRows) -> None:
         runs = np.array(rows.runs, dtype=np.int64)
@@ -574,7 +585,7 @@ class PlanarNumba(Engine):
 class GenericNumba(Engine):
     """Advances lanes of any map."""
 
-    group = 8 * _LANES
+    group = _ALL
 
     def __init__(self, equation: GenericEquation) -> None:
         self.equation = equation
