@@ -219,25 +219,25 @@ class Generic(Halved):
         """One elimination."""
         n = self.equation.rows
         full = self._matrices(z)
-        matrix, right = full[:, :n], full[:, n].copy()
+        matrix, right = full[:, :n], full[:, n]
         sizes = np.fmax(np.fmax.reduce(np.abs(matrix), axis=1), 1.0)  # of the rows
         for p in range(n):
+            much = MUCH * np.abs(full[p, p])
             for i in range(p + 1, n):
-                wanted = np.abs(matrix[i, p]) > MUCH * np.abs(matrix[p, p])
+                wanted = np.abs(full[i, p]) > much
                 if wanted.any():
-                    for table in (matrix[:, p:], right, sizes):
-                        _exchange(table, p, i, wanted)
-            if p + 1 < n:
-                factors = matrix[p + 1 :, p] * (1.0 / matrix[p, p])
-                matrix[p + 1 :, p + 1 :] -= factors[:, None] * matrix[p, None, p + 1 :]
-                right[p + 1 :] -= factors * right[p]
+                    _exchange(full[p, p:], full[i, p:], wanted)
+                    _exchange(sizes[p], sizes[i], wanted)
+                    much = MUCH * np.abs(full[p, p])
+            factors = full[p + 1 :, p] * (1.0 / full[p, p])
+            full[p + 1 :, p + 1 :] -= factors[:, None] * full[p, None, p + 1 :]
         for j in range(n - 1, -1, -1):
             right[j] /= matrix[j, j]
             right[:j] -= matrix[:j, j] * right[j]
         pivots = np.abs(matrix[range(n), range(n)])
         near = (pivots <= NEAR * sizes).any(axis=0).astype(np.int64)
         status = np.zeros(z.shape[1], dtype=np.int8)
-        if not (pivots.min() > 0.0 and np.isfinite(sizes).all() and np.isfinite(right).all()):
+        if not (0.0 < pivots.min() <= pivots.max() <= LARGEST >= sizes.max() and np.isfinite(right).all()):
             status[~(sizes <= LARGEST).all(axis=0)] = OVERFLOW
             for size in pivots:
                 ends = np.where(size == 0.0, SINGULAR, np.where(size <= LARGEST, RUNNING, OVERFLOW))
@@ -261,9 +261,11 @@ class Generic(Halved):
         return full
 
 
-def _exchange(rows: FloatArray, p: int, i: int, wanted: Any) -> None:
-    """Rows p and i in the lanes that want it."""
-    rows[p, ..., wanted], rows[i, ..., wanted] = rows[i, ..., wanted], rows[p, ..., wanted]
+def _exchange(one: FloatArray, other: FloatArray, wanted: Any) -> None:
+    """Two rows in the lanes that want it."""
+    kept = one.copy()
+    np.copyto(one, other, where=wanted)
+    np.copyto(other, kept, where=wanted)
 
 
 class Word(Engine):

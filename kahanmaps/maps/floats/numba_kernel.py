@@ -198,17 +198,16 @@ def _sweep(state: Any, width: int, run: Any, coefficients: Any, count: int, usua
 
 
 @_inner
-def _careful(
-    state: Any, width: int, i: int, numbers: Numbers, first: int, count: int, lanes: Lanes, lane: int
-) -> None:
+def _careful(state: Any, width: int, i: int, numbers: Numbers, first: int, count: int, lanes: Lanes, lane: int) -> None:
     """Steps of one lane with all tests; an orbit ends as the first of its blocks does (advance.Planar.one)."""
-    runs, size = numbers.runs, len(lanes.z) * width
+    runs = numbers.runs
     for index in range(first, first + count):
         status, near = RUNNING, 0
         for r in range(len(runs)):
-            low, far, k = runs[r, 2] * width, runs[r, 3] * width, _eight(numbers.coefficients[runs[r, 4]])
-            for at in range(low + i, low + far, width):
-                if runs[r, 1] == 2:
+            real, far, k = runs[r, 1] == 2, runs[r, 3] * width, _eight(numbers.coefficients[runs[r, 4]])
+            for b in range(runs[r, 3]):
+                at = (runs[r, 2] + b) * width + i
+                if real:
                     state[at], state[at + far], w, g = real_general(state[at], state[at + far], k)
                     unusual = not abs(w) > NEAR + NEAR * abs(g)
                 else:
@@ -220,11 +219,11 @@ def _careful(
                     status = SINGULAR if w == 0.0 else RUNNING if np.isfinite(w) else OVERFLOW
                     near += unusual
         if status == RUNNING:
-            for at in range(i, size, width):
-                status = status if np.isfinite(state[at]) else OVERFLOW
+            for j in range(len(lanes.z)):
+                status = status if np.isfinite(state[j * width + i]) else OVERFLOW
         if status != RUNNING:
-            for at in range(i, size, width):
-                state[at] = 0.0
+            for j in range(len(lanes.z)):
+                state[j * width + i] = 0.0
         if status != RUNNING or near:
             _note(lanes, lane, index, status, near)
         if status != RUNNING:
@@ -284,19 +283,23 @@ def _multiple(index: int, every: int) -> int:
 
 
 @_inner
+def _usual(state: Any, before: Any, size: int, usual: Any, blocks: int) -> bool:
+    """Whether nothing unusual was met in any lane."""
+    good = True
+    for i in range(blocks):
+        good &= usual[i] != 0.0
+    # Where w overflows and the numerators do not, the image is 0, and stays there; see advance.sound.
+    for i in range(size):
+        good &= (abs(state[i]) <= LARGEST) & ((state[i] != 0.0) | (before[i] == 0.0))
+    return good
+
+
+@_inner
 def _again(
     state: Any, before: Any, usual: Any, width: int, at: int, numbers: Numbers, first: int, count: int, lanes: Lanes
 ) -> None:
     """Take the lanes that met anything unusual again: `before` has their states before these steps."""
     rows, blocks = len(lanes.z), len(usual) // _WIDTH
-    good = True
-    for i in range(blocks * width):
-        good &= usual[i] != 0.0
-    # Where w overflows and the numerators do not, the image is 0, and stays there; see advance.sound.
-    for i in range(rows * width):
-        good &= (abs(state[i]) <= LARGEST) & ((state[i] != 0.0) | (before[i] == 0.0))
-    if good:
-        return
     for i in range(width):
         good = True
         for b in range(blocks):
@@ -326,6 +329,7 @@ def _planar_kernel(stamp: int) -> Any:
         state, before, usual = room.buffer, room.saved, room.usual
         for at in range(lo, hi, _WIDTH):
             width = min(_WIDTH, hi - at)
+            most = len(usual) // _WIDTH * width
             for j in range(rows):
                 for i in range(width):
                     state[j * width + i] = lanes.z[j, at + i]
@@ -335,11 +339,12 @@ def _planar_kernel(stamp: int) -> Any:
                 end = min(last, index + _PIECE, to_keep, to_sample)
                 for i in range(rows * width):
                     before[i] = state[i]
-                for i in range(len(usual) // _WIDTH * width):
+                for i in range(most):
                     usual[i] = 1.0
                 for r in range(len(runs)):
                     _sweep(state, width, runs[r], numbers.coefficients, end - index, usual)
-                _again(state, before, usual, width, at, numbers, index, end - index, lanes)
+                if not _usual(state, before, rows * width, usual, most):
+                    _again(state, before, usual, width, at, numbers, index, end - index, lanes)
                 index = end
                 if index == to_keep:
                     _keep(state, width, at, width, row, kept.table)
@@ -544,7 +549,8 @@ def _generic_kernel(stamp: int) -> Any:
                             for j in range(n):
                                 alone[j] = x[j, i]
                             failed, near = _alone(alone, equation, M, image, sizes)
-                            _note(lanes, at + i, index, failed, near)
+                            if failed != RUNNING or near:
+                                _note(lanes, at + i, index, failed, near)
                         for j in range(n):
                             right[j, i] = image[j] if status[at + i] == RUNNING else 0.0
                 x, right = right, x

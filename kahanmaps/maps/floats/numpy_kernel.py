@@ -147,7 +147,8 @@ class GenericNumpy(Generic):
         factors: list[float] = equation.factors.tolist()
         constants: list[list[float]] = equation.constants.tolist()
         terms = [list(zip(columns[s:e], factors[s:e], strict=True)) for s, e in pairwise(first)]
-        self._entries = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        rows = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        self._entries = [(row[:n], *row[n]) for row in rows]
         self._products: list[list[int]] = equation.products.tolist()
 
     def take(self, z: FloatArray, first: int, count: int, kept: Kept) -> Any:
@@ -168,27 +169,34 @@ class GenericNumpy(Generic):
         for index in range(first, first + count):
             for a, b in self._products:
                 x.append(x[a] * x[b])
-            rows = []
-            for row in self._entries:
-                entries = []
+            rows, sizes = [], []
+            for row, side, side_terms in self._entries:
+                entries, size = [], 1.0
                 for total, terms in row:
                     for k, factor in terms:
                         total += factor * x[k]
                     entries.append(total)
+                    if abs(total) > size:
+                        size = abs(total)
+                for k, factor in side_terms:
+                    side += factor * x[k]
+                entries.append(side)
                 rows.append(entries)
-            if not _solved(rows):
+                sizes.append(size)
+            if not _solved(rows, sizes):
                 return False
             x = [row[-1] for row in rows]
+            if not all(map(isfinite, x)):
+                return False
             if kept.every and (index + 1) % kept.every == 0:
                 kept = kept.keep(np.array(x)[:, None], index + 1)
         z[:, lane] = x
         return True
 
 
-def _solved(rows: list[list[float]]) -> bool:
-    """Whether nothing is unusual in the elimination in (M | r), whose last column becomes the solution."""
+def _solved(rows: list[list[float]], sizes: list[float]) -> bool:
+    """Whether no pivot is unusual in the elimination in (M | r), whose last column becomes the solution."""
     n = len(rows)
-    sizes = [max(1.0, *map(abs, row[:n])) for row in rows]
     if not max(sizes) <= LARGEST:
         return False
     for p in range(n):
@@ -209,4 +217,4 @@ def _solved(rows: list[list[float]]) -> bool:
         rows[j][n] = value = rows[j][n] / rows[j][j]
         for row in rows[:j]:
             row[n] -= row[j] * value
-    return all(isfinite(row[n]) for row in rows)
+    return True
