@@ -148,18 +148,22 @@ class Halved(Engine):
         """One step of lanes in which it is unusual."""
         with np.errstate(all="ignore"):
             image, status, near = self.one(before)
-        ended = lanes.status[lost] != RUNNING
-        image[:, ended | (status != RUNNING)] = 0.0
+        note(lanes, lost, index, image, status, near)
         lanes.z[:, lost] = image
         if kept.rows(index, 1):
             kept.table[kept.row, :, kept.lane + places] = image.T
-        ends = ~ended & (status != RUNNING)
-        lanes.status[lost[ends]] = status[ends]
-        lanes.failed_at[lost[ends]] = index + 1
-        close = ~ended & (status == RUNNING) & (near > 0)
-        seen = lost[close]
-        lanes.near_at[seen] = np.where(lanes.near[seen] == 0, index, lanes.near_at[seen])
-        lanes.near[seen] += near[close]
+
+
+def note(lanes: Lanes, which: Any, index: int, image: FloatArray, status: Any, near: Any) -> None:
+    """What a step of some lanes from the index was; the images of those that have ended become 0."""
+    running = lanes.status[which] == RUNNING
+    ends, close = running & (status != RUNNING), running & (status == RUNNING) & (near > 0)
+    image[:, ~running | ends] = 0.0
+    lanes.status[which[ends]] = status[ends]
+    lanes.failed_at[which[ends]] = index + 1
+    seen = which[close]
+    lanes.near_at[seen] = np.where(lanes.near[seen] == 0, index, lanes.near_at[seen])
+    lanes.near[seen] += near[close]
 
 
 class Planar(Halved):
@@ -197,7 +201,7 @@ def sound(z: FloatArray, before: FloatArray) -> Any:
     return np.isfinite(z).all(axis=0) & ~(((z == 0.0) & (before != 0.0)).any(axis=0))
 
 
-class Generic(Halved):
+class Generic(Engine):
     """Engines for any map with an equation."""
 
     def __init__(self, equation: GenericEquation) -> None:

@@ -12,10 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from kahanmaps.maps.floats.advance import Generic, Kept, Planar, segments, sound
+from kahanmaps.maps.floats.advance import Generic, Kept, Planar, note, segments, sound
 from kahanmaps.maps.floats.blocks import CUBES, LINES
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.floats.steps import CLEAR, FORMULAS, LARGEST, MUCH, NEAR, RUNNING, GenericEquation, Run
+from kahanmaps.maps.floats.steps import (
+    CLEAR,
+    FORMULAS,
+    LARGEST,
+    MUCH,
+    NEAR,
+    OVERFLOW,
+    RUNNING,
+    SINGULAR,
+    GenericEquation,
+    Lanes,
+    Run,
+)
 
 
 class PlanarNumpy(Planar):
@@ -151,22 +163,26 @@ class GenericNumpy(Generic):
         self._entries = [(row[:n], *row[n]) for row in rows]
         self._products: list[list[int]] = equation.products.tolist()
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Kept) -> Any:
-        if z.shape[1] <= self.few:
-            return np.array([self._alone(z, lane, first, count, kept) for lane in range(z.shape[1])])
-        good = np.ones(z.shape[1], dtype=bool)
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        if hi - lo <= self.few:
+            for lane in range(lo, hi):
+                self._walk(lanes, lane, first, steps, kept)
+            return
+        z, which, kept = lanes.z[:, lo:hi].copy(), np.arange(lo, hi), kept._replace(lane=lo)
         with np.errstate(all="ignore"):
-            for index in range(first, first + count):
+            for index in range(first, first + steps):
                 z[:], status, near = self.one(z)
-                good &= (status == RUNNING) & (near == 0)
+                if status.any() or near.any() or lanes.status[lo:hi].any():
+                    note(lanes, which, index, z, status, near)
                 kept = kept.keep(z, index + 1)
-        return good
+        lanes.z[:, lo:hi] = z
 
-    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Kept) -> bool:
-        """One lane in Python's own floats."""
-        x = z[:, lane].tolist()
-        kept = kept._replace(lane=kept.lane + lane)
-        for index in range(first, first + count):
+    def _walk(self, lanes: Lanes, lane: int, first: int, steps: int, kept: Kept) -> None:
+        """One lane in Python's own floats, with all tests."""
+        if lanes.status[lane] != RUNNING:
+            return
+        x, place = lanes.z[:, lane].tolist(), kept.row
+        for index in range(first, first + steps):
             for a, b in self._products:
                 x.append(x[a] * x[b])
             rows, sizes = [], []
@@ -183,22 +199,27 @@ class GenericNumpy(Generic):
                 entries.append(side)
                 rows.append(entries)
                 sizes.append(size)
-            if not _solved(rows, sizes):
-                return False
+            status, near = _solved(rows, sizes)
             x = [row[-1] for row in rows]
-            if not all(map(isfinite, x)):
-                return False
+            if status != RUNNING or not all(map(isfinite, x)):
+                lanes.status[lane], lanes.failed_at[lane] = status or OVERFLOW, index + 1
+                lanes.z[:, lane] = 0.0
+                return
+            if near:
+                if not lanes.near[lane]:
+                    lanes.near_at[lane] = index
+                lanes.near[lane] += 1
             if kept.every and (index + 1) % kept.every == 0:
-                kept = kept.keep(np.array(x)[:, None], index + 1)
-        z[:, lane] = x
-        return True
+                kept.table[place, :, lane] = x
+                place += 1
+        lanes.z[:, lane] = x
 
 
-def _solved(rows: list[list[float]], sizes: list[float]) -> bool:
-    """Whether no pivot is unusual in the elimination in (M | r), whose last column becomes the solution."""
-    n = len(rows)
+def _solved(rows: list[list[float]], sizes: list[float]) -> tuple[int, bool]:
+    """Eliminate in (M | r), whose last column becomes the solution; the status, and whether a pivot was small."""
+    n, near = len(rows), False
     if not max(sizes) <= LARGEST:
-        return False
+        return OVERFLOW, near
     for p in range(n):
         for i in range(p + 1, n):
             if abs(rows[i][p]) > MUCH * abs(rows[p][p]):
@@ -207,7 +228,11 @@ def _solved(rows: list[list[float]], sizes: list[float]) -> bool:
         upper = rows[p]
         pivot = upper[p]
         if not NEAR * sizes[p] < abs(pivot) <= LARGEST:
-            return False
+            if pivot == 0.0:
+                return SINGULAR, near
+            if not abs(pivot) <= LARGEST:
+                return OVERFLOW, near
+            near = True
         inverse = 1.0 / pivot
         for row in rows[p + 1 :]:
             factor = row[p] * inverse
@@ -217,4 +242,4 @@ def _solved(rows: list[list[float]], sizes: list[float]) -> bool:
         rows[j][n] = value = rows[j][n] / rows[j][j]
         for row in rows[:j]:
             row[n] -= row[j] * value
-    return True
+    return RUNNING, near
