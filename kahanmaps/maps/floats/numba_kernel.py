@@ -230,7 +230,7 @@ def _careful(state: Any, width: int, i: int, numbers: Numbers, first: int, count
             return
 
 
-@_inner
+@numba.njit(error_model="numpy", nogil=True, inline="always")  # Lanes are long to hand over
 def _note(lanes: Lanes, lane: int, index: int, status: int, near: int) -> None:
     """What a step from the index was."""
     if status != RUNNING:
