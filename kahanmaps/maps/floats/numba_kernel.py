@@ -216,11 +216,16 @@ def _careful(state: Any, width: int, i: int, numbers: Numbers, first: int, count
                     state[at], state[at + far], state[at + 2 * far], state[at + 3 * far] = U, V, W, T
                     unusual = not w > NEAR_SQUARED + NEAR_SQUARED * g
                 if status == RUNNING:
-                    status = SINGULAR if w == 0.0 else RUNNING if np.isfinite(w) else OVERFLOW
-                    near += unusual
+                    if w == 0.0:
+                        status = SINGULAR
+                    elif not np.isfinite(w):
+                        status = OVERFLOW
+                    elif unusual:
+                        near += 1
         if status == RUNNING:
             for j in range(len(lanes.z)):
-                status = status if np.isfinite(state[j * width + i]) else OVERFLOW
+                if not np.isfinite(state[j * width + i]):
+                    status = OVERFLOW
         if status != RUNNING:
             for j in range(len(lanes.z)):
                 state[j * width + i] = 0.0
