@@ -86,8 +86,8 @@ complex_integral = _inner(float_steps.complex_integral)
 
 
 @_inner
-def _eight(k: Any) -> Any:
-    return (k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7])
+def _eight(k: Any, r: int) -> Any:
+    return (k[r, 0], k[r, 1], k[r, 2], k[r, 3], k[r, 4], k[r, 5], k[r, 6], k[r, 7])
 
 
 def _real_sweep(formula: Any) -> Any:
@@ -168,7 +168,7 @@ _sweep_complex_lines, _sweep_complex_general = _complex_sweep(complex_lines), _c
 @_inner
 def _sweep(state: Any, width: int, run: Any, coefficients: Any, count: int, usual: Any) -> None:
     """Steps of all blocks of a run: `state` has their rows, of `width` lanes each, one behind the other."""
-    kind, parts, blocks, k = run[0], run[1], run[3], _eight(coefficients[run[4]])
+    kind, parts, blocks, k = run[0], run[1], run[3], _eight(coefficients, run[4])
     size, at = blocks * width, run[2] * width
     few, share = size <= _FEW, size if size <= _WIDTH else width
     for low in range(0, size, share):
@@ -204,7 +204,7 @@ def _careful(state: Any, width: int, i: int, numbers: Numbers, first: int, count
     for index in range(first, first + count):
         status, near = RUNNING, 0
         for r in range(len(runs)):
-            real, far, k = runs[r, 1] == 2, runs[r, 3] * width, _eight(numbers.coefficients[runs[r, 4]])
+            real, far, k = runs[r, 1] == 2, runs[r, 3] * width, _eight(numbers.coefficients, runs[r, 4])
             for b in range(runs[r, 3]):
                 at = (runs[r, 2] + b) * width + i
                 if real:
@@ -255,7 +255,7 @@ def _sample(state: Any, width: int, at: int, numbers: Numbers, lanes: Lanes) -> 
         far = runs[r, 3] * width
         for b in range(runs[r, 3]):
             block, low = runs[r, 4] + b, (runs[r, 2] + b) * width
-            k, kappa = _eight(numbers.coefficients[block]), numbers.kappa[block]
+            k, kappa = _eight(numbers.coefficients, block), numbers.kappa[block]
             real, imaginary = lanes.base[block, 0, at : at + width], lanes.base[block, 1, at : at + width]
             top, U, V = lanes.largest[block, at : at + width], state[low:], state[low + far :]
             if runs[r, 1] == 2:
