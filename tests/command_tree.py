@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import click
 
+from kahanmaps.checks.table import CHECKS
 from kahanmaps_cli.main import WELCOME, cli
 from kahanmaps_cli.options import Renamed
 
@@ -17,10 +18,7 @@ LEAST = {
     "orbit": "harmonic --start 1,2 --eps 1/10 --steps 1",
     "period": "paper_m2 --start 1,2,3,4 --eps 1/10 --arithmetic mod:7",
     "ensemble": "harmonic --random 1 --eps 1/10 --steps 1",
-    "check-commute": "harmonic harmonic",
-    "check-integrals": "harmonic",
-    "check-measure": "harmonic",
-    "check-poisson": "harmonic",
+    **{name: "harmonic harmonic" if check.is_of_pair else "harmonic" for name, check in CHECKS.items()},
     "analyze": "harmonic --seconds 1",
     "degrees": "harmonic --terms 3 --seconds 1",
     "scan": "henon_heiles --over c --primes 5,7,11 --terms 2",

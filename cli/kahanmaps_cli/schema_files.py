@@ -50,6 +50,10 @@ def schema(name: str) -> dict[str, Any]:
 
 def _read(name: str) -> dict[str, Any]:
     found: dict[str, Any] = json.loads((files("kahanmaps_cli") / "schemas" / name).read_text(encoding="utf-8"))
+    if name == "check.json":  # the one file that all checks share names them as their table does
+        checks = [check.name for check in CHECKS.values()]
+        found["title"] = f"check-{', -'.join(checks)} --json"
+        found["properties"]["check"]["enum"] = checks
     return found
 
 

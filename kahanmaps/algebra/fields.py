@@ -1,9 +1,10 @@
 """The fields of numbers: the rationals QQ, the prime fields GF(p), real balls RR(bits) and complex balls CC(bits).
 
-One protocol serves all four, so that the Kahan map is written once. Elements are FLINT's own numbers (`fmpq`,
-`nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`, `acb`) and use the ordinary operators; what FLINT does
-not do under one name stands here. `convert` is the door to exactness: text, integers and fractions come in,
-machine floats do not. `Element` gives the operators to elements that FLINT does not have.
+One protocol, `Field`, serves them and those of the files beside this one (duals.py, etale.py, functions.py, bounds.py),
+so that the Kahan map is written once. Elements are here FLINT's own numbers (`fmpq`, `nmod` for p < 2^63, `fmpz_mod`
+for larger p, `arb`, `acb`) and use the ordinary operators; what FLINT does not do under one name stands here. `convert`
+is the door to exactness: text, integers and fractions come in, machine floats do not. `Element` gives the operators to
+elements that FLINT does not have.
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ class Field(ABC):
 
     @abstractmethod
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
-        """FLINT's matrix over this field from its entries, row by row."""
+        """The matrix over this field from its entries, row by row: FLINT's, or an `EntryMatrix`."""
 
     def column(self, entries: Sequence[Any]) -> Any:
         """The entries as a matrix of one column."""

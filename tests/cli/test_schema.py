@@ -11,6 +11,7 @@ from cli_helpers import Outcome
 from jsonschema import Draft202012Validator
 
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.table import CHECKS
 from kahanmaps.documents.structured_facts import GROWTHS, VERDICTS
 from kahanmaps.experiments.records import KEPT
 from kahanmaps.invariants.heights import Growth
@@ -121,6 +122,6 @@ def test_a_schema_is_printed_by_its_name_or_that_of_its_command(kahanmaps: Run, 
     assert kahanmaps(f"schema {name}").json == schema("family-show")
 
 
-@pytest.mark.parametrize("command", ["commute", "integrals", "measure", "poisson"])
+@pytest.mark.parametrize("command", CHECKS)
 def test_the_checks_share_a_schema(kahanmaps: Run, command: str) -> None:
-    assert kahanmaps(f"schema check-{command}").json == schema("check")
+    assert kahanmaps(f"schema {command}").json == schema("check")

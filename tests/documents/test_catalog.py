@@ -36,6 +36,7 @@ from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import standard_structure
 
 PACKAGE = Path(kahanmaps.__file__).parent
+FACT = r"(Proved|Refuted|Measured|Classical|Origin)( \([a-z0-9-]+\))?: .*\.$"
 HOLDS = {Verdict.PROVED, Verdict.SUPPORTED}
 ONE_EPS = fmpq(2, 7)
 
@@ -114,7 +115,12 @@ def test_a_file_has_a_title_a_source_that_exists_a_convention_and_facts(name):
 @over_the_catalogue
 def test_every_fact_opens_with_its_status(name):
     for fact in load(name).catalog["facts"]:
-        assert re.match(r"(Proved|Refuted|Measured|Classical|Origin)( \([a-z0-9-]+\))?: .*\.$", fact), fact
+        assert re.match(FACT, fact), fact
+
+
+def test_newcomers_are_told_what_a_fact_looks_like():
+    page = PACKAGE.parent / "docs" / "howto" / "add-a-catalogue-system.md"
+    assert f"`{FACT}`" in page.read_text(encoding="utf-8")
 
 
 @over_the_catalogue
@@ -227,7 +233,7 @@ def test_the_member_with_irreducible_chi_has_three_rational_integrals():
 
 # The sources.
 
-KEY = re.compile(r"(?<![\w-])(?:petrera-suris-[a-z0-9]+|[a-z]+(?:-[a-z]+)*-(?:19|20)[0-9]{2})(?![\w-])")
+KEY = re.compile(r"(?<![\w-])(?:petrera-suris-[a-z0-9]+|[a-z]+(?:-[a-z]+)*-(?:18|19|20)[0-9]{2})(?![\w-])")
 
 
 def keys_in_the_package():
@@ -247,6 +253,7 @@ def test_every_source_that_is_cited_exists():
 
 def test_a_key_is_recognised_in_the_middle_of_a_sentence():
     assert KEY.findall("see kahan-1993, Sect. 2; (petrera-suris-4d); UTF-8-2010") == ["kahan-1993", "petrera-suris-4d"]
+    assert KEY.findall("halphen-1881, kowalevski-1889") == ["halphen-1881", "kowalevski-1889"]
     assert all(KEY.fullmatch(key) for key in SOURCES)
 
 
