@@ -274,6 +274,36 @@ def test_orbits_beyond_the_first_group_are_walked_sampled_and_recorded_as_alone(
         assert np.array_equal(whole.largest[4097:], part.largest)
 
 
+@over_kernels
+@pytest.mark.parametrize("generic", [False, True], ids=["normal form", "elimination"])
+@pytest.mark.parametrize("name", ["three real roots", "real and complex"])
+def test_hostile_orbits_come_to_the_same_end_in_any_company(name, generic, kernel):
+    """Some end, many are near-singular again and again; portions and records change nothing, nor do the others."""
+    system, form = MEMBERS[name].chosen.system, None if generic else FORMS[name]
+    rng = np.random.default_rng(5)
+    starts = starts_of(system.dim, 40) * 10.0 ** rng.uniform(-3, 60, (40, 1))
+    starts[30:] = np.round(8 * starts_of(system.dim, 10)) * 10.0 ** rng.integers(0, 250, (10, 1))
+
+    def taken(some, *portions):
+        orbits = FloatEnsemble(system, EPS, some, form=form, kernel=kernel, sampled=7)
+        return orbits, np.concatenate([x for steps in portions for x in orbits.records(steps, 4)])
+
+    together, points = taken(starts, 100)
+    again, same_points = taken(starts, 3, 64, 33)
+    same(together, again)
+    assert np.array_equal(points, same_points, equal_nan=True)
+    assert together.near_singular.max() > 1
+    assert generic or len(set(together.status)) > 1
+    for orbit in range(40):
+        alone, own = taken(starts[orbit : orbit + 1], 100)
+        assert np.array_equal(own[:, 0], points[:, orbit], equal_nan=True)
+        assert alone.end(0) == together.end(orbit)
+        for field in ("near_singular", "near_singular_at"):
+            assert getattr(alone, field)[0] == getattr(together, field)[orbit]
+        for mine, all_ in zip(alone.drift, together.drift, strict=True):
+            assert mine.largest[0] == all_.largest[orbit]
+
+
 # Ends.
 
 RICCATI_PLANE = FamilyMember(

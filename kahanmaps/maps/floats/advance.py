@@ -1,8 +1,9 @@
-"""How orbits side by side are advanced, by whatever kernel: all together, and what is unusual again in smaller pieces.
+"""How orbits side by side are advanced: all together, and those that meet something unusual again with all tests.
 
-A kernel takes many lanes through many steps and says in which of them every step was usual. The others are taken again
-from where they were, in halves, until a single step is left, which `Engine.one` looks at: it may be near-singular, or
-the last one. So kernels need no test that ends an orbit, and what is unusual costs as much as it is rare.
+Compiled kernels do both (numba_kernel.py). A kernel in whole arrays takes many lanes through many steps and says in
+which of them every step was usual. The others are taken again from where they were, in halves, until a single step is
+left, which `Halved.one` looks at: it may be near-singular, or the last one. So such a kernel needs no test that ends an
+orbit, and what is unusual costs as much as it is rare.
 """
 
 from __future__ import annotations
@@ -30,8 +31,7 @@ from kahanmaps.maps.floats.steps import (
 )
 
 _SHARES = 8  # of the lanes for each thread: other programs run too
-NOTHING = np.empty((0, 0, 0))
-
+_MULTIPLE = 256  # lanes that compiled kernels take together
 Outcome = tuple[FloatArray, NDArray[np.int8], NDArray[np.int64]]
 
 
@@ -51,18 +51,57 @@ class Kept(NamedTuple):
         """The same for lanes that are taken apart, to a table of their own."""
         return Kept(self.every, np.empty((self.rows(first, count), self.table.shape[1], lanes)))
 
+    def after(self, first: int, count: int) -> Kept:
+        """The same for the steps behind these."""
+        return self._replace(row=self.row + self.rows(first, count))
+
+    def keep(self, z: FloatArray, index: int) -> Kept:
+        """Write the states at an index, if they are wanted; the same for the steps behind."""
+        if self.every == 0 or index % self.every:
+            return self
+        self.table[self.row, :, self.lane : self.lane + z.shape[1]] = z
+        return self._replace(row=self.row + 1)
+
+
+NOTHING = Kept(0, np.empty((0, 0, 0)))
+
 
 class Engine(ABC):
     """Takes states (rows, n) to their images."""
 
-    piece = 64  # steps that are taken together in many lanes,
-    long_piece = 4096  # and in few
-    few = 16
-    group = 4096  # lanes that are taken together by one thread
+    group = 4096  # lanes that are taken together by a single thread
     threads = 1
 
     @abstractmethod
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        """Take the lanes lo, ..., hi - 1 through the steps; what is kept of an orbit that has ended does not count."""
+
+    def advance(self, lanes: Lanes, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        """Take all lanes `steps` steps from the index `first`; states after the end of an orbit become NaN.
+
+        In normal form the integrals are looked at at multiples of `sampled`.
+        """
+        in_ranges(
+            lambda lo, hi: self.run(lanes, lo, hi, first, steps, kept, sampled),
+            lanes.z.shape[1],
+            self.threads,
+            self.group,
+        )
+        if len(kept.table) and (lanes.status != RUNNING).any():
+            at = (first // kept.every + 1 + np.arange(len(kept.table))) * kept.every
+            gone = (lanes.failed_at >= 0) & (at[:, None] >= lanes.failed_at)
+            kept.table.transpose(0, 2, 1)[gone] = np.nan
+
+
+class Halved(Engine):
+    """Engines that only say which lanes were usual."""
+
+    piece = 64  # steps that are taken together in many lanes,
+    long_piece = 4096  # and in few
+    few = 16
+
+    @abstractmethod
+    def take(self, z: FloatArray, first: int, count: int, kept: Kept) -> Any:
         """Take the states `count` steps from the index `first`, in place; for each lane whether all were usual.
 
         Where one was not, what stands in z and in the tables afterwards does not count.
@@ -72,27 +111,19 @@ class Engine(ABC):
     def one(self, z: FloatArray) -> Outcome:
         """One step: the images, the status of each lane, and how many blocks or pivots were near-singular."""
 
-    def advance(self, lanes: Lanes, first: int, steps: int, kept: Sequence[Kept]) -> None:
-        """Take all lanes `steps` steps from the index `first`; states after the end of an orbit become NaN."""
-        n = lanes.z.shape[1]
+    def sample(self, lanes: Lanes, which: slice) -> None:
+        """Look at the integrals, if there are any."""
 
-        def run(lo: int, hi: int) -> None:
-            piece = self.long_piece if hi - lo <= self.few else self.piece
-            rows = [one.row for one in kept]
-            for index in range(first, first + steps, piece):
-                count = min(piece, first + steps - index)
-                here = [one._replace(row=row, lane=lo) for one, row in zip(kept, rows, strict=True)]
-                self._take(lanes, slice(lo, hi), index, count, here)
-                rows = [row + one.rows(index, count) for one, row in zip(kept, rows, strict=True)]
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        piece = self.long_piece if hi - lo <= self.few else self.piece
+        kept, which = kept._replace(lane=lo), slice(lo, hi)
+        for index, count in segments(first, steps, piece, sampled):
+            self._take(lanes, which, index, count, kept)
+            kept = kept.after(index, count)
+            if sampled and (index + count) % sampled == 0:
+                self.sample(lanes, which)
 
-        in_ranges(run, n, self.threads, self.group)
-        for one in kept:
-            if len(one.table):
-                at = (first // one.every + 1 + np.arange(len(one.table))) * one.every
-                gone = (lanes.failed_at >= 0) & (at[:, None] >= lanes.failed_at)
-                one.table.transpose(0, 2, 1)[gone] = np.nan
-
-    def _take(self, lanes: Lanes, which: Any, index: int, count: int, kept: Sequence[Kept]) -> None:
+    def _take(self, lanes: Lanes, which: Any, index: int, count: int, kept: Kept) -> None:
         """Take some lanes, a slice of them or an array of numbers, through a piece."""
         before = np.array(lanes.z[:, which], order="C")
         z = before.copy()
@@ -106,39 +137,45 @@ class Engine(ABC):
             self._look(lanes, lost, index, before[:, bad], kept, bad)
             return
         lanes.z[:, lost] = before[:, bad]
-        done = [0] * len(kept)
         for start, part in ((index, count // 2), (index + count // 2, count - count // 2)):
-            apart = [one.of(len(bad), start, part) for one in kept]
+            apart = kept.of(len(bad), start, part)
             self._take(lanes, lost, start, part, apart)
-            for k, (one, other) in enumerate(zip(kept, apart, strict=True)):
-                at = one.row + done[k]
-                one.table[at : at + len(other.table), :, one.lane + bad] = other.table
-                done[k] += len(other.table)
+            if len(apart.table):
+                kept.table[kept.row : kept.row + len(apart.table), :, kept.lane + bad] = apart.table
+            kept = kept.after(start, part)
 
-    def _look(self, lanes: Lanes, lost: Any, index: int, before: FloatArray, kept: Sequence[Kept], places: Any) -> None:
+    def _look(self, lanes: Lanes, lost: Any, index: int, before: FloatArray, kept: Kept, places: Any) -> None:
         """One step of lanes in which it is unusual."""
         with np.errstate(all="ignore"):
             image, status, near = self.one(before)
-        ended = lanes.status[lost] != RUNNING
-        image[:, ended | (status != RUNNING)] = 0.0
+        note(lanes, lost, index, image, status, near)
         lanes.z[:, lost] = image
-        for one in kept:
-            if one.rows(index, 1):
-                one.table[one.row, :, one.lane + places] = image.T
-        ends = ~ended & (status != RUNNING)
-        lanes.status[lost[ends]] = status[ends]
-        lanes.failed_at[lost[ends]] = index + 1
-        close = ~ended & (status == RUNNING) & (near > 0)
-        seen = lost[close]
-        lanes.near_at[seen] = np.where(lanes.near[seen] == 0, index, lanes.near_at[seen])
-        lanes.near[seen] += near[close]
+        if kept.rows(index, 1):
+            kept.table[kept.row, :, kept.lane + places] = image.T
 
 
-class Planar(Engine):
+def note(lanes: Lanes, which: Any, index: int, image: FloatArray, status: Any, near: Any) -> None:
+    """What a step of some lanes from the index was; the images of those that have ended become 0."""
+    running = lanes.status[which] == RUNNING
+    ends, close = running & (status != RUNNING), running & (status == RUNNING) & (near > 0)
+    image[:, ~running | ends] = 0.0
+    lanes.status[which[ends]] = status[ends]
+    lanes.failed_at[which[ends]] = index + 1
+    seen = which[close]
+    lanes.near_at[seen] = np.where(lanes.near[seen] == 0, index, lanes.near_at[seen])
+    lanes.near[seen] += near[close]
+
+
+class Planar(Halved):
     """Engines in normal form."""
 
     def __init__(self, rows: PlanarRows) -> None:
         self.rows = rows
+
+    def sample(self, lanes: Lanes, which: slice) -> None:
+        seen = self.rows.distances(lanes.z[:, which], lanes.base[:, :, which])
+        seen[:, lanes.status[which] != RUNNING] = 0.0
+        np.maximum(lanes.largest[:, which], seen, out=lanes.largest[:, which])
 
     def one(self, z: FloatArray) -> Outcome:
         """One step of all blocks; an orbit ends as the first of its blocks does."""
@@ -186,29 +223,31 @@ class Generic(Engine):
         """One elimination."""
         n = self.equation.rows
         full = self._matrices(z)
-        matrix, right = full[:, :n], full[:, n].copy()
+        matrix, right = full[:, :n], full[:, n]
         sizes = np.fmax(np.fmax.reduce(np.abs(matrix), axis=1), 1.0)  # of the rows
-        near = np.zeros(z.shape[1], dtype=bool)
-        status = np.where(np.fmax.reduce(sizes) <= LARGEST, RUNNING, OVERFLOW).astype(np.int8)
         for p in range(n):
+            much = MUCH * np.abs(full[p, p])
             for i in range(p + 1, n):
-                wanted = np.abs(matrix[i, p]) > MUCH * np.abs(matrix[p, p])
+                wanted = np.abs(full[i, p]) > much
                 if wanted.any():
-                    for table in (matrix, right, sizes):
-                        _exchange(table, p, i, wanted)
-            size = np.abs(matrix[p, p])
-            ends = np.where(size == 0.0, SINGULAR, np.where(size <= LARGEST, RUNNING, OVERFLOW))
-            status = np.where(status == RUNNING, ends, status).astype(np.int8)
-            near |= size <= NEAR * sizes[p]
-            if p + 1 < n:
-                factors = matrix[p + 1 :, p] * (1.0 / matrix[p, p])
-                matrix[p + 1 :, p + 1 :] -= factors[:, None] * matrix[p, None, p + 1 :]
-                right[p + 1 :] -= factors * right[p]
+                    _exchange(full[p, p:], full[i, p:], wanted)
+                    _exchange(sizes[p], sizes[i], wanted)
+                    much = MUCH * np.abs(full[p, p])
+            factors = full[p + 1 :, p] * (1.0 / full[p, p])
+            full[p + 1 :, p + 1 :] -= factors[:, None] * full[p, None, p + 1 :]
         for j in range(n - 1, -1, -1):
             right[j] /= matrix[j, j]
             right[:j] -= matrix[:j, j] * right[j]
-        status[(status == RUNNING) & ~np.isfinite(right).all(axis=0)] = OVERFLOW
-        return right, status, near.astype(np.int64)
+        pivots = np.abs(matrix[range(n), range(n)])
+        near = (pivots <= NEAR * sizes).any(axis=0).astype(np.int64)
+        status = np.zeros(z.shape[1], dtype=np.int8)
+        if not (0.0 < pivots.min() <= pivots.max() <= LARGEST >= sizes.max() and np.isfinite(right).all()):
+            status[~(sizes <= LARGEST).all(axis=0)] = OVERFLOW
+            for size in pivots:
+                ends = np.where(size == 0.0, SINGULAR, np.where(size <= LARGEST, RUNNING, OVERFLOW))
+                status = np.where(status == RUNNING, ends, status).astype(np.int8)
+            status[(status == RUNNING) & ~np.isfinite(right).all(axis=0)] = OVERFLOW
+        return right, status, near
 
     def _matrices(self, z: FloatArray) -> FloatArray:
         """(M | r) at the states."""
@@ -226,9 +265,11 @@ class Generic(Engine):
         return full
 
 
-def _exchange(rows: FloatArray, p: int, i: int, wanted: Any) -> None:
-    """Rows p and i in the lanes that want it."""
-    rows[p, ..., wanted], rows[i, ..., wanted] = rows[i, ..., wanted], rows[p, ..., wanted]
+def _exchange(one: FloatArray, other: FloatArray, wanted: Any) -> None:
+    """Two rows in the lanes that want it."""
+    kept = one.copy()
+    np.copyto(one, other, where=wanted)
+    np.copyto(other, kept, where=wanted)
 
 
 class Word(Engine):
@@ -237,46 +278,26 @@ class Word(Engine):
     def __init__(self, engines: Sequence[Engine]) -> None:
         self.engines = engines
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
-        fine = np.ones(z.shape[1], dtype=bool)
-        places = [one.row for one in kept]
-        for index in range(first, first + count):
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        kept = kept._replace(lane=lo)
+        for index in range(first, first + steps):
             for engine in self.engines:
-                fine &= engine.take(z, index, 1, ())
-            keep(z, index + 1, kept, places)
-        return fine
-
-    def one(self, z: FloatArray) -> Outcome:
-        """One step of each; an orbit ends as the first of them does."""
-        status, near = np.zeros(z.shape[1], dtype=np.int8), np.zeros(z.shape[1], dtype=np.int64)
-        for engine in self.engines:
-            z, ends, close = engine.one(z)
-            near += np.where(status == RUNNING, close, 0)
-            status = np.where(status == RUNNING, ends, status).astype(np.int8)
-        return z, status, near
+                engine.run(lanes, lo, hi, index, 1, NOTHING, 0)
+            kept = kept.keep(lanes.z[:, lo:hi], index + 1)
 
 
-def keep(z: FloatArray, index: int, kept: Sequence[Kept], places: list[int]) -> None:
-    """Write the states at an index to the tables that want them; `places` are the next rows."""
-    for k, one in enumerate(kept):
-        if one.every and index % one.every == 0:
-            one.table[places[k], :, one.lane : one.lane + z.shape[1]] = z
-            places[k] += 1
-
-
-def segments(first: int, count: int, kept: Sequence[Kept]) -> Iterator[int]:
-    """How many steps it is each time to the next index at which something is kept, or to the end."""
+def segments(first: int, count: int, *intervals: int) -> Iterator[tuple[int, int]]:
+    """Index and number of steps of segments that end at every multiple of the intervals (0: none)."""
     index = first
     while index < first + count:
-        ends = [index - index % one.every + one.every for one in kept if one.every]
-        end = min([first + count, *ends])
-        yield end - index
+        end = min([first + count, *(index - index % interval + interval for interval in intervals if interval)])
+        yield index, end - index
         index = end
 
 
 def in_ranges(run: Callable[[int, int], None], lanes: int, threads: int, width: int) -> None:
-    """Run on ranges of lanes that are multiples of `width` long, on several threads in several for each."""
-    share = -(-lanes // (threads * _SHARES * width)) * width if threads > 1 else width
+    """Run on ranges of at most `width` lanes, or on several threads on several for each."""
+    share = -(-lanes // (threads * _SHARES * _MULTIPLE)) * _MULTIPLE if threads > 1 else width
     ranges = [(lo, min(lanes, lo + share)) for lo in range(0, lanes, share)]
     if threads == 1 or len(ranges) == 1:
         for lo, hi in ranges:

@@ -130,17 +130,8 @@ class Stepping:
 
         The distances of the block integrals from the start are looked at every `sampled` steps.
         """
-        kept = [] if record is None else [Kept(every, record)]
-        if self.rows is None:
-            self._engine.advance(lanes, first, steps, kept)
-            return
-        samples = Kept(sampled, NOTHING)
-        samples = samples._replace(table=np.empty((samples.rows(first, steps), *lanes.z.shape)))
-        self._engine.advance(lanes, first, steps, [*kept, samples])
-        if len(samples.table):
-            seen = self.rows.distances(samples.table, lanes.base)
-            seen[:, np.isnan(samples.table).any(axis=1)] = 0.0  # the orbit has ended
-            np.maximum(lanes.largest, seen.max(axis=1), out=lanes.largest)
+        kept = NOTHING if record is None else Kept(every, record)
+        self._engine.advance(lanes, first, steps, kept, 0 if self.rows is None else sampled)
 
     def points(self, record: FloatArray) -> FloatArray:
         """The points x (count, n, dim) of recorded states (count, rows, n)."""
@@ -305,7 +296,7 @@ class FloatEnsemble:
     def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray | None]:
         self._interrupted = False
         stepping, lanes, stop = self._stepping, self._lanes, self.step + steps
-        for first, count, rows in portions(stepping, self.n, self.step, stop, every, self._sampled):
+        for first, count, rows in portions(stepping, self.n, self.step, stop, every):
             record = np.empty((rows, len(lanes.z), self.n)) if rows else None
             stepping.advance(lanes, first, count, every, self._sampled, record)
             self.step = first + count
@@ -316,14 +307,11 @@ class FloatEnsemble:
                 return
 
 
-def portions(
-    stepping: Stepping, n: int, step: int, stop: int, every: int, sampled: int
-) -> Iterator[tuple[int, int, int]]:
+def portions(stepping: Stepping, n: int, step: int, stop: int, every: int) -> Iterator[tuple[int, int, int]]:
     """First index, steps and recorded rows of portions that take a tenth of a second and some megabytes."""
     piece = stepping.piece(n)
-    for interval in (every, sampled if stepping.rows is not None else 0):
-        if interval:
-            piece = min(piece, interval * max(1, 1_000_000 // (n * stepping.dim)))
+    if every:
+        piece = min(piece, every * max(1, 1_000_000 // (n * stepping.dim)))
     while step < stop:
         count = min(piece, stop - step)
         yield step, count, (step + count) // every - step // every if every else 0
@@ -383,7 +371,7 @@ def block_drifts(stepping: Stepping, lanes: Lanes) -> Iterator[Drift]:
     if stepping.rows is None:
         return
     blocks = stepping.rows.blocks
-    now = stepping.rows.distances(lanes.z[None], lanes.base)[:, 0]
+    now = stepping.rows.distances(lanes.z, lanes.base)
     now[:, lanes.status != RUNNING] = np.nan
     largest = np.fmax(lanes.largest, now)
     for r, label in enumerate(blocks.labels):

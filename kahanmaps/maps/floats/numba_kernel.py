@@ -3,7 +3,8 @@
 In normal form blocks know nothing of each other: all blocks of one kind are taken together, those of 256 lanes in
 vector registers and the innermost cache, and those of a single orbit such that the steps of one hide the time that a
 chain of operations takes in another. The generic elimination runs over 128 lanes, exchanging rows in those that want
-it; for single orbits the same code is compiled for one lane. Steps are only watched for anything unusual (advance.py).
+it. Steps are only watched for anything unusual, and lanes that met it are taken again from a saved state, one by one
+and with all tests: a Python call for each of them would cost a thousand times as much.
 
 Operations and their order are those of steps.py, which are compiled here. Without fastmath nothing is contracted or
 reordered. Kernels release the interpreter lock and are started by Python threads on ranges of lanes. So no threading
@@ -13,7 +14,6 @@ layer of numba is needed; the one that is always there aborts the program if two
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,38 +22,54 @@ import numba
 import numpy as np
 
 from kahanmaps.maps.floats import steps as float_steps
-from kahanmaps.maps.floats.advance import NOTHING, Generic, Kept, Planar
+from kahanmaps.maps.floats.advance import Engine, Kept
 from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.floats.steps import GenericEquation, PlanarRows
+from kahanmaps.maps.floats.steps import GenericEquation, Lanes, PlanarRows
 from kahanmaps.maps.kept_code import compiled
 
 _WIDTH = 256
+_PIECE = 1024
 _FEW = 16  # blocks of a kind
 _LANES = 128
+_ALL = 1 << 62
+_ALONE = 8  # lanes, up to which the elimination takes them one by one
 
 NEAR = float_steps.NEAR
 NEAR_SQUARED = float_steps.NEAR_SQUARED
 MUCH = float_steps.MUCH
 LARGEST = float_steps.LARGEST
+RUNNING = float_steps.RUNNING
+OVERFLOW = float_steps.OVERFLOW
+SINGULAR = float_steps.SINGULAR
 
-_NONE = Kept(0, NOTHING)
+
+class Numbers(NamedTuple):
+    """Of a normal form what a step needs: its runs, and by block a, b, c, d and the factor of the integral."""
+
+    runs: Any
+    coefficients: FloatArray
+    kappa: FloatArray
 
 
 class PlanarRoom(NamedTuple):
-    """What a kernel in normal form works in: the states of some lanes, and for each block 1, or 0 (unusual)."""
+    """What a kernel in normal form works in: the states of some lanes, those before a piece, and which lanes are fine.
+
+    There is a 1 for each block of a run (0: unusual).
+    """
 
     buffer: FloatArray
+    saved: FloatArray
     usual: FloatArray
 
 
 class GenericRoom(NamedTuple):
-    """What the elimination works in: points and images, (M | r), sizes of rows, and a number a lane twice."""
+    """What the elimination works in: points and images, (M | r), and a number a lane three times."""
 
     x: FloatArray
     right: FloatArray
     M: FloatArray
-    sizes: FloatArray
+    scale: FloatArray
     inverse: FloatArray
     fine: FloatArray
 
@@ -65,11 +81,13 @@ real_cubes = _inner(float_steps.real_cubes)
 real_general = _inner(float_steps.real_general)
 complex_lines = _inner(float_steps.complex_lines)
 complex_general = _inner(float_steps.complex_general)
+real_integral = _inner(float_steps.real_integral)
+complex_integral = _inner(float_steps.complex_integral)
 
 
 @_inner
-def _eight(k: Any) -> Any:
-    return (k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7])
+def _eight(k: Any, r: int) -> Any:
+    return (k[r, 0], k[r, 1], k[r, 2], k[r, 3], k[r, 4], k[r, 5], k[r, 6], k[r, 7])
 
 
 def _real_sweep(formula: Any) -> Any:
@@ -150,7 +168,7 @@ _sweep_complex_lines, _sweep_complex_general = _complex_sweep(complex_lines), _c
 @_inner
 def _sweep(state: Any, width: int, run: Any, coefficients: Any, count: int, usual: Any) -> None:
     """Steps of all blocks of a run: `state` has their rows, of `width` lanes each, one behind the other."""
-    kind, parts, blocks, k = run[0], run[1], run[3], _eight(coefficients[run[4]])
+    kind, parts, blocks, k = run[0], run[1], run[3], _eight(coefficients, run[4])
     size, at = blocks * width, run[2] * width
     few, share = size <= _FEW, size if size <= _WIDTH else width
     for low in range(0, size, share):
@@ -180,82 +198,270 @@ def _sweep(state: Any, width: int, run: Any, coefficients: Any, count: int, usua
 
 
 @_inner
-def _next(index: int, last: int, one: Kept, other: Kept) -> int:
-    """The next index at which something is kept, or the last one."""
-    if one.every:
-        last = min(last, index - index % one.every + one.every)
-    if other.every:
-        last = min(last, index - index % other.every + other.every)
-    return last
+def _careful(state: Any, width: int, i: int, numbers: Numbers, first: int, count: int, lanes: Lanes, lane: int) -> None:
+    """Steps of one lane with all tests; an orbit ends as the first of its blocks does (advance.Planar.one)."""
+    runs = numbers.runs
+    for index in range(first, first + count):
+        status, near = RUNNING, 0
+        for r in range(len(runs)):
+            real, far, k = runs[r, 1] == 2, runs[r, 3] * width, _eight(numbers.coefficients, runs[r, 4])
+            for b in range(runs[r, 3]):
+                at = (runs[r, 2] + b) * width + i
+                if real:
+                    state[at], state[at + far], w, g = real_general(state[at], state[at + far], k)
+                    unusual = not abs(w) > NEAR + NEAR * abs(g)
+                else:
+                    U, V, W, T = state[at], state[at + far], state[at + 2 * far], state[at + 3 * far]
+                    U, V, W, T, w, g = complex_general(U, V, W, T, k)
+                    state[at], state[at + far], state[at + 2 * far], state[at + 3 * far] = U, V, W, T
+                    unusual = not w > NEAR_SQUARED + NEAR_SQUARED * g
+                if status == RUNNING:
+                    if w == 0.0:
+                        status = SINGULAR
+                    elif not np.isfinite(w):
+                        status = OVERFLOW
+                    elif unusual:
+                        near += 1
+        if status == RUNNING:
+            for j in range(len(lanes.z)):
+                if not np.isfinite(state[j * width + i]):
+                    status = OVERFLOW
+        if status != RUNNING:
+            for j in range(len(lanes.z)):
+                state[j * width + i] = 0.0
+        if status != RUNNING or near:
+            _note(lanes, lane, index, status, near)
+        if status != RUNNING:
+            return
+
+
+@numba.njit(error_model="numpy", nogil=True, inline="always")  # Lanes are long to hand over
+def _note(lanes: Lanes, lane: int, index: int, status: int, near: int) -> None:
+    """What a step from the index was."""
+    if status != RUNNING:
+        lanes.status[lane] = status
+        lanes.failed_at[lane] = index + 1
+    elif near:
+        if lanes.near[lane] == 0:
+            lanes.near_at[lane] = index
+        lanes.near[lane] += near
 
 
 @_inner
-def _keep(state: Any, stride: int, at: int, width: int, index: int, row: int, kept: Kept) -> int:
-    """Write the states of the lanes from `at` on to the table, if they are wanted; the next row."""
-    if kept.every == 0 or index % kept.every:
-        return row
-    for j in range(kept.table.shape[1]):
+def _sample(state: Any, width: int, at: int, numbers: Numbers, lanes: Lanes) -> None:
+    """PlanarRows.distances of the lanes from `at` on, the largest of which are kept for orbits that go on."""
+    runs, alive = numbers.runs, lanes.status[at : at + width]
+    for r in range(len(runs)):
+        far = runs[r, 3] * width
+        for b in range(runs[r, 3]):
+            block, low = runs[r, 4] + b, (runs[r, 2] + b) * width
+            k, kappa = _eight(numbers.coefficients, block), numbers.kappa[block]
+            real, imaginary = lanes.base[block, 0, at : at + width], lanes.base[block, 1, at : at + width]
+            top, U, V = lanes.largest[block, at : at + width], state[low:], state[low + far :]
+            if runs[r, 1] == 2:
+                for i in range(width):
+                    x = abs(real_integral(U[i], V[i], k, kappa[0]) - real[i])
+                    x = x if x <= np.inf else np.inf
+                    top[i] = x if (x > top[i]) & (alive[i] == RUNNING) else top[i]
+            else:
+                W, T = state[low + 2 * far :], state[low + 3 * far :]
+                for i in range(width):
+                    x, y = complex_integral(U[i], V[i], W[i], T[i], k, kappa[0], kappa[1])
+                    x, y = x - real[i], y - imaginary[i]
+                    x = np.sqrt(x * x + y * y)
+                    x = x if x <= np.inf else np.inf
+                    top[i] = x if (x > top[i]) & (alive[i] == RUNNING) else top[i]
+
+
+@_inner
+def _keep(state: Any, stride: int, at: int, width: int, row: int, table: Any) -> None:
+    """Write the states of the lanes from `at` on to a row of the table."""
+    for j in range(table.shape[1]):
         for i in range(width):
-            kept.table[row, j, kept.lane + at + i] = state[j * stride + i]
-    return row + 1
+            table[row, j, at + i] = state[j * stride + i]
+
+
+@_inner
+def _multiple(index: int, every: int) -> int:
+    """The next multiple (0: none)."""
+    return index - index % every + every if every else 1 << 62
+
+
+@_inner
+def _usual(state: Any, before: Any, size: int, usual: Any, blocks: int) -> bool:
+    """Whether nothing unusual was met in any lane."""
+    good = True
+    for i in range(blocks):
+        good &= usual[i] != 0.0
+    # Where w overflows and the numerators do not, the image is 0, and stays there; see advance.sound.
+    for i in range(size):
+        good &= (abs(state[i]) <= LARGEST) & ((state[i] != 0.0) | (before[i] == 0.0))
+    return good
+
+
+@_inner
+def _again(
+    state: Any, before: Any, usual: Any, width: int, at: int, numbers: Numbers, first: int, count: int, lanes: Lanes
+) -> None:
+    """Take the lanes that met anything unusual again: `before` has their states before these steps."""
+    rows, blocks = len(lanes.z), len(usual) // _WIDTH
+    for i in range(width):
+        good = True
+        for b in range(blocks):
+            good &= usual[b * width + i] != 0.0
+        for j in range(rows):
+            value, old = state[j * width + i], before[j * width + i]
+            good &= (abs(value) <= LARGEST) & ((value != 0.0) | (old == 0.0))
+        if not good:
+            for j in range(rows):
+                state[j * width + i] = before[j * width + i]
+            _careful(state, width, i, numbers, first, count, lanes, at + i)
 
 
 def _planar_kernel(stamp: int) -> Any:
-    def planar_take(
-        z: Any,
-        runs: Any,
-        coefficients: Any,
+    def planar_advance(
+        lanes: Lanes,
+        lo: int,
+        hi: int,
+        numbers: Numbers,
         first: int,
-        count: int,
+        steps: int,
+        sampled: int,
         kept: Kept,
-        also: Kept,
         room: PlanarRoom,
-        fine: Any,
     ) -> int:
-        rows, lanes, last = z.shape[0], z.shape[1], first + count
-        state, usual = room.buffer, room.usual
-        for at in range(0, lanes, _WIDTH):
-            width = min(_WIDTH, lanes - at)
+        rows, last, runs = lanes.z.shape[0], first + steps, numbers.runs
+        state, before, usual = room.buffer, room.saved, room.usual
+        for at in range(lo, hi, _WIDTH):
+            width = min(_WIDTH, hi - at)
+            most = len(usual) // _WIDTH * width
             for j in range(rows):
                 for i in range(width):
-                    state[j * width + i] = z[j, at + i]
-            usual[:] = 1.0
-            index, row, other = first, kept.row, also.row
+                    state[j * width + i] = lanes.z[j, at + i]
+            index, row = first, 0
+            to_keep, to_sample = _multiple(first, kept.every), _multiple(first, sampled)
             while index < last:
-                end = _next(index, last, kept, also)
+                end = min(last, index + _PIECE, to_keep, to_sample)
+                for i in range(rows * width):
+                    before[i] = state[i]
+                for i in range(most):
+                    usual[i] = 1.0
                 for r in range(len(runs)):
-                    _sweep(state, width, runs[r], coefficients, end - index, usual)
+                    _sweep(state, width, runs[r], numbers.coefficients, end - index, usual)
+                if not _usual(state, before, rows * width, usual, most):
+                    _again(state, before, usual, width, at, numbers, index, end - index, lanes)
                 index = end
-                row = _keep(state, width, at, width, index, row, kept)
-                other = _keep(state, width, at, width, index, other, also)
+                if index == to_keep:
+                    _keep(state, width, at, width, row, kept.table)
+                    row, to_keep = row + 1, to_keep + kept.every
+                if index == to_sample:
+                    _sample(state, width, at, numbers, lanes)
+                    to_sample += sampled
             for j in range(rows):
                 for i in range(width):
-                    value = state[j * width + i]
-                    # Where w overflows and the numerators do not, the image is 0, and stays there; see advance.sound.
-                    if not ((abs(value) <= LARGEST) & ((value != 0.0) | (z[j, at + i] == 0.0))):
-                        fine[at + i] = False
-                    z[j, at + i] = value
-            for r in range(len(runs)):
-                for b in range(runs[r, 3]):
-                    for i in range(width):
-                        fine[at + i] &= usual[b * width + i] != 0.0
+                    lanes.z[j, at + i] = state[j * width + i]
         return stamp
 
-    return planar_take
+    return planar_advance
 
 
 @_inner
-def _fill(x: Any, equation: GenericEquation, M: Any, sizes: Any) -> None:
-    """The matrices at x, and for each row the largest of 1 and its entries."""
+def _alone(x: Any, equation: GenericEquation, M: Any, right: Any, sizes: Any) -> Any:
+    """float_steps.PythonGeneric.step: the image of x into `right`; its status, and whether it was near-singular."""
+    constants, first, columns = equation.constants, equation.first, equation.columns
+    factors, products = equation.factors, equation.products
+    n = len(constants)
+    near = 0
+    scale = 1.0
+    for t in range(len(products)):
+        x[n + t] = x[products[t, 0]] * x[products[t, 1]]
+    for i in range(n):
+        sizes[i] = 1.0
+        for j in range(n + 1):
+            total = constants[i, j]
+            for t in range(first[i * (n + 1) + j], first[i * (n + 1) + j + 1]):
+                total += factors[t] * x[columns[t]]
+            if j == n:
+                right[i] = total
+                continue
+            M[i, j] = total
+            if abs(total) > sizes[i]:
+                sizes[i] = abs(total)
+        if sizes[i] > scale:
+            scale = sizes[i]
+    if not scale <= LARGEST:
+        return OVERFLOW, near
+    for p in range(n):
+        for i in range(p + 1, n):
+            if abs(M[i, p]) > MUCH * abs(M[p, p]):
+                for j in range(p, n):
+                    M[p, j], M[i, j] = M[i, j], M[p, j]
+                right[p], right[i] = right[i], right[p]
+                sizes[p], sizes[i] = sizes[i], sizes[p]
+        if M[p, p] == 0.0:
+            return SINGULAR, near
+        if not abs(M[p, p]) <= LARGEST:
+            return OVERFLOW, near
+        if abs(M[p, p]) <= NEAR * sizes[p]:
+            near = 1
+        inverse = 1.0 / M[p, p]
+        for i in range(p + 1, n):
+            factor = M[i, p] * inverse
+            for j in range(p + 1, n):
+                M[i, j] -= factor * M[p, j]
+            right[i] -= factor * right[p]
+    for j in range(n - 1, -1, -1):
+        right[j] /= M[j, j]
+        for i in range(j):
+            right[i] -= M[i, j] * right[j]
+    for j in range(n):
+        if not np.isfinite(right[j]):
+            return OVERFLOW, near
+    return RUNNING, near
+
+
+@_inner
+def _together(x: Any, right: Any, equation: GenericEquation, room: GenericRoom) -> bool:
+    """One step of all lanes: images into `right`; `fine` is 0 where something is unusual.
+
+    M has n rows of n + 1 entries, the last one the right-hand side. Loops over the lanes do several operations, which
+    saves loads and stores, but not too many: a loop over more than a handful of arrays is not vectorised, because the
+    compiler would have to test too many pairs of them for overlap. For the same reason the number of lanes is a
+    constant.
+    """
+    n = len(equation.constants)
+    _fill(x, equation, room.M, room.scale)
+    for l in range(_LANES):
+        room.fine[l] = 1.0
+    for p in range(n):
+        _eliminate(room.M, p, n, room.scale, room.inverse, room.fine)
+    M, fine, good = room.M, room.fine, True
+    for j in range(n - 1, -1, -1):
+        value, target, pivot = M[j * (n + 1) + n], right[j], M[j * (n + 1) + j]
+        for l in range(_LANES):
+            target[l] = value[l] / pivot[l]
+            fine[l] = fine[l] if abs(target[l]) <= LARGEST else 0.0
+        for i in range(j):
+            entry, upper = M[i * (n + 1) + n], M[i * (n + 1) + j]
+            for l in range(_LANES):
+                entry[l] -= upper[l] * target[l]
+    for l in range(_LANES):
+        good &= fine[l] != 0.0
+    return good
+
+
+@_inner
+def _fill(x: Any, equation: GenericEquation, M: Any, scale: Any) -> None:
+    """The matrices at x, and for each lane the largest of 1 and their entries."""
     first, columns, factors, products = equation.first, equation.columns, equation.factors, equation.products
     n = len(equation.constants)
+    for l in range(_LANES):
+        scale[l] = 1.0
     for t in range(len(products)):
-        a, b = products[t, 0], products[t, 1]
+        target, A, B = x[n + t], x[products[t, 0]], x[products[t, 1]]
         for l in range(_LANES):
-            x[n + t, l] = x[a, l] * x[b, l]
+            target[l] = A[l] * B[l]
     for i in range(n):
-        for l in range(_LANES):
-            sizes[i, l] = 1.0
         for j in range(n + 1):
             entry, constant = M[i * (n + 1) + j], equation.constants[i, j]
             t, end = first[i * (n + 1) + j], first[i * (n + 1) + j + 1]
@@ -280,201 +486,127 @@ def _fill(x: Any, equation: GenericEquation, M: Any, sizes: Any) -> None:
                     entry[l] += a * A[l]
                 t += 1
             if j < n:
-                size = sizes[i]
                 for l in range(_LANES):
-                    size[l] = abs(entry[l]) if abs(entry[l]) > size[l] else size[l]
+                    scale[l] = abs(entry[l]) if abs(entry[l]) > scale[l] else scale[l]
 
 
 @_inner
-def _exchange(M: Any, a: int, b: int, wanted: Any) -> None:
-    """Two rows in the lanes that want it."""
-    for l in range(_LANES):
-        one, other = M[a, l], M[b, l]
-        M[a, l] = other if wanted[l] != 0.0 else one
-        M[b, l] = one if wanted[l] != 0.0 else other
-
-
-@_inner
-def _eliminate(M: Any, p: int, n: int, sizes: Any, inverse: Any, fine: Any) -> None:
+def _eliminate(M: Any, p: int, n: int, scale: Any, inverse: Any, fine: Any) -> None:
     """Column p out of the rows below row p, which is exchanged with others in the lanes that want it."""
-    top = p * (n + 1)
+    pivot = M[p * (n + 1) + p]
     for i in range(p + 1, n):
-        below, wanted = i * (n + 1), False
+        below = M[i * (n + 1) + p]
+        wanted = False
         for l in range(_LANES):
-            wanted |= abs(M[below + p, l]) > MUCH * abs(M[top + p, l])
+            wanted |= abs(below[l]) > MUCH * abs(pivot[l])
         if wanted:
             for l in range(_LANES):
-                inverse[l] = 1.0 if abs(M[below + p, l]) > MUCH * abs(M[top + p, l]) else 0.0
+                inverse[l] = 1.0 if abs(below[l]) > MUCH * abs(pivot[l]) else 0.0
             for j in range(p, n + 1):
-                _exchange(M, top + j, below + j, inverse)
-            _exchange(sizes, p, i, inverse)
+                upper, entry = M[p * (n + 1) + j], M[i * (n + 1) + j]
+                for l in range(_LANES):
+                    one, other = upper[l], entry[l]
+                    upper[l] = other if inverse[l] != 0.0 else one
+                    entry[l] = one if inverse[l] != 0.0 else other
     for l in range(_LANES):
-        size = abs(M[top + p, l])
-        fine[l] = fine[l] if (size > NEAR * sizes[p, l]) & (size <= LARGEST) else 0.0
-        inverse[l] = 1.0 / M[top + p, l]
+        size = abs(pivot[l])
+        fine[l] = fine[l] if (size > NEAR * scale[l]) & (size <= LARGEST) else 0.0
+        inverse[l] = 1.0 / pivot[l]
     for i in range(p + 1, n):
         factor = M[i * (n + 1) + p]
         for l in range(_LANES):
             factor[l] = factor[l] * inverse[l]
         j = p + 1
         while j + 1 <= n:
-            entry, upper = M[i * (n + 1) + j], M[top + j]
-            other, above = M[i * (n + 1) + j + 1], M[top + j + 1]
+            entry, upper = M[i * (n + 1) + j], M[p * (n + 1) + j]
+            other, above = M[i * (n + 1) + j + 1], M[p * (n + 1) + j + 1]
             for l in range(_LANES):
                 entry[l] -= factor[l] * upper[l]
                 other[l] -= factor[l] * above[l]
             j += 2
         while j <= n:
-            entry, upper = M[i * (n + 1) + j], M[top + j]
+            entry, upper = M[i * (n + 1) + j], M[p * (n + 1) + j]
             for l in range(_LANES):
                 entry[l] -= factor[l] * upper[l]
             j += 1
 
 
-@_inner
-def _step_many(x: Any, right: Any, equation: GenericEquation, room: GenericRoom) -> None:
-    """One step of all lanes: images into `right`; `fine` becomes 0 where something is unusual.
-
-    M has n rows of n + 1 entries, the last one the right-hand side. Loops over the lanes do several operations,
-    which saves loads and stores, but not too many: a loop over more than a handful of rows is not vectorised,
-    because the compiler would have to test too many pairs of them for overlap.
-    """
-    n = len(equation.constants)
-    M, sizes, fine = room.M, room.sizes, room.fine
-    _fill(x, equation, M, sizes)  # an infinite entry makes its row's size infinite, and its pivot small
-    for p in range(n):
-        _eliminate(M, p, n, sizes, room.inverse, fine)
-    for j in range(n - 1, -1, -1):
-        value, pivot = j * (n + 1) + n, j * (n + 1) + j
-        for l in range(_LANES):
-            right[j, l] = M[value, l] / M[pivot, l]
-            fine[l] = fine[l] if abs(right[j, l]) <= LARGEST else 0.0
-        for i in range(j):
-            value, pivot = i * (n + 1) + n, i * (n + 1) + j
-            for l in range(_LANES):
-                M[value, l] -= M[pivot, l] * right[j, l]
-
-
-@_inner
-def _step_one(x: Any, right: Any, equation: GenericEquation, M: Any, sizes: Any) -> bool:
-    """The same for one lane; whether nothing was unusual."""
-    constants, first, columns = equation.constants, equation.first, equation.columns
-    factors, products = equation.factors, equation.products
-    n = len(constants)
-    for t in range(len(products)):
-        x[n + t] = x[products[t, 0]] * x[products[t, 1]]
-    for i in range(n):
-        sizes[i] = 1.0
-        for j in range(n + 1):
-            total = constants[i, j]
-            for t in range(first[i * (n + 1) + j], first[i * (n + 1) + j + 1]):
-                total += factors[t] * x[columns[t]]
-            if j == n:
-                right[i] = total
-                continue
-            M[i, j] = total
-            if abs(total) > sizes[i]:
-                sizes[i] = abs(total)
-    for p in range(n):
-        for i in range(p + 1, n):
-            if abs(M[i, p]) > MUCH * abs(M[p, p]):
-                for j in range(p, n):
-                    M[p, j], M[i, j] = M[i, j], M[p, j]
-                right[p], right[i] = right[i], right[p]
-                sizes[p], sizes[i] = sizes[i], sizes[p]
-        if not (abs(M[p, p]) > NEAR * sizes[p] and abs(M[p, p]) <= LARGEST):
-            return False
-        inverse = 1.0 / M[p, p]
-        for i in range(p + 1, n):
-            factor = M[i, p] * inverse
-            for j in range(p + 1, n):
-                M[i, j] -= factor * M[p, j]
-            right[i] -= factor * right[p]
-    usual = True
-    for j in range(n - 1, -1, -1):
-        right[j] /= M[j, j]
-        usual &= abs(right[j]) <= LARGEST
-        for i in range(j):
-            right[i] -= M[i, j] * right[j]
-    return usual
-
-
 def _generic_kernel(stamp: int) -> Any:
-    def generic_take(
-        z: Any, equation: GenericEquation, first: int, count: int, kept: Kept, room: GenericRoom, usual: Any
+    def generic_advance(
+        lanes: Lanes, lo: int, hi: int, equation: GenericEquation, first: int, steps: int, kept: Kept, room: GenericRoom
     ) -> int:
-        n, lanes, wide = z.shape[0], z.shape[1], len(room.fine)
-        x, right = room.x, room.right
-        M, alone, image, sizes = np.empty((n, n)), np.empty(len(x)), np.empty(n), np.empty(n)
-        for at in range(0, lanes, wide):
-            width = min(wide, lanes - at)
+        x, right, fine, status = room.x, room.right, room.fine, lanes.status
+        n, wide = lanes.z.shape[0], len(room.fine)
+        alone, M, image, sizes = np.zeros(len(x)), np.zeros((n, n)), np.zeros(n), np.ones(n)
+        for at in range(lo, hi, wide):
+            width = min(wide, hi - at)
             for j in range(n):
                 for i in range(wide):
-                    x[j, i] = z[j, at + i] if i < width else z[j, at]  # lanes that nobody looks at
-            room.fine[:] = 1.0
-            row = kept.row
-            for index in range(first, first + count):
-                if wide > 1:
-                    _step_many(x, right, equation, room)
-                    x, right = right, x
-                else:
-                    for j in range(n):
-                        alone[j] = x[j, 0]
-                    if not _step_one(alone, image, equation, M, sizes):
-                        room.fine[0] = 0.0
-                        break
-                    for j in range(n):
-                        x[j, 0] = image[j]
-                if kept.every and (index + 1) % kept.every == 0:
-                    row = _keep(x.ravel(), wide, at, width, index + 1, row, kept)
+                    x[j, i] = lanes.z[j, at + i] if i < width else lanes.z[j, at]  # lanes that nobody looks at
+            row, to_keep = 0, _multiple(first, kept.every)
+            for index in range(first, first + steps):
+                fine[0] = 0.0
+                if wide == 1 or not _together(x, right, equation, room):
+                    for i in range(width):
+                        if fine[i] != 0.0:
+                            continue
+                        if status[at + i] == RUNNING:
+                            for j in range(n):
+                                alone[j] = x[j, i]
+                            failed, near = _alone(alone, equation, M, image, sizes)
+                            if failed != RUNNING or near:
+                                _note(lanes, at + i, index, failed, near)
+                        for j in range(n):
+                            right[j, i] = image[j] if status[at + i] == RUNNING else 0.0
+                x, right = right, x
+                if index + 1 == to_keep:
+                    _keep(x.ravel(), wide, at, width, row, kept.table)
+                    row, to_keep = row + 1, to_keep + kept.every
             for i in range(width):
-                usual[at + i] = room.fine[i] != 0.0
                 for j in range(n):
-                    z[j, at + i] = x[j, i]
+                    lanes.z[j, at + i] = x[j, i] if status[at + i] == RUNNING else 0.0
         return stamp
 
-    return generic_take
+    return generic_advance
 
 
 # A checksum of the formulas' file: machine code kept on disk goes by the age of this file alone.
 _STAMP = zlib.crc32(Path(float_steps.__file__).read_bytes())
 _kernel = partial(compiled, error_model="numpy", nogil=True)
-planar_take = _kernel(_planar_kernel(_STAMP))
-generic_take = _kernel(_generic_kernel(_STAMP))
+planar_advance = _kernel(_planar_kernel(_STAMP))
+generic_advance = _kernel(_generic_kernel(_STAMP))
 
 
-class PlanarNumba(Planar):
-    """Steps in normal form."""
+class PlanarNumba(Engine):
+    """Advances lanes in normal form."""
 
-    piece, long_piece, group = 4096, 1 << 16, 2048
+    group = _ALL
 
     def __init__(self, rows: PlanarRows) -> None:
-        super().__init__(rows)
-        self._runs = np.array(rows.runs, dtype=np.int64)
+        runs = np.array(rows.runs, dtype=np.int64)
+        self._numbers = Numbers(runs, rows.blocks.coefficients, rows.blocks.kappa)
+        self._most = int(runs[:, 3].max())
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
-        blocks = self.rows.blocks
-        most = int(self._runs[:, 3].max())
-        one, other, *_ = [*kept, _NONE, _NONE]
-        room = PlanarRoom(_aligned(len(z), _WIDTH).ravel(), _aligned(most, _WIDTH).ravel())
-        fine = np.ones(z.shape[1], dtype=bool)
-        planar_take(z, self._runs, blocks.coefficients, first, count, one, other, room, fine)
-        return fine
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        rows = len(lanes.z)
+        room = PlanarRoom(*(_aligned(count, _WIDTH).ravel() for count in (rows, rows, self._most)))
+        planar_advance(lanes, lo, hi, self._numbers, first, steps, sampled, kept, room)
 
 
-class GenericNumba(Generic):
-    """Steps of any map."""
+class GenericNumba(Engine):
+    """Advances lanes of any map."""
 
-    piece, long_piece, few, group = 128, 1 << 14, 8, 1024
+    group = _ALL
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+    def __init__(self, equation: GenericEquation) -> None:
+        self.equation = equation
+
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
         n, more = self.equation.rows, len(self.equation.products)
-        wide = 1 if z.shape[1] <= self.few else _LANES
-        x, right, M, sizes = (_aligned(rows, wide) for rows in (n + more, n + more, n * (n + 1), n))
-        room = GenericRoom(x, right, M, sizes, _aligned(1, wide)[0], _aligned(1, wide)[0])
-        fine = np.ones(z.shape[1], dtype=bool)
-        generic_take(z, self.equation, first, count, kept[0] if kept else _NONE, room, fine)
-        return fine
+        wide = 1 if hi - lo <= _ALONE else _LANES
+        x, right, M = (_aligned(rows, wide) for rows in (n + more, n + more, n * (n + 1)))
+        room = GenericRoom(x, right, M, *(_aligned(1, wide)[0] for _ in range(3)))
+        generic_advance(lanes, lo, hi, self.equation, first, steps, kept, room)
 
 
 def _aligned(rows: int, width: int) -> FloatArray:

@@ -6,23 +6,34 @@ minimum over all of them in a step. If there is something, the steps are taken o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from kahanmaps.maps.floats.advance import Generic, Kept, Planar, keep, segments, sound
+from kahanmaps.maps.floats.advance import Generic, Kept, Planar, note, segments, sound
 from kahanmaps.maps.floats.blocks import CUBES, LINES
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.floats.steps import CLEAR, FORMULAS, LARGEST, MUCH, NEAR, RUNNING, GenericEquation, Run
+from kahanmaps.maps.floats.steps import (
+    CLEAR,
+    FORMULAS,
+    LARGEST,
+    MUCH,
+    NEAR,
+    OVERFLOW,
+    RUNNING,
+    SINGULAR,
+    GenericEquation,
+    Lanes,
+    Run,
+)
 
 
 class PlanarNumpy(Planar):
     """Steps in normal form. The two common kinds of block have their formulas here with buffers reused."""
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
+    def take(self, z: FloatArray, first: int, count: int, kept: Kept) -> Any:
         if z.shape[1] <= self.few:
             return np.array([self._alone(z, lane, first, count, kept) for lane in range(z.shape[1])])
         before, good = z.copy(), np.ones(z.shape[1], dtype=bool)
@@ -33,17 +44,14 @@ class PlanarNumpy(Planar):
                 good &= sound(z, before)
         return good
 
-    def _together(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept], good: Any) -> bool:
+    def _together(self, z: FloatArray, first: int, count: int, kept: Kept, good: Any) -> bool:
         """Whether no lane met anything unusual; `good` tells which did, if given."""
-        places = [one.row for one in kept]
-        index = first
-        for steps in segments(first, count, kept):
+        for index, steps in segments(first, count, kept.every):
             for run in self.rows.runs:
                 sweep = _canonical if run.parts == 2 and run.kind in (LINES, CUBES) else self._any
                 if not sweep(run, run.of(z), steps, good):
                     return False
-            index += steps
-            keep(z, index, kept, places)
+            kept = kept.keep(z, index + steps)
         return True
 
     def _any(self, run: Run, parts: list[FloatArray], count: int, good: Any) -> bool:
@@ -56,10 +64,10 @@ class PlanarNumpy(Planar):
                 return False
         return True
 
-    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Sequence[Kept]) -> bool:
+    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Kept) -> bool:
         """One lane in Python's own floats, block by block."""
         before = z[:, lane].copy()
-        wanted = [one for one in kept if one.rows(first, count)]
+        wanted = kept.rows(first, count)
         for run in self.rows.runs:
             formula, near = FORMULAS[run.kind, run.parts], run.near
             for b in range(run.blocks):
@@ -77,9 +85,9 @@ class PlanarNumpy(Planar):
                 except ZeroDivisionError:  # where numpy and compiled code get an infinity
                     return False
                 z[rows, lane] = state
-                for one in wanted:
-                    states = path[one.every - first % one.every - 1 :: one.every]
-                    one.table[one.row : one.row + len(states), rows, one.lane + lane] = states
+                if wanted:
+                    states = path[kept.every - first % kept.every - 1 :: kept.every]
+                    kept.table[kept.row : kept.row + wanted, rows, kept.lane + lane] = states
         return bool(sound(z[:, lane : lane + 1], before[:, None])[0])
 
 
@@ -151,53 +159,67 @@ class GenericNumpy(Generic):
         factors: list[float] = equation.factors.tolist()
         constants: list[list[float]] = equation.constants.tolist()
         terms = [list(zip(columns[s:e], factors[s:e], strict=True)) for s, e in pairwise(first)]
-        self._entries = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        rows = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        self._entries = [(row[:n], *row[n]) for row in rows]
         self._products: list[list[int]] = equation.products.tolist()
 
-    def take(self, z: FloatArray, first: int, count: int, kept: Sequence[Kept]) -> Any:
-        if z.shape[1] <= self.few:
-            return np.array([self._alone(z, lane, first, count, kept) for lane in range(z.shape[1])])
-        good = np.ones(z.shape[1], dtype=bool)
-        places = [one.row for one in kept]
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        if hi - lo <= self.few:
+            for lane in range(lo, hi):
+                self._walk(lanes, lane, first, steps, kept)
+            return
+        z, which, kept = lanes.z[:, lo:hi].copy(), np.arange(lo, hi), kept._replace(lane=lo)
         with np.errstate(all="ignore"):
-            for index in range(first, first + count):
+            for index in range(first, first + steps):
                 z[:], status, near = self.one(z)
-                good &= (status == RUNNING) & (near == 0)
-                keep(z, index + 1, kept, places)
-        return good
+                if status.any() or near.any() or lanes.status[lo:hi].any():
+                    note(lanes, which, index, z, status, near)
+                kept = kept.keep(z, index + 1)
+        lanes.z[:, lo:hi] = z
 
-    def _alone(self, z: FloatArray, lane: int, first: int, count: int, kept: Sequence[Kept]) -> bool:
-        """One lane in Python's own floats."""
-        x = z[:, lane].tolist()
-        places = [one.row for one in kept]
-        for index in range(first, first + count):
+    def _walk(self, lanes: Lanes, lane: int, first: int, steps: int, kept: Kept) -> None:
+        """One lane in Python's own floats, with all tests."""
+        if lanes.status[lane] != RUNNING:
+            return
+        x, place = lanes.z[:, lane].tolist(), kept.row
+        for index in range(first, first + steps):
             for a, b in self._products:
                 x.append(x[a] * x[b])
-            rows = []
-            for row in self._entries:
-                entries = []
+            rows, sizes = [], []
+            for row, side, side_terms in self._entries:
+                entries, size = [], 1.0
                 for total, terms in row:
                     for k, factor in terms:
                         total += factor * x[k]
                     entries.append(total)
+                    if abs(total) > size:
+                        size = abs(total)
+                for k, factor in side_terms:
+                    side += factor * x[k]
+                entries.append(side)
                 rows.append(entries)
-            if not _solved(rows):
-                return False
+                sizes.append(size)
+            status, near = _solved(rows, sizes)
             x = [row[-1] for row in rows]
-            for k, one in enumerate(kept):
-                if one.every and (index + 1) % one.every == 0:
-                    one.table[places[k], :, one.lane + lane] = x
-                    places[k] += 1
-        z[:, lane] = x
-        return True
+            if status != RUNNING or not all(map(isfinite, x)):
+                lanes.status[lane], lanes.failed_at[lane] = status or OVERFLOW, index + 1
+                lanes.z[:, lane] = 0.0
+                return
+            if near:
+                if not lanes.near[lane]:
+                    lanes.near_at[lane] = index
+                lanes.near[lane] += 1
+            if kept.every and (index + 1) % kept.every == 0:
+                kept.table[place, :, lane] = x
+                place += 1
+        lanes.z[:, lane] = x
 
 
-def _solved(rows: list[list[float]]) -> bool:
-    """Whether nothing is unusual in the elimination in (M | r), whose last column becomes the solution."""
-    n = len(rows)
-    sizes = [max(1.0, *map(abs, row[:n])) for row in rows]
+def _solved(rows: list[list[float]], sizes: list[float]) -> tuple[int, bool]:
+    """Eliminate in (M | r), whose last column becomes the solution; the status, and whether a pivot was small."""
+    n, near = len(rows), False
     if not max(sizes) <= LARGEST:
-        return False
+        return OVERFLOW, near
     for p in range(n):
         for i in range(p + 1, n):
             if abs(rows[i][p]) > MUCH * abs(rows[p][p]):
@@ -206,7 +228,11 @@ def _solved(rows: list[list[float]]) -> bool:
         upper = rows[p]
         pivot = upper[p]
         if not NEAR * sizes[p] < abs(pivot) <= LARGEST:
-            return False
+            if pivot == 0.0:
+                return SINGULAR, near
+            if not abs(pivot) <= LARGEST:
+                return OVERFLOW, near
+            near = True
         inverse = 1.0 / pivot
         for row in rows[p + 1 :]:
             factor = row[p] * inverse
@@ -216,4 +242,4 @@ def _solved(rows: list[list[float]]) -> bool:
         rows[j][n] = value = rows[j][n] / rows[j][j]
         for row in rows[:j]:
             row[n] -= row[j] * value
-    return all(isfinite(row[n]) for row in rows)
+    return RUNNING, near

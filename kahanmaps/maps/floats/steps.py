@@ -238,15 +238,13 @@ class PlanarRows:
                         found[here, 0, lanes], found[here, 1, lanes] = value
         return found
 
-    def distances(self, states: FloatArray, base: FloatArray) -> FloatArray:
-        """How far the block integrals at states (count, rows, n) are from `base`: an array (blocks, count, n)."""
-        count, rows, n = states.shape
-        moved = self.integrals(states.transpose(1, 0, 2).reshape(rows, count * n)).reshape(-1, 2, count, n)
+    def distances(self, z: FloatArray, base: FloatArray) -> FloatArray:
+        """How far the block integrals at the states z (rows, n) are from `base`: an array (blocks, n)."""
+        moved, reals = self.integrals(z), self.blocks.reals
         with np.errstate(all="ignore"):
-            moved -= base[:, :, None]
+            moved -= base
             distance: FloatArray = np.abs(moved[:, 0])
-            if self.blocks.reals < len(distance):
-                distance = np.sqrt(distance * distance + moved[:, 1] * moved[:, 1])
+            distance[reals:] = np.sqrt((moved[reals:] * moved[reals:]).sum(axis=1))
         distance[np.isnan(distance)] = np.inf
         return distance
 
