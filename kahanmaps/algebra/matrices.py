@@ -41,8 +41,8 @@ def det(matrix: Any) -> Any:
 
 def rank(field: Field, matrix: Any) -> int:
     """The rank. Over balls: certain, or `PrecisionLost`."""
-    if isinstance(matrix, arb_mat | acb_mat):
-        return len(_eliminate_balls(field, matrix)[1])
+    if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
+        return len(_eliminate(field, matrix)[1])
     if isinstance(matrix, fmpq_mat):
         return int(_integer_rows(matrix).rank())
     return int(matrix.rank())
@@ -204,8 +204,8 @@ def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
 
 def _reduced_echelon(field: Field, matrix: Any) -> tuple[Any, list[int]]:
     """Entries (as a function of row and column) of the reduced echelon form, and its pivot columns."""
-    if isinstance(matrix, arb_mat | acb_mat):
-        rows, pivots = _eliminate_balls(field, matrix)
+    if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
+        rows, pivots = _eliminate(field, matrix)
         return (lambda i, j: rows[i][j]), pivots
     below: Any = None
     if isinstance(matrix, fmpq_mat):
@@ -224,28 +224,36 @@ def _reduced_echelon(field: Field, matrix: Any) -> tuple[Any, list[int]]:
     return (lambda i, j: reduced[i, j]), pivots
 
 
-def _eliminate_balls(field: Field, matrix: arb_mat | acb_mat) -> tuple[list[list[Any]], list[int]]:
-    """Gauss-Jordan with the pivot farthest from zero; where no pivot is certain, all must be zero exactly."""
+def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
+    """Gauss-Jordan, where FLINT has no echelon form: balls, and entries of our own."""
     with field.working():
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []
         for column in range(matrix.ncols()):
             top = len(pivots)
-            if top == len(rows):
-                break
-            best = max(range(top, len(rows)), key=lambda i: rows[i][column].abs_lower())
-            if rows[best][column].contains(0):
-                if all(rows[i][column].is_zero() for i in range(top, len(rows))):
-                    continue
-                raise PrecisionLost("the rank cannot be decided with balls this wide: ask for more bits")
+            best = _pivot([row[column] for row in rows[top:]])
+            if best is None:
+                continue
+            best += top
             rows[top], rows[best] = rows[best], rows[top]
             lead = rows[top][column]
             rows[top] = [entry / lead for entry in rows[top]]
             rows[top][column] = field.one  # exactly: lead / lead is only a ball around it
             for i in range(len(rows)):
-                if i != top and not rows[i][column].is_zero():
+                if i != top and not rows[i][column] == 0:  # noqa: SIM201  (a ball that may be zero is neither)
                     factor = rows[i][column]
                     rows[i] = [a - factor * b for a, b in zip(rows[i], rows[top], strict=True)]
                     rows[i][column] = field.zero
             pivots.append(column)
         return rows, pivots
+
+
+def _pivot(entries: Sequence[Any]) -> int | None:
+    """The place of an entry that is not zero, of balls that farthest from zero; none where all are certainly zero."""
+    found = [k for k, entry in enumerate(entries) if not entry == 0]  # noqa: SIM201  (a ball that may be zero is there)
+    if not found or not hasattr(entries[0], "abs_lower"):
+        return min(found, default=None)
+    best = max(found, key=lambda k: entries[k].abs_lower())
+    if entries[best].contains(0):
+        raise PrecisionLost("the rank cannot be decided with balls this wide: ask for more bits")
+    return best

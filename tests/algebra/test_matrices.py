@@ -10,11 +10,12 @@ import itertools
 from math import gcd
 
 import pytest
-from flint import arb, fmpq, fmpq_mat
+from flint import arb, fmpq, fmpq_mat, fmpq_poly
 from helpers import matrices, over_all_fields, over_exact_fields, some
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import det, nullspace, primitive_integers, rank, solve, trace
 from kahanmaps.errors import PrecisionLost, SingularMatrix
@@ -256,3 +257,14 @@ def test_a_ball_matrix_of_wide_balls_is_not_solved():
     wide = arb(0, 1)  # the interval [-1, 1]
     with RR(64).working(), pytest.raises(PrecisionLost):
         solve(RR(64).matrix(1, 1, [wide]), RR(64).column([1]))
+
+
+@given(matrices(3, 4, st.integers(-1, 1)))
+def test_rank_and_null_space_over_a_number_field_are_those_over_q(matrix):
+    K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
+    scale = [K.one, K.generator, K.generator - 1]  # a row times a unit has the same null space
+    rows = [[K.convert(entry) * c for entry in row] for row, c in zip(matrix.tolist(), scale, strict=True)]
+    rows.append([a + b for a, b in zip(rows[0], rows[1], strict=True)])
+    over = K.matrix(4, 4, [entry for row in rows for entry in row])
+    assert rank(K, over) == rank(QQ, matrix)
+    assert nullspace(K, over) == [tuple(map(K.convert, vector)) for vector in nullspace(QQ, matrix)]
