@@ -240,7 +240,7 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
             rows[top] = [entry / lead for entry in rows[top]]
             rows[top][column] = field.one  # exactly: lead / lead is only a ball around it
             for i in range(len(rows)):
-                if i != top and not rows[i][column] == 0:  # noqa: SIM201  (a ball that may be zero is neither)
+                if i != top and not _is_zero(rows[i][column]):
                     factor = rows[i][column]
                     rows[i] = [a - factor * b for a, b in zip(rows[i], rows[top], strict=True)]
                     rows[i][column] = field.zero
@@ -248,9 +248,14 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
         return rows, pivots
 
 
+def _is_zero(entry: Any) -> bool:
+    """Whether an entry is certainly zero; a ball that holds 0 and more is neither equal to 0 nor different from it."""
+    return bool(entry == 0)
+
+
 def _pivot(entries: Sequence[Any]) -> int | None:
     """The place of an entry that is not zero, of balls that farthest from zero; none where all are certainly zero."""
-    found = [k for k, entry in enumerate(entries) if not entry == 0]  # noqa: SIM201  (a ball that may be zero is there)
+    found = [k for k, entry in enumerate(entries) if not _is_zero(entry)]
     if not found or not hasattr(entries[0], "abs_lower"):
         return min(found, default=None)
     best = max(found, key=lambda k: entries[k].abs_lower())
