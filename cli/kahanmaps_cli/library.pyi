@@ -109,7 +109,7 @@ from kahanmaps.family.skew_hamiltonian import chi as chi
 from kahanmaps.family.skew_hamiltonian import diagnosis as diagnosis
 from kahanmaps.family.structure import NoStructure as NoStructure
 from kahanmaps.family.structure import Structure as Structure
-from kahanmaps.invariants.heights import Growth as Growth
+from kahanmaps.invariants.growth import Growth as Growth
 from kahanmaps.invariants.integrals import ClaimedIntegral as ClaimedIntegral
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as analyze

@@ -9,10 +9,10 @@ from typing import NamedTuple
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.curves import Ended
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.preserve.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
@@ -53,7 +53,7 @@ class _Facts:
     def __init__(self, found: Findings) -> None:
         degrees = found.degrees
         self.found, self.degrees, self.count = found, degrees, found.integral_count
-        self.growth = degrees.growth if degrees is not None else GrowthClass.UNKNOWN
+        self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
         self.grown = degrees.known if degrees is not None else Known.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis = f" ({degrees.basis})" if degrees is not None and degrees.basis else ""
@@ -78,7 +78,7 @@ def conclude(found: Findings) -> Conclusion:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
     sense, ground, growth = verdict.sense or verdict.kind, str(verdict.ground or ""), facts.growth
     if verdict.kind == "not integrable" and ground != Known.PROVED:
-        growth = GrowthClass.EXPONENTIAL  # also where that is estimated only
+        growth = Growth.EXPONENTIAL  # also where that is estimated only
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
 
@@ -108,9 +108,9 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
     """Periodic maps, those with a constant iterate, and those of bounded degrees."""
     if facts.closes:
         return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.phrase}.")
-    if facts.growth is GrowthClass.ZERO:
+    if facts.growth is Growth.ZERO:
         return _Verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
-    if facts.growth is not GrowthClass.BOUNDED:
+    if facts.growth is not Growth.BOUNDED:
         return None
     bounded = f"The degrees of the iterates are bounded{facts.basis}"
     sentence = f"{bounded}: the map is linearisable in the sense of complexity; {facts.integrals}."
@@ -126,7 +126,7 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
     where = "" if found.eps is not None or not found.file.map.has_eps else ", for all eps but countably many"
     sentence = (
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
-        f"function is an integral; {facts.phrase}{facts.basis if facts.growth is GrowthClass.EXPONENTIAL else ''}."
+        f"function is an integral; {facts.phrase}{facts.basis if facts.growth is Growth.EXPONENTIAL else ''}."
     )
     return _Verdict("not integrable", sentence, _confining(found), Known.PROVED)
 
@@ -140,7 +140,7 @@ def _on_curves(facts: _Facts) -> _Verdict | None:
         sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
         return _Verdict("integrable", sentence, sense, Known.PROVED)
     on_curves = orbits_lie_on_curves(found)
-    if facts.growth is not GrowthClass.UNKNOWN or not (facts.liouville or on_curves):
+    if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
     curves = ", so that orbits lie on curves" if on_curves else ""
     sentence = f"Integrable: {facts.integrals}{curves}; of the degrees: {facts.phrase}."
@@ -150,13 +150,13 @@ def _on_curves(facts: _Facts) -> _Verdict | None:
 def _by_growth(facts: _Facts) -> _Verdict | None:
     """Exponential and polynomial growth, measured or explained."""
     count, integrals = facts.count, facts.integrals
-    exact = facts.growth is GrowthClass.EXPONENTIAL  # else the phrase says that it is estimated
+    exact = facts.growth is Growth.EXPONENTIAL  # else the phrase says that it is estimated
     if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
         sentence = f"Not integrable in the sense of complexity: {facts.phrase}{facts.basis if exact else ''}{although}."
         ground = facts.grown if exact else Known.ESTIMATED
         return _Verdict("not integrable", sentence, _confining(facts.found), ground)
-    if facts.growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
+    if facts.growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL):
         sentence = f"Integrable in the sense of complexity: {facts.phrase}{facts.basis}; {integrals}."
         return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.grown))
     return None
@@ -194,7 +194,7 @@ def _orbits_on_curves_proved(found: Findings) -> bool:
     return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
 
 
-def _curves(found: Findings, growth: GrowthClass) -> str:
+def _curves(found: Findings, growth: Growth) -> str:
     """The curves of integrals: in the plane with their genus, which the growth tells where it was not computed."""
     genus = found.pencil.genus if found.pencil is not None else None
     if genus is None and found.dim == 2:

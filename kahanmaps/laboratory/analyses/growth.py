@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.consistency import doubt_of_heights
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey, height_survey
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.singular.singularities import WRITTEN_DIMENSION, patterns_of
 
@@ -40,7 +39,7 @@ def statements(found: Findings) -> list[Statement]:
         more = ", ..." if len(found.degrees.degrees) > _SHOWN_DEGREES + 1 else ""
         if shown:
             lines.append(Statement(Known.MEASURED, f"degrees of the iterates: {shown}{more}"))
-        unknown = found.degrees.growth is GrowthClass.UNKNOWN and not found.degrees.looks_exponential
+        unknown = found.degrees.growth is Growth.UNKNOWN and not found.degrees.looks_exponential
         known = found.degrees.known
         lines.append(Statement(Known.UNDECIDED if unknown else known, found.degrees.growth_text))
         recurrence = found.degrees.recurrence

@@ -8,9 +8,9 @@ from typing import Any
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
@@ -50,7 +50,7 @@ def relations(run: Run, **_: Any) -> tuple[SparseRelation, ...]:
 
 def curves_json(found: Findings) -> dict[str, Any]:
     """The curves, and what the map is on them; null where the degrees contradict them."""
-    growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
+    growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
     if found.pencil is None or found.pencil.against(growth):
         return {"invariant_curves": None}
     return {"invariant_curves": {**found.pencil.to_json(), "motion": found.pencil.motion(growth)}}
@@ -127,7 +127,7 @@ def listed(names: Sequence[str]) -> str:
 def _curve_lines(found: Findings) -> list[Statement]:
     if found.pencil is None:
         return []
-    growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
+    growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
     against = found.pencil.against(growth)
     follows = f"but {against}" if against else found.pencil.motion(growth)
     text = "; ".join(filter(None, [found.pencil.text, follows]))
