@@ -38,6 +38,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
+    Written,
     _joined,
     _tangents,
     outcome_of,
@@ -392,7 +393,9 @@ def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
 def lorenz_along(seed, limits):
     """What becomes of x^2 = 2 z^2, which has points in GF(p) for every other prime only."""
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
-    return outcome_of(load("lorenz").map, fmpq(1, 7), x**2 - 2 * z**2, "?", False, None, random.Random(seed), limits)
+    return outcome_of(
+        load("lorenz").map, fmpq(1, 7), Written(x**2 - 2 * z**2, False, None), "?", random.Random(seed), limits
+    )
 
 
 def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():

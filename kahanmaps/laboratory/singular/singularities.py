@@ -35,10 +35,12 @@ from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
     FIRST_STEPS,
+    NONE_TRACKED,
     NOT_CONFINED,
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
+    Tracking,
     outcome_of,
     outcomes_at_random,
     unwritten,
@@ -181,18 +183,7 @@ def singularities(
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
     map_, exact_eps = as_map(system), rational(eps)
-    if map_.refusal:
-        raise InputError(map_.refusal)
-    if map_.dim > MAX_DIMENSION:
-        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
-    most = _most_digits(map_.dim, seconds)
-    if (digits := _digits(map_, exact_eps)) > most:
-        raise InputError(
-            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
-            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
-        )
-    if steps is not None and not 1 <= steps <= MAX_STEPS:
-        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    _require_short(map_, exact_eps, steps, seconds)
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     over = map_.at(exact_eps)
     try:
@@ -214,26 +205,37 @@ def singularities(
         run = _map_by_map(map_, exact_eps, degree, seed, limits, progress)
         if run is not None:
             return run
+    tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
     rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
-    followed = followed_forms(map_form, every) if critical_degree else ((), ())
-    found, stopped = [], False
+    found: list[Hypersurface] = []
     for one in every:
         if limits.is_over:
-            stopped = True
-            break
+            return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), True, False, True)
         text = name_of(one.form, map_)
         progress(f"following {text[:40]}")
-        found.append(outcome_of(map_, exact_eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, *followed))
-    if critical_degree is None and not stopped:
+        found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
+    if critical_degree is None:
         progress("following critical points")
-        if over.is_bilinear:
-            found += unwritten(map_, exact_eps, rng, limits)
-        else:
-            found.append(
-                Hypersurface(note="the hypersurfaces that this map contracts are too large to be written down")
-            )
-        stopped = limits.is_over
+        too_large = "the hypersurfaces that this map contracts are too large to be written down"
+        found += unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
+    stopped = critical_degree is None and limits.is_over
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
+
+
+def _require_short(map_: BirationalMap, eps: fmpq, steps: int | None, seconds: float) -> None:
+    """Raise InputError for what is too large, or cannot be asked."""
+    if map_.refusal:
+        raise InputError(map_.refusal)
+    if map_.dim > MAX_DIMENSION:
+        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+    most = _most_digits(map_.dim, seconds)
+    if (digits := _digits(map_, eps)) > most:
+        raise InputError(
+            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
+            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
+        )
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
 
 
 def _map_by_map(
