@@ -20,7 +20,7 @@ from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
-from kahanmaps.maps.methods import JUMP_FROM, choose_method, why_no_reduction
+from kahanmaps.maps.methods import DOUBLING_FROM, choose_method, why_no_reduction
 from kahanmaps.maps.orbits import (
     DEFAULT_MAX_DIGITS,
     Iterates,
@@ -345,7 +345,7 @@ def _why_not_to_look(
     member: FamilyMember | None,
 ) -> str:
     """Empty, or why looking for a structure would cost more than it can save."""
-    few = JUMP_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
+    few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
     numbers = [eps, *(rational(entry) for entry in start)]
     if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
         few = max(few, 24)

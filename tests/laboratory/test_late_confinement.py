@@ -523,7 +523,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
 ):
     tried = []
 
-    def walk(equation, point, direction, precision, tangents, functions):
+    def images_of_curve(equation, point, direction, precision, tangents, functions):
         tried.append(precision)
         yield SimpleNamespace(name="first", common=0)
         if precision < 64:
@@ -531,7 +531,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
         yield SimpleNamespace(name="t", common=1)
         yield SimpleNamespace(name="last", common=0)
 
-    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk", walk)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.following.images_of_curve", images_of_curve)
     limits = Range(0, 0, 0, options.get("end", math.inf))
     run, whole = Course((), (), (), limits).steps(steps, most=options.get("most", 4096))
     assert ([step.name for step in run], whole, tried) == found

@@ -214,7 +214,7 @@ class DegreeGrowth(Printed):
             if self.explained is not None:
                 lines.append(("generating function", self.patterns.series_text))
             lines.append(("singularities", self.patterns.text))
-            lines += [("contracted", told) for told in self.patterns.told]
+            lines += [("contracted", text) for text in self.patterns.sentences]
             lines += [("note", told) for told in (self.patterns.word_text,) if told]
         if self.enclosure is not None:
             lines.append(("proved", self.enclosure.text))
@@ -408,7 +408,7 @@ class _Search:
                     lines[k] = self._line()
 
     def _degree(self, line: Line, n: int) -> int:
-        """The degree of iterate n on a line, which is walked there; -1 where that cannot be done on this line."""
+        """The degree of iterate n on a line, which is followed there; -1 where that cannot be done on this line."""
         try:
             while line.steps < n:
                 line.step(self._guess(line.steps + 1))

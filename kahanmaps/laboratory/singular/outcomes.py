@@ -89,7 +89,7 @@ class Hypersurface:
     stage: int | None = None
     generic: str = ""
 
-    def told(self, at: str) -> str:
+    def sentence(self, at: str) -> str:
         """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
         text, most = (self.generic, 2 * _LONGEST) if self.generic else (self.polynomial, _LONGEST)
         cut = text if len(text) <= most else f"{text[:most]} ..."
@@ -105,7 +105,7 @@ class Hypersurface:
             outcome = f"followed for {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
         parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", outcome]
-        return "; ".join([", ".join(parts), *self.orders.told])
+        return "; ".join([", ".join(parts), *self.orders.sentences])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: what is known of it beside its first steps."""
@@ -292,7 +292,7 @@ def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
     )
 
 
-def _told(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
+def _by_ranks(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
     """Status, the step that contracts and the step that ends it."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:
@@ -314,7 +314,7 @@ def _outcome_at(
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     course = Course(equations, point, direction, limits, tracked)
     run, is_whole = course.steps(limits.shown, tangents, _MOST_WITH_TANGENTS)
-    status, down, up = _told([step.rank for step in run], full)
+    status, down, up = _by_ranks([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
@@ -327,7 +327,7 @@ def _outcome_at(
         orders = course.orders_until_return(up)
     if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
         run = list(course.all_steps(orders.settled_at + 2, tangents))
-        status, down, up = _told([step.rank for step in run], full)
+        status, down, up = _by_ranks([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         orders = replace(NO_ORDERS, followed=orders.followed)

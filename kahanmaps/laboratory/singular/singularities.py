@@ -29,7 +29,7 @@ from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
-from kahanmaps.laboratory.singular.contracted import Untold, contracted
+from kahanmaps.laboratory.singular.contracted import OrdersUnknown, contracted
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.laboratory.singular.outcomes import (
@@ -317,14 +317,14 @@ class Patterns:
         return " / ".join(f"({_ascending(part)})" for part in self.series)
 
     @property
-    def told(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """A sentence for each contracted hypersurface, where degrees follow: when it comes back and what it costs."""
         at = f" at eps = {self.at}" if self.at else ""
-        return [f"C{k}: {h.told(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
+        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
 
     @property
     def word_text(self) -> str:
-        """What steps are in what is told, where these are not those of the map; else empty."""
+        """What steps are in these sentences, where these are not those of the map; else empty."""
         return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
 
     @property
@@ -348,7 +348,7 @@ class Patterns:
         found = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
-        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.told, self.contracted, strict=False)]
+        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.contracted, strict=False)]
         maps = self.word.length if self.word_text and self.word else None
         known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
         return {**found, **known, "maps_a_step": maps}
@@ -424,7 +424,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     try:
         degree, hypersurfaces = contracted(map_, eps, rng, limits)
         return _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
-    except Untold as error:
+    except OrdersUnknown as error:
         return _refused(eps, True, limits.is_over) or _unknown(str(error))
 
 
