@@ -14,7 +14,7 @@ from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
 from kahanmaps.algebra.fields import GF, RR
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks import expand
 from kahanmaps.checks.commute import check_commute, commutativity
 from kahanmaps.checks.conserve import check_integrals
@@ -29,25 +29,26 @@ from kahanmaps.invariants.phase_functions import where
 from kahanmaps.laboratory import analysis
 from kahanmaps.laboratory.growth import degrees
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve import darboux_spaces, densities, hamiltonian_structure, hirota_kimura, search
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
-from kahanmaps.laboratory.preserve.cofactors import determinant_polynomial
-from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve import densities, hirota_kimura, search
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.cofactors import determinant_polynomial
+from kahanmaps.laboratory.preserve.darboux.darboux import darboux_polynomials, darboux_spaces
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.inherited import inherited_integrals
-from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.poisson import hamiltonian_structure
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.singular import singularities
 from kahanmaps.laboratory.symmetry import symmetries
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_space import commuting_space
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
-from kahanmaps.maps import orbits
 from kahanmaps.maps.floats import ensemble, steps
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import Kahan
-from kahanmaps.maps.orbit import orbit
+from kahanmaps.maps.orbits.orbit import orbit
+from kahanmaps.maps.orbits.orbits import orbits
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.maps.residues.projective import ProjectiveMap
 from kahanmaps.paper.verifier import VerifyOptions

@@ -14,8 +14,8 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
@@ -29,12 +29,12 @@ from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
-from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
-from kahanmaps.laboratory.preserve.limits import flow_and_map
-from kahanmaps.laboratory.preserve.pencil import pencil_of
-from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.preserve.poisson.pencil import pencil_of
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.preserve.sparse_relations import sparse_relations
 from kahanmaps.laboratory.report import Statement, sections
 from kahanmaps.laboratory.singular.singularities import (

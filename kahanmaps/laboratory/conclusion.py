@@ -12,7 +12,7 @@ from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.known import Known
-from kahanmaps.laboratory.preserve.pencil import GROWTH_ON
+from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
 
 _CURVES = {0: "rational curves", 1: "elliptic curves, of genus 1"}

@@ -8,7 +8,7 @@ from itertools import takewhile
 
 from flint import fmpq_mat
 
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.structure import Structure
@@ -17,7 +17,7 @@ from kahanmaps.laboratory.consistency import doubt_of_heights
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.known import Known
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.singular.outcomes import Outcome
 from kahanmaps.laboratory.symmetry.commuting import CommutingFamily, CommutingField
