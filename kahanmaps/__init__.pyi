@@ -75,8 +75,8 @@ from kahanmaps.laboratory.growth.recurrences import find_recurrence as find_recu
 from kahanmaps.laboratory.laboratory import Laboratory as Laboratory
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux as _affine_darboux
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals as _affine_integrals
-from kahanmaps.laboratory.preserve.darboux.darboux import DarbouxSearch as DarbouxSearch
-from kahanmaps.laboratory.preserve.darboux.darboux import darboux_polynomials as _darboux_polynomials
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch as DarbouxSearch
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials as _darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch as DensitySearch
 from kahanmaps.laboratory.preserve.densities import find_densities as _find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis as hirota_kimura_basis
@@ -121,9 +121,9 @@ from kahanmaps.maps.normal_form.periods import period as _period
 from kahanmaps.maps.normal_form.periods import period_over_rationals as period_over_rationals
 from kahanmaps.maps.normal_form.steps import NormalSteps as NormalSteps
 from kahanmaps.maps.orbits.arithmetic import Arithmetic as Arithmetic
+from kahanmaps.maps.orbits.iteration import Iterates as Iterates
+from kahanmaps.maps.orbits.iteration import Orbit as Orbit
 from kahanmaps.maps.orbits.orbit import orbit as _orbit
-from kahanmaps.maps.orbits.orbits import Iterates as Iterates
-from kahanmaps.maps.orbits.orbits import Orbit as Orbit
 from kahanmaps.maps.polarised import polarised_map as polarised_map
 from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
 from kahanmaps.paper.verifier import VerifyOptions as VerifyOptions

@@ -205,7 +205,7 @@ RIGHT = [
     (MAPS, "def f():\n    import numpy"),
     (MAPS, "if TYPE_CHECKING:\n    import numpy"),
     ("kahanmaps/documents/catalog/__init__.py", "from ...family import cubics"),
-    ("kahanmaps/maps/orbits/orbits.py", "from kahanmaps.displayed import Displayed"),
+    ("kahanmaps/maps/orbits/iteration.py", "from kahanmaps.displayed import Displayed"),
     ("kahanmaps/family/planar.py", "from kahanmaps.systems.quadratic import QuadraticSystem"),
     ("kahanmaps/experiments/results/store.py", "from kahanmaps import __version__"),
     ("kahanmaps/maps/floats/fast.py", "import numpy as np"),

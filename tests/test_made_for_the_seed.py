@@ -32,7 +32,7 @@ from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian
 from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.preserve.darboux.darboux import affine_functions
+from kahanmaps.laboratory.preserve.darboux import affine_functions
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

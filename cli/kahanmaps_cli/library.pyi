@@ -125,8 +125,8 @@ from kahanmaps.laboratory.growth.height_survey import HeightSurvey as HeightSurv
 from kahanmaps.laboratory.growth.height_survey import height_survey as height_survey
 from kahanmaps.laboratory.laboratory import Laboratory as Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint as NoPoint
-from kahanmaps.laboratory.preserve.darboux.darboux import DarbouxSearch as DarbouxSearch
-from kahanmaps.laboratory.preserve.darboux.darboux import darboux_polynomials as darboux_polynomials
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch as DarbouxSearch
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials as darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities as find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import Basis as Basis
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis as hirota_kimura_basis
@@ -170,8 +170,8 @@ from kahanmaps.maps.normal_form.periods import OrbitPeriod as OrbitPeriod
 from kahanmaps.maps.normal_form.periods import period_of as period_of
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock as PlanarBlock
 from kahanmaps.maps.orbits.arithmetic import Arithmetic as Arithmetic
+from kahanmaps.maps.orbits.iteration import OrbitEnd as OrbitEnd
 from kahanmaps.maps.orbits.orbit import orbit as orbit
-from kahanmaps.maps.orbits.orbits import OrbitEnd as OrbitEnd
 from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
 from kahanmaps.paper.claims.survivors import survivors as survivors
 from kahanmaps.paper.claims.survivors import table as table

@@ -19,7 +19,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import CONVENTION, NO_EPS, convention
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.maps.orbits.orbits import Orbit, OrbitEnd, require_short
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 

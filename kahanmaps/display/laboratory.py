@@ -25,7 +25,7 @@ from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.finite.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-from kahanmaps.laboratory.preserve.darboux.darboux import DarbouxSearch
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch
 from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures

@@ -28,9 +28,9 @@ from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
-from kahanmaps.maps.orbits.orbits import DEFAULT_MAX_DIGITS, OrbitPoint
 
 _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash

@@ -52,8 +52,8 @@ from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
-from kahanmaps.maps.orbits.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
 
 FEWEST_HEIGHTS = 9  # for a decision; exponential growth is plain from fewer, and a budget leaves no more of it
 _FEWEST_FOR_EXPONENTIAL = 6

@@ -42,7 +42,7 @@ from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -30,7 +30,7 @@ from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
-from kahanmaps.maps.orbits.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 

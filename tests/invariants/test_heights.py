@@ -39,7 +39,7 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.steps import NormalSteps
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint
-from kahanmaps.maps.orbits.orbits import Orbit, OrbitEnd
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1/2", "1/3", "-1/5", "2/7", "3/4", "-2/3"]

@@ -10,6 +10,7 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.darboux import cofactors as module
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
@@ -24,7 +25,6 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     products,
     search_cofactors,
 )
-from kahanmaps.laboratory.preserve.darboux.darboux import cofactors as module
 from kahanmaps.maps.kahan import Kahan
 
 SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]

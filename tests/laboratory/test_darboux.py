@@ -17,7 +17,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.darboux.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -13,7 +13,7 @@ from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.darboux.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched

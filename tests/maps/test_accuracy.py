@@ -16,8 +16,8 @@ from kahanmaps.family.structure import structure_of
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
+from kahanmaps.maps.orbits.iteration import Iterates, Orbit
 from kahanmaps.maps.orbits.orbit import orbit
-from kahanmaps.maps.orbits.orbits import Iterates, Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])

@@ -30,8 +30,8 @@ from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.maps.orbits.orbit import orbit
-from kahanmaps.maps.orbits.orbits import Orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.maps.residues.ensemble import ModularEnsemble

@@ -26,7 +26,7 @@ from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, _facto
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
-from kahanmaps.maps.orbits.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 EPS = "1/10"

@@ -21,8 +21,8 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint
-from kahanmaps.maps.orbits.orbits import integer_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])

@@ -35,7 +35,7 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint
-from kahanmaps.maps.orbits.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 NUMBERS = (0, 1, 2, 3, 5, 16, 17, 18, 23, 24, 25, 26, 33, 40)

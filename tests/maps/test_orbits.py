@@ -40,7 +40,7 @@ from kahanmaps.algebra.written.text import parse_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint, IntegerSteps
-from kahanmaps.maps.orbits.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])

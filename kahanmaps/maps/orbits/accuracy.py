@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from flint import arb
 
 from kahanmaps.algebra.fields import MAX_BALL_BITS
-from kahanmaps.maps.orbits.orbits import Iterates, Orbit
+from kahanmaps.maps.orbits.iteration import Iterates, Orbit
 
 _BITS_PER_DIGIT = 3.3219281
 

@@ -20,8 +20,7 @@ from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
-from kahanmaps.maps.orbits.methods import JUMP_FROM, choose_method, why_no_reduction
-from kahanmaps.maps.orbits.orbits import (
+from kahanmaps.maps.orbits.iteration import (
     DEFAULT_MAX_DIGITS,
     Iterates,
     Orbit,
@@ -30,6 +29,7 @@ from kahanmaps.maps.orbits.orbits import (
     require_short,
     require_steps,
 )
+from kahanmaps.maps.orbits.methods import JUMP_FROM, choose_method, why_no_reduction
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.whole_files import write_whole

@@ -25,7 +25,7 @@ from kahanmaps.maps.implicit import BirationalMap, StepOver
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.maps.orbits.orbits import require_steps
+from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Residues = NDArray[np.uint64]

@@ -17,7 +17,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.classical import ClassicalOrbit
 from kahanmaps.maps.floats.doubles import FloatArray, to_floats
 from kahanmaps.maps.floats.fast import FloatOrbit
-from kahanmaps.maps.orbits.orbits import OrbitEnd
+from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.plots.drifts.drift_functions import WatchedFunction
 from kahanmaps.systems.quadratic import QuadraticSystem
 

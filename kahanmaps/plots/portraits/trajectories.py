@@ -16,7 +16,7 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.orbits.orbits import require_steps
+from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 4_000_000  # of all orbits together: beyond that a picture of single points shows nothing more
