@@ -94,6 +94,7 @@ class Analysis(Findings, Printed):
             **attributes(self.file, "parameters"),
             **attributes(self, "symbols"),
             **eps_record(self.eps, self.file.map),
+            "arithmetic": "exact formulas, from residues modulo primes",
             **attributes(self, "seed", "seconds", "dim"),
             "verdict": {
                 "integrability": final.kind,

@@ -172,6 +172,7 @@ def _record(
         "period",
         file,
         _arithmetic(options),
+        seed=None,
         structure=structure.text,
         eps=str(eps),
         time_step=str(2 * eps),

@@ -35,7 +35,8 @@ def print_json(data: Mapping[str, Any]) -> None:
 def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
     """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
     if as_json:
-        print_json(report.to_json())
+        name = click.get_current_context().info_name or ""
+        print_json({**envelope(name), **report.to_json()})
     elif on_terminal():
         _print_terminal(report, verbose)
     else:
