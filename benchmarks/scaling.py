@@ -26,12 +26,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from kahanmaps.experiments.cluster import GROUP_MODULE, ClusterWorkers, record_on
-from kahanmaps.experiments.dask_client import RESULTS_AT_ONCE, Result
-from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.run import Batch, executor_for, plan
+from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.running.cluster import GROUP_MODULE, ClusterWorkers, record_on
+from kahanmaps.experiments.running.dask_client import RESULTS_AT_ONCE, Result
+from kahanmaps.experiments.running.run import Batch, executor_for, plan
 from kahanmaps.experiments.spec import parse_spec
-from kahanmaps.experiments.store import Store
 
 WORKERS = 1000
 CHILDREN = 2

@@ -10,7 +10,7 @@ from math import log
 import numpy as np
 
 import kahanmaps as km
-from kahanmaps.plots.trajectories import ensemble_for, euler_orbits, walked
+from kahanmaps.plots.portraits.trajectories import ensemble_for, euler_orbits, walked
 
 lotka_volterra = km.load("lotka_volterra")
 system = lotka_volterra.system
@@ -35,10 +35,10 @@ for finding in km.check_measure(lotka_volterra).findings:
     print(f"{finding.verdict}: {finding.claim}")
 
 if find_spec("matplotlib"):
-    from kahanmaps.plots.draw_portrait import draw_portrait
     from kahanmaps.plots.figures import write_picture
     from kahanmaps.plots.point_functions import point_function
-    from kahanmaps.plots.portrait import portrait_of
+    from kahanmaps.plots.portraits.draw_portrait import draw_portrait
+    from kahanmaps.plots.portraits.portrait import portrait_of
     from kahanmaps.plots.style import Style
 
     axes = [point_function(name, system.variables) for name in system.variables]

@@ -10,8 +10,8 @@ from importlib.util import find_spec
 import numpy as np
 
 import kahanmaps as km
-from kahanmaps.plots.drift import METHODS, survey_drift
-from kahanmaps.plots.drift_functions import known_functions
+from kahanmaps.plots.drifts.drift import METHODS, survey_drift
+from kahanmaps.plots.drifts.drift_functions import known_functions
 
 EPS, STEPS = "1/20", 20_000
 
@@ -39,7 +39,7 @@ for name in ("I1", "I2"):
     print(f"{file.name}, {name}: below 1e-6: {error['generic'] < 1e-6}; in normal form smaller: {better}")
 
 if find_spec("matplotlib"):
-    from kahanmaps.plots.draw_drift import draw_drift
+    from kahanmaps.plots.drifts.draw_drift import draw_drift
     from kahanmaps.plots.figures import write_picture
     from kahanmaps.plots.style import Style
 

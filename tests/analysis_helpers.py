@@ -9,7 +9,7 @@ from flint import fmpz_poly
 from search_helpers import at_residues, ranks
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap

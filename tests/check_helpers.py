@@ -18,7 +18,7 @@ from helpers import fraction, rationals
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system

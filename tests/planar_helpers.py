@@ -24,7 +24,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 Cubic = tuple[int, int, int, int]
 Integers = tuple[int, int, int]
 
-# A cubic and a start (U : V : W) each, found by search; chi is that of maps/tau.py, chi_n = 0 for P_i, P_j, P_k on a
+# A cubic and a start (U : V : W) each, found by search; chi is that of tau.py, chi_n = 0 for P_i, P_j, P_k on a
 # line, i + j + k = n.
 STARTS: dict[str, tuple[Cubic, Integers]] = {
     "three real roots, irrational": ((1, 1, -3, -1), (3, 2, 5)),

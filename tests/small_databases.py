@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps.experiments import store as store_module
-from kahanmaps.experiments import tables
-from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results import store as store_module
+from kahanmaps.experiments.results import tables
+from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.store import Store
 
 # For hundreds of small databases: a disk that others use makes each wait to be synchronised.
 MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -66,10 +66,10 @@ def small_chunks():
 
 PRELUDE = """
 import json, os, resource, sys, time, urllib.parse  # the last one for scripts that give up the right to load it later
-from kahanmaps.experiments import database
-from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.database import StoreError, Unavailable
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results import database
+from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.database import StoreError, Unavailable
+from kahanmaps.experiments.results.store import Store
 
 def task(number):
     return Task("orbit", {"family": {"m": 2, "seed": number}}, {"eps": "1/10"})

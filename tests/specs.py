@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from kahanmaps.experiments.experiment import Experiment
-from kahanmaps.experiments.records import Task
+from kahanmaps.experiments.results.records import Task
 from kahanmaps.experiments.spec import SpecError, parse_spec
 
 LORENZ = '[experiments.a]\ntask = "orbit"\nsystem = "lorenz"\n'

@@ -6,9 +6,9 @@ import json
 from typing import Any
 
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.experiments.recipes import recipe_of, system_from
-from kahanmaps.experiments.records import canonical
 from kahanmaps.experiments.registry import task_kind
+from kahanmaps.experiments.results.recipes import recipe_of, system_from
+from kahanmaps.experiments.results.records import canonical
 
 
 def made(file: SystemFile) -> SystemFile:

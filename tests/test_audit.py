@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kahanmaps.paper.registry import claims
 from kahanmaps.paper.verify import verify_universal
-from kahanmaps_cli.verify_table import markdown
+from kahanmaps_cli.runs.verify_table import markdown
 
 AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding="utf-8")
 

@@ -57,7 +57,7 @@ def test_the_list_of_systems_loads_nothing_heavy():
 
 def test_looking_at_a_database_of_results_loads_no_mathematics(tmp_path):
     database = str(tmp_path / "results.db")
-    made = f"from kahanmaps.experiments.store import Store; Store.open({database!r}, create=True).close()"
+    made = f"from kahanmaps.experiments.results.store import Store; Store.open({database!r}, create=True).close()"
     assert modules_loaded_by(made) & HEAVY == set()
     arguments = ["batch", "status", "--db", database]
     assert modules_loaded_by(COMMAND.format(arguments=arguments)) & HEAVY == set()

@@ -14,7 +14,7 @@ from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
 from kahanmaps.algebra.fields import GF, RR
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks import expand
 from kahanmaps.checks.commute import check_commute, commutativity
 from kahanmaps.checks.conserve import check_integrals
@@ -30,25 +30,27 @@ from kahanmaps.laboratory import analysis
 from kahanmaps.laboratory.analyses import growth
 from kahanmaps.laboratory.growth import degrees
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve import darboux_spaces, densities, hamiltonian_structure, hirota_kimura, search
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
-from kahanmaps.laboratory.preserve.cofactors import determinant_polynomial
-from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve import densities, hirota_kimura, search
+from kahanmaps.laboratory.preserve.darboux import darboux_spaces
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.cofactors import determinant_polynomial
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.inherited import inherited_integrals
-from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.poisson import hamiltonian_structure
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.singular import singularities
 from kahanmaps.laboratory.symmetry import symmetries
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_space import commuting_space
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
-from kahanmaps.maps import orbits
 from kahanmaps.maps.floats import ensemble, steps
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import Kahan
-from kahanmaps.maps.orbit import orbit
+from kahanmaps.maps.orbits import iteration
+from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.maps.residues.projective import ProjectiveMap
 from kahanmaps.paper.verifier import VerifyOptions
@@ -132,19 +134,19 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "found 2 starts",
     ),
     (
-        "maps.orbit._TOO_FAR",
+        "maps.orbits.orbit._TOO_FAR",
         40,
         lambda: refused(lambda: orbit(LORENZ, [1, 2, 3], "1/9", steps=40)),
         "step 40 is too far",
     ),
     (
-        "maps.orbit._LARGE_DIMENSION",
+        "maps.orbits.orbit._LARGE_DIMENSION",
         4,
         lambda: orbit(MEMBER.system, [1, 2, 3, 4], "1/9", steps=1000).why,
         "not looked for in dimension 4",
     ),
     (
-        "maps.orbit._LONG_INPUT",
+        "maps.orbits.orbit._LONG_INPUT",
         4,  # bits of 9
         lambda: orbit(MEMBER.system, [1, 2, 3, -4], "1/9", steps=24).why,
         "not looked for, for so few steps",
@@ -231,44 +233,49 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "supported",
     ),
     (
-        "laboratory.preserve.poisson_tensors._MAX_UNKNOWNS",
+        "laboratory.preserve.poisson.poisson_tensors._MAX_UNKNOWNS",
         3 * 20,  # entries, times the monomials of degree 3 in three variables
         lambda: find_poisson(load("lorenz"), 3, integrals=()).reason,
         "degrees above 2 were not tried",
     ),
     (
-        "laboratory.preserve.poisson_tensors._MAX_UNKNOWNS",
+        "laboratory.preserve.poisson.poisson_tensors._MAX_UNKNOWNS",
         3,
         lambda: find_poisson(load("lorenz"), 0, integrals=()).reason,
         "a tensor in dimension 3 has too many entries",
     ),
     (
-        "laboratory.preserve.darboux._MOST_TERMS",
+        "laboratory.preserve.darboux.darboux_polynomials._MOST_TERMS",
         20,
         lambda: darboux_polynomials(load("euler_top"), 3).reason,
         "degrees above 2 were not tried: polynomials in dimension 3 have too many terms",
     ),
     (
-        "laboratory.preserve.darboux._MOST_PRODUCTS",
+        "laboratory.preserve.darboux.darboux_polynomials._MOST_PRODUCTS",
         10,
         lambda: darboux_polynomials(load("lotka_volterra"), 2).reason,
         "10 products of cofactors",
     ),
     (
-        "laboratory.preserve.affine_functions.MAX_EXTACTIC_DIMENSION",
+        "laboratory.preserve.darboux.affine_functions.MAX_EXTACTIC_DIMENSION",
         2,
         lambda: affine_darboux(LOTKA_VOLTERRA).reason,
         "variables: only factors of the right-hand sides were tried",
     ),
     (
-        "laboratory.preserve.affine_functions.LONG_COEFFICIENTS",
+        "laboratory.preserve.darboux.affine_functions.LONG_COEFFICIENTS",
         LOTKA_VOLTERRA.digits,
         lambda: affine_darboux(LOTKA_VOLTERRA).reason,
         "coefficients of more than",
     ),
-    ("laboratory.preserve.cofactors._MAX_DIMENSION", 3, lambda: str(determinant_polynomial(Kahan(EULER_TOP))), "None"),
     (
-        "laboratory.preserve.cofactors.LONG_COEFFICIENTS",
+        "laboratory.preserve.darboux.cofactors._MAX_DIMENSION",
+        3,
+        lambda: str(determinant_polynomial(Kahan(EULER_TOP))),
+        "None",
+    ),
+    (
+        "laboratory.preserve.darboux.cofactors.LONG_COEFFICIENTS",
         EULER_TOP.digits,
         lambda: str(determinant_polynomial(Kahan(EULER_TOP))),
         "None",
@@ -398,7 +405,7 @@ def test_a_limit_that_the_documentation_names_is_the_one_in_force(promise):
     ("page", "promise"),
     [
         ("orbits.md", f"that has lost {-log2(steps.NEAR):.0f} of its 53 bits counts as near-singular"),
-        ("orbits.md", f"a start of more than {orbits.LONGEST_INPUT:,} digits is refused"),
+        ("orbits.md", f"a start of more than {iteration.LONGEST_INPUT:,} digits is refused"),
         ("cli.md", f"block integrals of the normal form, looked at every {ensemble.SAMPLED} steps"),
     ],
 )

@@ -23,7 +23,7 @@ from kahanmaps import (
 )
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
@@ -32,7 +32,7 @@ from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian
 from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.preserve import affine_functions
+from kahanmaps.laboratory.preserve.darboux import affine_functions
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

@@ -13,7 +13,7 @@ import subprocess
 import pytest
 
 import kahanmaps as km
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.display.mathml import formula
 from kahanmaps.reports.report import report_html
 

@@ -13,7 +13,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
 from kahanmaps_cli.params import ExactNumber, Kind, NameValue, PointText, Seconds, Whole
-from kahanmaps_cli.progress import say
+from kahanmaps_cli.screen.progress import say
 
 F = TypeVar("F", bound=Callable[..., Any])
 

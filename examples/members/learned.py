@@ -13,8 +13,8 @@ from math import log2
 from flint import fmpq
 
 import kahanmaps as km
-from kahanmaps.experiments.recipes import system_from
-from kahanmaps.experiments.records import Row
+from kahanmaps.experiments.results.recipes import system_from
+from kahanmaps.experiments.results.records import Row
 from kahanmaps.maps.normal_form.steps import NormalSteps
 
 

@@ -34,7 +34,7 @@ from flint import (
     nmod_mat,
 )
 
-from kahanmaps.algebra.text import format_number, parse_number
+from kahanmaps.algebra.written.text import format_number, parse_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 
 # FLINT proves primality of 512 bits in about 0.1 s; the cost grows steeply beyond.

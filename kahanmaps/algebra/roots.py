@@ -18,7 +18,7 @@ from kahanmaps.algebra.bounds import Bound, BoundField, Size, log2
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, ComplexBallField, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
-from kahanmaps.algebra.text import format_univariate, parse_number, parse_polynomial
+from kahanmaps.algebra.written.text import format_univariate, parse_number, parse_polynomial
 from kahanmaps.errors import BadPrime, InputError, quoted
 
 MAX_DEGREE = 12

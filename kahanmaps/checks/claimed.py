@@ -7,7 +7,7 @@ from itertools import count
 from typing import Any
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.expressions import formula_text
 from kahanmaps.documents.files import SystemFile

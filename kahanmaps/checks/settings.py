@@ -11,7 +11,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.documents.files import SystemFile
@@ -19,7 +19,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import CONVENTION, NO_EPS, convention
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.maps.orbits import Orbit, OrbitEnd, require_short
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 

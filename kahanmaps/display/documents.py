@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula, matrix
 from kahanmaps.display.systems import CHARACTERS, map_html

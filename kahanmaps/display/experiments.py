@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from kahanmaps.display import markup
 from kahanmaps.displayed import html_form
-from kahanmaps.experiments.database import StoreError
-from kahanmaps.experiments.store import ExperimentStatus, Store
-from kahanmaps.experiments.summary import Summary, Table
+from kahanmaps.experiments.results.database import StoreError
+from kahanmaps.experiments.results.store import ExperimentStatus, Store
+from kahanmaps.experiments.results.summary import Summary, Table
 
 _ROWS = 40
 

@@ -15,7 +15,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.checks.settings import eps_record, eps_words
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
@@ -25,11 +25,11 @@ from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.finite.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-from kahanmaps.laboratory.preserve.darboux import DarbouxSearch
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch
 from kahanmaps.laboratory.preserve.densities import DensitySearch
-from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
-from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.scan.result import Scan
 from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun

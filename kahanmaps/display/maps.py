@@ -10,7 +10,7 @@ from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
-from kahanmaps.maps.orbits import Orbit, OrbitPoint
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _EQUATIONS = 8

@@ -15,8 +15,8 @@ from math import prod
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.reading import PLAIN, Notation, above_and_below, first_terms
-from kahanmaps.algebra.text import format_number, format_product, shorter_factors, sides
+from kahanmaps.algebra.written.reading import PLAIN, Notation, above_and_below, first_terms
+from kahanmaps.algebra.written.text import format_number, format_product, shorter_factors, sides
 from kahanmaps.display.latex import GREEK_NAMES
 from kahanmaps.display.markup import escape
 from kahanmaps.errors import InputError, counted
@@ -62,7 +62,7 @@ def mathml_number(value: fmpq) -> str:
 def mathml_polynomial(polynomial: fmpq_mpoly) -> str:
     """A polynomial over Q as one row of MathML, exact; it belongs into <math>. `formula` breaks long ones.
 
-    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> from kahanmaps.algebra.written.text import parse_polynomial
     >>> mathml_polynomial(parse_polynomial("x^2 - eps", ["x", "eps"]))
     '<mrow><msup><mi>x</mi><mn>2</mn></msup><mo form="infix">−</mo><mi>ε</mi></mrow>'
     """
@@ -73,7 +73,7 @@ def mathml_rational_function(function: RationalFunction) -> str:
     """A quotient of polynomials over Q as MathML, exact, without fractions inside the fraction, in factors where they
     are shorter.
 
-    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> from kahanmaps.algebra.written.text import parse_rational_function
     >>> mathml_rational_function(parse_rational_function("x/y^2", ["x", "y"]))
     '<mfrac><mrow><mi>x</mi></mrow><mrow><msup><mi>y</mi><mn>2</mn></msup></mrow></mfrac>'
     """
@@ -86,7 +86,7 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
     `left` is the name of what it is: "I1" makes I_1 = ...; "x1'" is the derivative. Where more than about
     `characters` characters would be shown, the rest is left out, and the number of terms is told.
 
-    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> from kahanmaps.algebra.written.text import parse_polynomial
     >>> print(formula(parse_polynomial("x^2", ["x"])))
     <span class="formula"><math alttext="x^2"><mrow><msup><mi>x</mi><mn>2</mn></msup></mrow></math></span>
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
 from kahanmaps.display.mathml import equations

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 from flint import fmpq
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import format_number, parse_rational_function
+from kahanmaps.algebra.written.text import format_number, parse_rational_function
 from kahanmaps.documents.reader import EXPECTED, KEYS, KINDS, PartReader, json_like
 from kahanmaps.errors import InputError, quoted, show
 from kahanmaps.maps.implicit import BirationalMap

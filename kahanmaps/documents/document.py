@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.numerals import check_names
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, substitute
 from kahanmaps.algebra.roots import Root, parse_root
-from kahanmaps.algebra.text import format_number, parse_polynomial
+from kahanmaps.algebra.written.numerals import check_names
+from kahanmaps.algebra.written.text import format_number, parse_polynomial
 from kahanmaps.documents.composition import CompositionReader
 from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.expressions import number

@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.errors import InputError, UnknownName, counted, quoted, show
 from kahanmaps.systems.quadratic import MAX_DIMENSION

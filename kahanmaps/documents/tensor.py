@@ -7,7 +7,7 @@ from typing import Any
 from flint import fmpq_poly
 
 from kahanmaps.algebra.functions import BudgetExceeded
-from kahanmaps.algebra.text import format_polynomial, format_rational_function, format_univariate
+from kahanmaps.algebra.written.text import format_polynomial, format_rational_function, format_univariate
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.documents.toml_text import to_toml

@@ -16,9 +16,9 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.experiments.grid import Grid, RationalRange, Values, has_repeats, read_values
 from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of
-from kahanmaps.experiments.recipes import family_recipe, find_file, recipe_of
-from kahanmaps.experiments.records import Limits, Task, canonical
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
+from kahanmaps.experiments.results.recipes import family_recipe, find_file, recipe_of
+from kahanmaps.experiments.results.records import Limits, Task, canonical
 from kahanmaps.experiments.shape import SpecDocument, read_memory, read_time
 
 PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system

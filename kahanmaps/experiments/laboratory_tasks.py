@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq_poly
 
-from kahanmaps.algebra.text import format_number, format_univariate
+from kahanmaps.algebra.written.text import format_number, format_univariate
 from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
@@ -143,7 +143,7 @@ def poisson(
     seed: int = 0,
 ) -> Whole:
     """The Poisson tensors with polynomial entries: how many, their ranks, Casimirs among the integrals."""
-    from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+    from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 
     found = find_poisson(system, max_degree, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
     return {

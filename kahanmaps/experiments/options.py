@@ -14,7 +14,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, RR, rational
-from kahanmaps.algebra.text import format_number, format_point, format_univariate, parse_number, parse_point
+from kahanmaps.algebra.written.text import format_number, format_point, format_univariate, parse_number, parse_point
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.draw import MAX_M, parse_chi
 

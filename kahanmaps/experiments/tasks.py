@@ -13,7 +13,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
@@ -25,12 +25,12 @@ from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, Whol
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import height_growth
-from kahanmaps.maps.arithmetic import Arithmetic
-from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.methods import choose_method
 from kahanmaps.maps.normal_form.periods import period_of
-from kahanmaps.maps.orbit import orbit as find_orbit
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, OrbitPoint
+from kahanmaps.maps.orbits.arithmetic import Arithmetic
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
+from kahanmaps.maps.orbits.methods import choose_method
+from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
 _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash

@@ -46,14 +46,14 @@ from typing import Any
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.numerals import wrong_kind
+from kahanmaps.algebra.written.numerals import wrong_kind
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.maps.implicit import MapOver
-from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.methods import choose_method
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
+from kahanmaps.maps.orbits.methods import choose_method
 
 FEWEST_HEIGHTS = 9  # for a decision; exponential growth is plain from fewer, and a budget leaves no more of it
 _FEWEST_FOR_EXPONENTIAL = 6

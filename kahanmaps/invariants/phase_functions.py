@@ -18,7 +18,7 @@ from kahanmaps.algebra.polynomials import (
     substitute,
 )
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.text import format_polynomial, format_rational_function
+from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
 
 _LONGEST_CONDITION = 200  # characters
 

@@ -22,7 +22,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
-from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.systems.hamiltonian import CubicHamiltonian

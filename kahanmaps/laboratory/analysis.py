@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
@@ -80,6 +80,7 @@ class Analysis(Findings, Printed):
             **attributes(self.file, "parameters"),
             **attributes(self, "symbols"),
             **eps_record(self.eps, self.file.map),
+            "arithmetic": "exact formulas, from residues modulo primes",
             **attributes(self, "seed", "seconds", "dim"),
             "verdict": {
                 "integrability": final.kind,

@@ -14,7 +14,7 @@ from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curve
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.known import Known
-from kahanmaps.laboratory.preserve.pencil import GROWTH_ON
+from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
 
 _CURVES = {0: "rational curves", 1: "elliptic curves, of genus 1"}

@@ -20,12 +20,17 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.closed_forms import MAX_DEGREE, ClosedForms, Spaces, closed_forms
-from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
-from kahanmaps.laboratory.preserve.flow import ModularFlow, euler_map, is_kept_by_flow
-from kahanmaps.laboratory.preserve.flow_polynomials import FlowPolynomials, flow_polynomials
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, darboux_cofactor
+from kahanmaps.laboratory.preserve.darboux.cofactors import (
+    Cofactor,
+    cofactor_of_affine,
+    determinant_factors,
+    jacobian_factors,
+)
 from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.limit.flow import ModularFlow, euler_map, is_kept_by_flow
+from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan

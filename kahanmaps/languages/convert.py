@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from kahanmaps.algebra.numerals import is_name
+from kahanmaps.algebra.written.numerals import is_name
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas

@@ -15,7 +15,7 @@ from importlib.resources import files
 from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.reading import Notation
+from kahanmaps.algebra.written.reading import Notation
 
 LANGUAGES = ("sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
 

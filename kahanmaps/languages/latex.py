@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.reading import above_and_below
+from kahanmaps.algebra.written.reading import above_and_below
 from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.writer import header

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.language import Language, fill
 from kahanmaps.sources import SOURCES

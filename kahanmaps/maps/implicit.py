@@ -32,12 +32,12 @@ from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.text import format_polynomial, format_rational_function
+from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.equation import Equation, equation_of
-from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
 from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint, IntegerSteps
 from kahanmaps.systems.polynomial import PolynomialField
 
 

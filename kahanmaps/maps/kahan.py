@@ -20,9 +20,9 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
-from kahanmaps.algebra.numerals import wrong_kind
 from kahanmaps.algebra.polynomials import names_of, ring
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.numerals import wrong_kind
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation

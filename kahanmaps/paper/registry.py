@@ -125,5 +125,5 @@ def claim(place: str, label: str, formula: str, **more: Any) -> Callable[[ClaimF
 def claims() -> tuple[Claim, ...]:
     """All claims, in the order of the paper."""
     for _, name in SECTIONS.values():
-        import_module(f"kahanmaps.paper.{name}")
+        import_module(f"kahanmaps.paper.claims.{name}")
     return tuple(sorted(_claims.values(), key=lambda found: found.section))

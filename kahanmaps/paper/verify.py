@@ -28,7 +28,7 @@ from kahanmaps.algebra.bounds import Size
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings

@@ -7,6 +7,8 @@ terminal          a figure as characters, for a terminal
 zero_band         a logarithmic axis on which an exact zero has a place
 growth            degrees of iterates, heights of exact orbits (height_curves, degree_records: read from records)
 scan              the plane of two parameters, with what a scan found in it
-drift             how far integrals drift along float orbits (drift_functions: which ones; draw_drift: drawn)
+drifts            how far integrals drift along float orbits
+portraits         orbits of planar maps and of sections, equilibria, the flow
+curves            invariant curves, and the planes they lie in
 batch             results of a batch: counts, distributions, one number against another
 """

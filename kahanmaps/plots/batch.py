@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.columns import Column, Pairs
-from kahanmaps.experiments.export import plain as plain_text
-from kahanmaps.experiments.records import Outcome
-from kahanmaps.experiments.summary import VERDICTS, Group, Summary, nearest
+from kahanmaps.experiments.results.columns import Column, Pairs
+from kahanmaps.experiments.results.export import plain as plain_text
+from kahanmaps.experiments.results.records import Outcome
+from kahanmaps.experiments.results.summary import VERDICTS, Group, Summary, nearest
 from kahanmaps.plots.figures import beside, drawing, label_of, legend_above, new_figure, plain, points
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOURS, MARKS, Style
 
@@ -61,8 +61,8 @@ def draw_batch(
     orders of magnitude. Raises InputError for no group or more than 40, for more than 4 values, and for names that no
     group has.
 
-    >>> from kahanmaps.experiments.summary import summarise
-    >>> from kahanmaps.experiments.records import Outcome, Record, Row, Task
+    >>> from kahanmaps.experiments.results.summary import summarise
+    >>> from kahanmaps.experiments.results.records import Outcome, Record, Row, Task
     >>> tasks = [Task("orbit", {"family": {"m": 1 + k % 2}}, {"seed": k}) for k in range(20)]
     >>> rows = [Row("e", k, t, Record(t.key, Outcome.OK, {"c": k})) for k, t in enumerate(tasks)]
     >>> axes = draw_batch(summarise(rows, ["m"]), ["c"]).axes[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kahanmaps.algebra.text import parse_number
+from kahanmaps.algebra.written.text import parse_number
 from kahanmaps.errors import InputError, printable
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.enclosure import Enclosure

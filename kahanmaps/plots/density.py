@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.windows import Window
+from kahanmaps.plots.portraits.windows import Window
 
 MAX_CELLS = 16_000_000
 _AT_ONCE = 1 << 18  # points, so that what is worked on stays in the processor's caches

@@ -14,11 +14,11 @@ import numpy as np
 from flint import arb
 
 from kahanmaps.errors import InputError
+from kahanmaps.plots.curves.plane_cubics import Floats
 from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, wrapped
-from kahanmaps.plots.plane_cubics import Floats
+from kahanmaps.plots.portraits.windows import outside, window_of
 from kahanmaps.plots.squares import Lattice, Squares
 from kahanmaps.plots.style import COLOURS, Style
-from kahanmaps.plots.windows import outside, window_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,6 +12,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.plots.curves.zero_band import log_scale_with_zero
 from kahanmaps.plots.figures import (
     drawing,
     label_number,
@@ -23,7 +24,6 @@ from kahanmaps.plots.figures import (
 )
 from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
-from kahanmaps.plots.zero_band import log_scale_with_zero
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

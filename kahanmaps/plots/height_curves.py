@@ -11,7 +11,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from kahanmaps.algebra.text import parse_number
+from kahanmaps.algebra.written.text import parse_number
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey

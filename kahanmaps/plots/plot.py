@@ -13,12 +13,12 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.maps.floats.doubles import start_rows
-from kahanmaps.maps.orbit import Trajectory
-from kahanmaps.plots.automatic_starts import automatic_starts
+from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portrait import portrait_of
+from kahanmaps.plots.portraits.automatic_starts import automatic_starts
+from kahanmaps.plots.portraits.portrait import portrait_of
+from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, walked
 from kahanmaps.plots.style import Style
-from kahanmaps.plots.trajectories import Trajectories, ensemble_for, walked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,7 +81,7 @@ def draw_orbits(
 
 
 def _drawn(found: Trajectories, axes: Sequence[int]) -> Axes:
-    from kahanmaps.plots.draw_portrait import draw_portrait
+    from kahanmaps.plots.portraits.draw_portrait import draw_portrait
 
     if not all(0 <= k < len(found.variables) for k in axes):
         raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(found.variables)}")

@@ -15,12 +15,12 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.scan.conditions import beside
 from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
 from kahanmaps.laboratory.scan.sweep import Sweep
+from kahanmaps.plots.curves.level_sets import level_curves
 from kahanmaps.plots.figures import beside as write
 from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
-from kahanmaps.plots.level_sets import level_curves
 from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.plots.portraits.windows import Window, window_of
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
-from kahanmaps.plots.windows import Window, window_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

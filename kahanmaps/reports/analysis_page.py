@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.laboratory import eps_sentence, result_html
 from kahanmaps.display.mathml import formula

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from kahanmaps.display import markup
 from kahanmaps.display.experiments import status_table, table_html
 from kahanmaps.errors import counted
-from kahanmaps.experiments.records import Outcome
-from kahanmaps.experiments.summary import summarise
+from kahanmaps.experiments.results.records import Outcome
+from kahanmaps.experiments.results.summary import summarise
 from kahanmaps.plots.batch import draw_batch
 from kahanmaps.reports.page import Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:
-    from kahanmaps.experiments.store import Store
-    from kahanmaps.experiments.summary import Summary
+    from kahanmaps.experiments.results.store import Store
+    from kahanmaps.experiments.results.summary import Summary
     from kahanmaps.plots.recipe import Recipe
 
 _ROWS = 400

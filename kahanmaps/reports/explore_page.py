@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.text import format_number, format_rational_function
+from kahanmaps.algebra.written.text import format_number, format_rational_function
 from kahanmaps.display import markup
 from kahanmaps.display.laboratory import eps_sentence
 from kahanmaps.display.mathml import formula
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import to_float, to_floats
-from kahanmaps.plots.automatic_starts import automatic_starts
-from kahanmaps.plots.plane_cubics import Floats
+from kahanmaps.plots.curves.plane_cubics import Floats
+from kahanmaps.plots.portraits.automatic_starts import automatic_starts
 from kahanmaps.reports.analysis_page import system_html
 from kahanmaps.reports.page import CHARACTERS, Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures

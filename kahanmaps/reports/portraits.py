@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import counted
 from kahanmaps.maps.floats.ensemble import starts_in_box
-from kahanmaps.plots.automatic_starts import automatic_starts
-from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
-from kahanmaps.plots.draw_portrait import draw_portrait
-from kahanmaps.plots.flow import plane_flow
-from kahanmaps.plots.invariant_curves import find_invariant_curves
+from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves
+from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portrait import portrait_of
+from kahanmaps.plots.portraits.automatic_starts import automatic_starts
+from kahanmaps.plots.portraits.draw_portrait import draw_portrait
+from kahanmaps.plots.portraits.flow import plane_flow
+from kahanmaps.plots.portraits.portrait import portrait_of
+from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.plots.style import Style
-from kahanmaps.plots.trajectories import ensemble_for, walked
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 from kahanmaps.checks.claims import Report
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results.store import Store
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.analysis_page import analysis_page

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from kahanmaps.algebra.text import format_polynomial, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, parse_rational_function
 from kahanmaps.display.checks import because
 from kahanmaps.display.mathml import formula
 from kahanmaps.errors import KahanmapsError

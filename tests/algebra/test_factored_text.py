@@ -8,7 +8,7 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import format_factored, format_product, parse_rational_function
+from kahanmaps.algebra.written.text import format_factored, format_product, parse_rational_function
 
 NAMES = ["x", "y", "eps"]
 CONTEXT = ring(NAMES)

@@ -22,7 +22,7 @@ from kahanmaps.algebra.interpolation import (
 from kahanmaps.algebra.modular_fit import Quotient, Shape
 from kahanmaps.algebra.polynomials import RationalFunction, monomials, ring
 from kahanmaps.algebra.residues import _common_denominator, chinese, random_prime
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.errors import InputError
 
 SPARE = 12  # values that confirm, or cover a round number

@@ -13,10 +13,10 @@ from helpers import THOROUGH, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra import expressions
-from kahanmaps.algebra.numerals import Limits, check_names, is_name
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import (
+from kahanmaps.algebra.written import expressions
+from kahanmaps.algebra.written.numerals import Limits, check_names, is_name
+from kahanmaps.algebra.written.text import (
     format_number,
     format_point,
     format_polynomial,

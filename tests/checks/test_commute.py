@@ -29,7 +29,7 @@ from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, THOROUGH, f
 from hypothesis import assume, given, settings
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks import commute, judge, theorems
 from kahanmaps.checks import settings as settings_module
 from kahanmaps.checks.claims import Report, Verdict
@@ -42,7 +42,7 @@ from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -28,7 +28,7 @@ from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA, THOROUGH
 from hypothesis import given, settings
 
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
 from kahanmaps.checks import judge, theorems
 from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.conserve import check_integrals, conservation, known_integrals

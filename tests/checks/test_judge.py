@@ -16,7 +16,7 @@ from kahanmaps.checks.decide import Decision, Identity
 from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import OrbitRun, Settings
 from kahanmaps.errors import SingularStep
-from kahanmaps.maps.orbits import OrbitEnd
+from kahanmaps.maps.orbits.iteration import OrbitEnd
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
 PROOF = theorems.evidence("Theorem 1", [("a hypothesis", True)])

@@ -40,7 +40,7 @@ from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA
 from hypothesis import given, settings
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks import judge, preserve, theorems
 from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.judge import Contradiction

@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import monomials as all_monomials
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks import theorems
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues

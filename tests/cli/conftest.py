@@ -70,4 +70,4 @@ def least_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def slow_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ten seconds pass between any two looks that progress takes at the clock."""
     ticks = count(0, 10)
-    monkeypatch.setattr("kahanmaps_cli.progress.time", SimpleNamespace(monotonic=lambda: next(ticks)))
+    monkeypatch.setattr("kahanmaps_cli.screen.progress.time", SimpleNamespace(monotonic=lambda: next(ticks)))

@@ -212,8 +212,8 @@ def test_show_tells_the_verdict_of_a_check(batch):
 
 
 def test_a_task_can_be_redone_from_what_show_prints(batch):
-    from kahanmaps.experiments.recipes import system_from
     from kahanmaps.experiments.registry import task_kind
+    from kahanmaps.experiments.results.recipes import system_from
 
     batch("run", '[experiments.top]\ntask = "check-integrals"\nsystem = "euler_top"\noptions.eps = "1/7"\n', "-q")
     key = batch("export --db study.db --jsonl").records[1]["key"]
@@ -260,9 +260,9 @@ def test_shards_are_merged_into_one_database(batch):
 
 
 def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
-    from kahanmaps.experiments.records import Limits, Record, Task
-    from kahanmaps.experiments.records import Outcome as Word
-    from kahanmaps.experiments.store import Store
+    from kahanmaps.experiments.results.records import Limits, Record, Task
+    from kahanmaps.experiments.results.records import Outcome as Word
+    from kahanmaps.experiments.results.store import Store
 
     task = Task("pause", None, {"seed": 1})
     for name, value in (("one.db", 1), ("two.db", 2)):
@@ -319,8 +319,8 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 
 def _stored() -> int:
-    from kahanmaps.experiments.database import StoreError
-    from kahanmaps.experiments.store import Store
+    from kahanmaps.experiments.results.database import StoreError
+    from kahanmaps.experiments.results.store import Store
 
     try:
         with Store.open("study.db", readonly=True) as store:
@@ -350,12 +350,12 @@ def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_
     @contextmanager
     def pressed(interrupt: Callable[[], None]) -> Iterator[None]:
         with monkeypatch.context() as patched:
-            patched.setattr("kahanmaps_cli.progress.click.echo", lambda *_, **__: told.append("in the handler"))
-            patched.setattr("kahanmaps.experiments.children.LocalChildren.in_flight", 2)
+            patched.setattr("kahanmaps_cli.screen.progress.click.echo", lambda *_, **__: told.append("in the handler"))
+            patched.setattr("kahanmaps.experiments.running.children.LocalChildren.in_flight", 2)
             interrupt()
         yield
 
-    monkeypatch.setattr("kahanmaps_cli.batch_run.interruptible", pressed)
+    monkeypatch.setattr("kahanmaps_cli.runs.batch_run.interruptible", pressed)
     done = batch("run", PAUSE, "-j", "2")
     assert (done.status, told) == (130, [])
 

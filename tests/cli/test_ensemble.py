@@ -18,7 +18,7 @@ import pytest
 from cli_helpers import COMMAND, shell
 
 from kahanmaps.maps.floats.stream import NpyFile
-from kahanmaps_cli import ensemble_starts
+from kahanmaps_cli.runs import ensemble_starts
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
 SQUARE = "ensemble --vars x --rhs x^2 --eps 1/2 --kernel numpy"  # the Kahan map x/(1 - x)

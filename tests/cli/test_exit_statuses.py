@@ -14,7 +14,7 @@ import pytest
 from helpers import table
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
-from kahanmaps_cli.render import exit_status
+from kahanmaps_cli.screen.render import exit_status
 
 COMMANDS = table(Path(__file__).with_name("exit_statuses.txt"))
 TOP = "euler_top --start 1,2,3 --eps 1/10"

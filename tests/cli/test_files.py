@@ -30,11 +30,11 @@ from kahanmaps.errors import InputError
 from kahanmaps.plots.degree_records import degrees_of_record
 from kahanmaps.plots.height_curves import curves_of_record
 from kahanmaps.plots.recipe import read_recipe
-from kahanmaps_cli.ensemble_starts import read_starts
 from kahanmaps_cli.main import main
-from kahanmaps_cli.outputs import OutputFile, OutputFolder
 from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.pictures.stored import read_orbits
+from kahanmaps_cli.runs.ensemble_starts import read_starts
+from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder
 
 needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 

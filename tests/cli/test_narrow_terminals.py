@@ -8,7 +8,7 @@ import shlex
 import pytest
 from cli_helpers import terminal
 
-from kahanmaps_cli.terminal import wrapped
+from kahanmaps_cli.screen.terminal import wrapped
 
 COMMANDS = [
     "orbit euler_top --start 1,2,3 --eps 1/10 --steps 6",
@@ -74,7 +74,7 @@ def test_the_report_of_analyze_has_headings_and_coloured_verdicts():
 
 def talk_to_forty_columns(monkeypatch):
     """Make standard error a terminal; in the test itself, for pytest puts another one there after its fixtures."""
-    monkeypatch.setattr("kahanmaps_cli.progress._width", lambda: 40)
+    monkeypatch.setattr("kahanmaps_cli.screen.progress._width", lambda: 40)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
 
 

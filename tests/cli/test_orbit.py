@@ -22,7 +22,7 @@ import pytest
 from cli_helpers import COMMAND, Outcome, shell, terminal
 
 from kahanmaps.version import __version__
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 TOP = "orbit euler_top --start 1,1/2,-1/3 --eps 1/10"
 LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
@@ -279,7 +279,7 @@ def test_npz_holds_integrals_with_a_mark_for_poles(npz, arithmetic, first):
 
 
 def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monkeypatch):
-    monkeypatch.setattr("kahanmaps_cli.orbit_formats.MAX_PADDED_BYTES", 1000)
+    monkeypatch.setattr("kahanmaps_cli.runs.orbit_formats.MAX_PADDED_BYTES", 1000)
     found = npz(f"{TOP} --steps 20")
     assert (found.status, found.meta["end"]["status"]) == (3, "budget")
     assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.store import Store
 
 
 @pytest.fixture(scope="module")

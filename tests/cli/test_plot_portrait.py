@@ -10,10 +10,10 @@ import pytest
 import kahanmaps as km
 from kahanmaps.documents.catalog import load
 from kahanmaps.maps.floats.fast import FloatOrbit
-from kahanmaps.plots import draw_portrait as drawing
+from kahanmaps.plots.portraits import draw_portrait as drawing
 from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli.pictures.stored import read_orbits
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 LV = "plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 30"
 

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.table import CHECKS
 from kahanmaps.documents.structured_facts import GROWTHS, VERDICTS
-from kahanmaps.experiments.records import KEPT
+from kahanmaps.experiments.results.records import KEPT
 from kahanmaps.invariants.growth import OF_DEGREES, OF_HEIGHTS
 from kahanmaps.laboratory.finite.cycle_laws import LAWS
 from kahanmaps.maps.normal_form.periods import Kind

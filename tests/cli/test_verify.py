@@ -17,7 +17,19 @@ from kahanmaps.paper.registry import SECTIONS, claims
 from kahanmaps.version import __version__
 
 QUICK = "verify --m 2 --section 6"
-COMMON = {"check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic", "seed"}
+COMMON = {
+    "command",
+    "check",
+    "verdict",
+    "holds",
+    "version",
+    "system",
+    "eps",
+    "time_step",
+    "convention",
+    "arithmetic",
+    "seed",
+}
 COMMON |= {"error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
 
 
@@ -35,7 +47,7 @@ def expected(m, *sections):
 def test_a_report_has_the_documented_shape(once):
     report = once(f"{QUICK} --json").json
     assert set(report) == COMMON | {"chi", "factors", "document"}
-    assert list(report)[:3] == ["check", "verdict", "holds"]
+    assert list(report)[:4] == ["command", "version", "check", "verdict"]
     assert report["check"] == "verify"
     assert report["version"] == __version__
     assert (report["m"], report["eps"], report["order"], report["controls"]) == (2, "every", 3, False)

@@ -11,9 +11,9 @@ from helpers import rationals, some
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.numerals import LIMITS
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.numerals import LIMITS
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.display.mathml import (
     equations,
     formula,

@@ -13,7 +13,7 @@ from small_databases import ok, planned
 
 import kahanmaps as km
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.display.latex import latex_cut
 from kahanmaps.laboratory.analysis import Analysis

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 from flint import fmpq_poly
 
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.structured_facts import GROWTHS, relation_functions
 from kahanmaps.errors import InputError

@@ -19,7 +19,7 @@ from helpers import rationals, systems
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.documents import files
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.structured_facts import relations

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import decide
@@ -22,7 +22,7 @@ from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
 from kahanmaps.maps.convention import CONVENTION, NO_EPS, NO_TIME_STEP
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.orbit import orbit
+from kahanmaps.maps.orbits.orbit import orbit
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]

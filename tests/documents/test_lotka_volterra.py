@@ -18,7 +18,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.lotka_volterra import degree
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.recipes import find_file
+from kahanmaps.experiments.results.recipes import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import null_space

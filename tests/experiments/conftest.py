@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from specs import ROTOR
 
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results.store import Store
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.child import _answer, _failure, perform
-from kahanmaps.experiments.records import Outcome, Task
+from kahanmaps.experiments.results.records import Outcome, Task
+from kahanmaps.experiments.running.child import _answer, _failure, perform
 
 SPACE = Task("family-space", {"family": {"draw": "eigenvalues", "m": 2, "seed": 0}}, {})
 
@@ -69,7 +69,7 @@ def test_the_limit_of_memory_ends_with_the_task_so_that_its_result_can_be_told()
 
 @pytest.mark.parametrize("verdict", [["proved"], 1, True])
 def test_a_verdict_that_is_no_text_is_a_failure_of_the_task(monkeypatch, verdict):
-    monkeypatch.setattr("kahanmaps.experiments.child._result", lambda task, documents: {"verdict": verdict})
+    monkeypatch.setattr("kahanmaps.experiments.running.child._result", lambda task, documents: {"verdict": verdict})
     done = perform(SPACE, None, {})
     assert (done["outcome"], done["message"]) == (
         Outcome.FAILED,

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.experiments.children import ChildrenError, LocalChildren
-from kahanmaps.experiments.records import Job, Limits, Outcome, Record, Task
-from kahanmaps.experiments.run import Batch
+from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, Task
+from kahanmaps.experiments.running.children import ChildrenError, LocalChildren
+from kahanmaps.experiments.running.run import Batch
 
 HERE = Path(__file__).parent
 KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
@@ -238,7 +238,7 @@ def test_closing_kills_what_is_in_flight_and_may_be_done_twice():
 
 
 def test_systems_reach_the_child_by_their_documents():
-    from kahanmaps.experiments.recipes import recipe_of
+    from kahanmaps.experiments.results.recipes import recipe_of
 
     documents: dict[str, str] = {}
     recipe = recipe_of(load("euler_top"), documents)
@@ -289,7 +289,7 @@ def parent() -> Iterator[subprocess.Popen[str]]:
     code = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from kahanmaps.experiments.children import LocalChildren
+from kahanmaps.experiments.running.children import LocalChildren
 from test_children import fault, pause, HANG
 children = LocalChildren(2, {}.__getitem__)
 children.submit(fault(HANG)); children.submit(pause(60_000))

@@ -22,10 +22,10 @@ import pytest
 from helpers import quick
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments import cluster
-from kahanmaps.experiments.children import TRIES
-from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
-from kahanmaps.experiments.records import Job, Limits, Outcome, Task
+from kahanmaps.experiments.results.records import Job, Limits, Outcome, Task
+from kahanmaps.experiments.running import cluster
+from kahanmaps.experiments.running.children import TRIES
+from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
 
 pytest.importorskip("distributed")
 
@@ -447,8 +447,8 @@ def test_nothing_is_printed_but_our_own_sentence_when_the_scheduler_dies(own):
     own.worker(nanny=False)
     script = f"""
 import os, signal
-from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers
-from kahanmaps.experiments.records import Job, Task
+from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers
+from kahanmaps.experiments.results.records import Job, Task
 workers = ClusterWorkers({str(own.file)!r}, str, command={own.command!r})
 workers.submit(Job(Task("test", None, {{"sleep": 600}})))
 workers.wait(1)

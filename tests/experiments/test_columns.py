@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.columns import value_pairs
-from kahanmaps.experiments.records import Outcome, Record, Row, Task
+from kahanmaps.experiments.results.columns import value_pairs
+from kahanmaps.experiments.results.records import Outcome, Record, Row, Task
 
 
 def row(number, result, options=None, outcome=Outcome.OK, verdict=None):

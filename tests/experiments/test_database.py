@@ -17,9 +17,9 @@ import pytest
 from small_databases import LIMITS, ok, planned, seed, seeds, small_chunks, start, task, tasks
 
 from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.experiments import database
-from kahanmaps.experiments.database import StoreError, Unavailable
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results import database
+from kahanmaps.experiments.results.database import StoreError, Unavailable
+from kahanmaps.experiments.results.store import Store
 
 # Files that cannot be used
 

@@ -19,14 +19,14 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import task_kind
-from kahanmaps.experiments.store import Store
-from kahanmaps.experiments.summary import summarise
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results.summary import summarise
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.finite.cycle_laws import compare
 from kahanmaps.laboratory.finite.cycles import cycle_census
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.preserve import densities, integrals
-from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.singular.singularities import singularities
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.reversors import find_reversor

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.run import run
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.running.run import run
 from kahanmaps.experiments.spec import parse_spec
-from kahanmaps.experiments.store import Store
 
 FILES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 SPEC = """

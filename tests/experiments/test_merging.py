@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, small_chunks, task, tasks
 
-from kahanmaps.experiments.database import StoreError
-from kahanmaps.experiments.merging import Merged
-from kahanmaps.experiments.records import Limits, digest
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results.database import StoreError
+from kahanmaps.experiments.results.merging import Merged
+from kahanmaps.experiments.results.records import Limits, digest
+from kahanmaps.experiments.results.store import Store
 
 numbers = st.integers(0, 12)
 

@@ -11,8 +11,8 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.options import FAMILY
-from kahanmaps.experiments.recipes import document_text, family_recipe, find_file, recipe_of, system_from
-from kahanmaps.experiments.records import canonical
+from kahanmaps.experiments.results.recipes import document_text, family_recipe, find_file, recipe_of, system_from
+from kahanmaps.experiments.results.records import canonical
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
 
 ROTOR = 'name = "rotor"\nvariables = ["x", "y"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*y", "-x*y"]\n'

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.experiments.records import KEY_LENGTH, Outcome, Record, Task, canonical, digest
+from kahanmaps.experiments.results.records import KEY_LENGTH, Outcome, Record, Task, canonical, digest
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(max_size=5),

@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.export import write_jsonl
-from kahanmaps.experiments.records import Job, Outcome, Record, Task
-from kahanmaps.experiments.run import Batch, run
+from kahanmaps.experiments.results.export import write_jsonl
+from kahanmaps.experiments.results.records import Job, Outcome, Record, Task
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.running.run import Batch, run
 from kahanmaps.experiments.spec import SpecError, parse_spec
-from kahanmaps.experiments.store import Store
 
 HERE = Path(__file__).parent
 MIXED = """
@@ -151,7 +151,7 @@ def test_wrong_specs_and_missing_files_are_told(tmp_path: Path):
 @pytest.fixture
 def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Records are handed on as they come."""
-    monkeypatch.setattr("kahanmaps.experiments.run._SHARED", 0)
+    monkeypatch.setattr("kahanmaps.experiments.running.run._SHARED", 0)
 
 
 class Scripted:

@@ -19,12 +19,12 @@ from signal import Signals
 
 import pytest
 
-from kahanmaps.experiments.children import TRIES, LocalChildren, is_from_outside
-from kahanmaps.experiments.export import write_jsonl
-from kahanmaps.experiments.group import main as do_group
-from kahanmaps.experiments.records import Job, Limits, Outcome, Record, Task
-from kahanmaps.experiments.run import Batch, run
-from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.results.export import write_jsonl
+from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.running.children import TRIES, LocalChildren, is_from_outside
+from kahanmaps.experiments.running.group import main as do_group
+from kahanmaps.experiments.running.run import Batch, run
 
 HERE = Path(__file__).parent
 OUTSIDE = [Signals.SIGTERM, Signals.SIGQUIT, Signals.SIGHUP, Signals.SIGKILL, Signals.SIGUSR1]

@@ -16,7 +16,7 @@ from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, UNIVERSAL, mistakes, on
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.experiment import DEFAULT_LIMITS
-from kahanmaps.experiments.records import Limits
+from kahanmaps.experiments.results.records import Limits
 from kahanmaps.experiments.spec import parse_spec, read_spec
 
 # What a spec says

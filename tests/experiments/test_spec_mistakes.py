@@ -17,7 +17,7 @@ from specs import LORENZ, keys, mistakes
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import spec as spec_module
-from kahanmaps.experiments.records import Task
+from kahanmaps.experiments.results.records import Task
 from kahanmaps.experiments.spec import Spec, SpecError, parse_spec, read_spec
 
 # Mistakes

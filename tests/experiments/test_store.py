@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
 
-from kahanmaps.experiments.database import StoreError
-from kahanmaps.experiments.records import Limits, Outcome, Record, Row, digest
-from kahanmaps.experiments.store import ExperimentStatus, Store
-from kahanmaps.experiments.tables import Planned
+from kahanmaps.experiments.results.database import StoreError
+from kahanmaps.experiments.results.records import Limits, Outcome, Record, Row, digest
+from kahanmaps.experiments.results.store import ExperimentStatus, Store
+from kahanmaps.experiments.results.tables import Planned
 
 # Records
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from kahanmaps.display.experiments import table_markdown
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.records import Outcome, Record, Row, Task
-from kahanmaps.experiments.summary import QUANTILES, Table, summarise
+from kahanmaps.experiments.results.records import Outcome, Record, Row, Task
+from kahanmaps.experiments.results.summary import QUANTILES, Table, summarise
 
 
 def task(kind="orbit", m=2, system=None, **options):

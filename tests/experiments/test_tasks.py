@@ -23,14 +23,14 @@ from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.records import canonical
+from kahanmaps.experiments.results.records import canonical
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 

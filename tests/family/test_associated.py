@@ -17,7 +17,7 @@ from helpers import random_point
 import kahanmaps as km
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import gradient, linear_combinations
-from kahanmaps.algebra.text import format_polynomial, parse_polynomial
+from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
 from kahanmaps.family.cubics import cubic_space

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import HypothesisError
 from kahanmaps.family.cubics import (
     belongs,

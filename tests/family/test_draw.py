@@ -12,7 +12,7 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.polynomials import gradient
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.cubics import belongs, cubic_space
 from kahanmaps.family.draw import MAX_M, draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues

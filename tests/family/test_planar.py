@@ -16,7 +16,7 @@ from helpers import random_point
 
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InexactNumber, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det, rank
 from kahanmaps.algebra.polynomials import linear_combinations, monomials, ring
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember

@@ -12,7 +12,7 @@ from helpers import EULER_TOP, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, random_poin
 from planar_helpers import diagonal, invertible, moved, over_members, structure_and_system
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables

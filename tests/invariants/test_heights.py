@@ -35,11 +35,11 @@ from kahanmaps.invariants.heights import (
     height_growth,
     height_of,
 )
-from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.steps import NormalSteps
-from kahanmaps.maps.orbits import Orbit, OrbitEnd
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1/2", "1/3", "-1/5", "2/7", "3/4", "-2/3"]

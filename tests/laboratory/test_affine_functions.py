@@ -15,7 +15,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
 from kahanmaps.documents.files import read_system
-from kahanmaps.laboratory.preserve.affine_functions import (
+from kahanmaps.laboratory.preserve.darboux.affine_functions import (
     affine_darboux,
     affine_integrals,
     darboux_cofactor,

@@ -13,7 +13,7 @@ from search_helpers import system, values_on_orbits
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.branches import tell_apart
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 # f = grad H x grad K with quadratic H(x, y) and K(y, z). By exchanging H and K each of the two pencils becomes the

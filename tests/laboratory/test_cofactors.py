@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from search_helpers import random_system, system
 
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve import cofactors as module
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
-from kahanmaps.laboratory.preserve.cofactors import (
+from kahanmaps.laboratory.preserve.darboux import cofactors as module
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
     Cofactor,
     CofactorProduct,

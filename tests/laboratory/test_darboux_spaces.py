@@ -12,8 +12,8 @@ from search_helpers import random_system, system
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import combine, echelon, exponents_up_to, monomial_values
-from kahanmaps.laboratory.preserve import darboux_spaces as module
-from kahanmaps.laboratory.preserve.darboux_spaces import (
+from kahanmaps.laboratory.preserve.darboux import darboux_spaces as module
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
     _is_darboux,
     _of_rank_two,

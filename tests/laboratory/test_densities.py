@@ -14,7 +14,7 @@ from helpers import quick
 from search_helpers import at_residues, random_system, specialised, system, value_of
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names

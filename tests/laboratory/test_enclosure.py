@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import Line, reduced
 from kahanmaps.laboratory.growth.degrees import degree_growth

@@ -9,14 +9,14 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to
-from kahanmaps.laboratory.preserve.flow import ModularFlow, is_kept_by_flow
 from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.limit.flow import ModularFlow, is_kept_by_flow
 
 PRIME = 2**61 - 1
 

@@ -9,17 +9,17 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate, monomials, primitive_part, ring
-from kahanmaps.algebra.text import format_polynomial, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.preserve import flow_polynomials as searched
-from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
-from kahanmaps.laboratory.preserve.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.limits import flow_and_map
+from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
+from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
+from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
+from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField
 
 

@@ -29,7 +29,7 @@ from check_helpers import (
 from helpers import fraction
 from search_helpers import ranks
 
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure

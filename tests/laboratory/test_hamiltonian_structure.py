@@ -20,7 +20,7 @@ from kahanmaps.documents.files import read_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.invariants.measures import DeterminantDensity
-from kahanmaps.laboratory.preserve.hamiltonian_structure import (
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     ConstantStructures,
     _invertible,
     _small,

@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import Decision
@@ -17,7 +17,7 @@ from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import identities
-from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals

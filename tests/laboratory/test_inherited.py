@@ -9,7 +9,7 @@ from flint import fmpq
 from search_helpers import random_system, ranks, system
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile

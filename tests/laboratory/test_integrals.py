@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from search_helpers import PRIME, random_system, ranks, specialised, system, values_on_orbits
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.symbols import with_symbols

@@ -20,7 +20,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent
-from kahanmaps.laboratory.preserve.affine_functions import affine_integrals
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.iterates import RatioOfIterates, integrals_in_iterates, verdict_on_ratio
 from kahanmaps.laboratory.preserve.lifted import LIFTS, Lift, Lifted, lifts_with_spaces

@@ -9,16 +9,16 @@ import pytest
 
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.inline import System
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.limits import flow_and_map
+from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
+from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 
 THREE_LINES = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["3*x*(x+2*y) + 6*x*y", "-(y*(x+2*y) + 3*x*y)"]')
 

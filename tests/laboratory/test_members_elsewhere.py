@@ -16,7 +16,7 @@ from schema_helpers import mistakes
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.cubics import belongs, default_variables
@@ -25,7 +25,7 @@ from kahanmaps.family.recognise import recognised_member_of
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.consistency import contradictions
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import constant_structures
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -11,13 +11,13 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.consistency import contradictions
-from kahanmaps.laboratory.preserve import pencil as module
-from kahanmaps.laboratory.preserve.pencil import Pencil, pencil_of
+from kahanmaps.laboratory.preserve.poisson import pencil as module
+from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
 
 SECONDS = 60.0  # never used up
 

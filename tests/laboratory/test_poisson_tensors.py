@@ -11,13 +11,13 @@ from search_helpers import random_system, system
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.preserve import poisson_tensors
-from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.poisson import poisson_tensors
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 
 PROVED, REFUTED = Verdict.PROVED, Verdict.REFUTED
 

@@ -13,7 +13,7 @@ from helpers import quick
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed, recurrence_of

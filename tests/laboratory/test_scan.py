@@ -9,7 +9,7 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import format_polynomial, parse_polynomial
+from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols

@@ -8,14 +8,14 @@ import pytest
 from flint import nmod
 from search_helpers import random_system, system
 
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.closed_forms import closed_forms
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.search import affine_space, may_be_conjugate, repeat, search
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from kahanmaps import KahanMap
 from kahanmaps.algebra.small_systems import Component
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries

@@ -8,7 +8,7 @@ from language_helpers import HAS_GP, ask_gp, converted, gp_prints, questions, sy
 
 import kahanmaps as km
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.languages.convert import convert
 
 pytestmark = pytest.mark.skipif(not HAS_GP, reason="gp, the program of PARI, is not installed")

@@ -9,7 +9,7 @@ import pytest
 from language_helpers import converted, numbers, question_in_python, run_python, systems
 
 import kahanmaps as km
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.languages.convert import convert
 from kahanmaps.languages.language import Language
 

@@ -13,11 +13,11 @@ from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
-from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import NthIterate
-from kahanmaps.maps.orbit import orbit
-from kahanmaps.maps.orbits import Iterates, Orbit
+from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
+from kahanmaps.maps.orbits.iteration import Iterates, Orbit
+from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
@@ -89,6 +89,6 @@ def test_every_trial_is_told():
 @pytest.mark.parametrize(("asked", "digits"), [({}, 15), ({"accuracy": 9}, 9)])
 def test_fifteen_digits_are_asked_for_unless_it_is_said_how_many(asked, digits, monkeypatch):
     seen = []
-    monkeypatch.setattr("kahanmaps.maps.orbit.bits_for", lambda orbit_with, digits, told: seen.append(digits) or 64)
+    monkeypatch.setattr("kahanmaps.maps.orbits.orbit.bits_for", lambda _map, digits, _: seen.append(digits) or 64)
     orbit(load("harmonic").system, [1, 2], "1/10", steps=3, arithmetic="ball:auto", **asked)
     assert seen == [digits]

@@ -18,20 +18,20 @@ from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.display.maps import orbit_html
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.heights import height, height_growth
-from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
-from kahanmaps.maps.orbit import orbit
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.arithmetic import Arithmetic
+from kahanmaps.maps.orbits.iteration import Orbit
+from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.maps.residues.ensemble import ModularEnsemble

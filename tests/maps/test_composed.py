@@ -14,7 +14,7 @@ from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.decide import decide
 from kahanmaps.checks.preserve import density_identity, transformation_identity
 from kahanmaps.documents.catalog import load
@@ -28,7 +28,7 @@ from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
-from kahanmaps.maps.orbit import orbit
+from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.maps.residues.ensemble import ModularEnsemble
 from kahanmaps.maps.residues.projective import ProjectiveMap

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
-from kahanmaps.maps.constant_rows import ConstantRows
-from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits.constant_rows import ConstantRows
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 NAMES = ["x", "y", "z", "w"]

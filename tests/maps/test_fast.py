@@ -23,11 +23,11 @@ from helpers import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.maps.floats.fast import FloatOrbit, float_function, to_float, to_floats
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import OrbitEnd
+from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 UNIT = 2.0**-53  # the relative error of one rounding to nearest

@@ -16,7 +16,7 @@ from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly
 from helpers import HENON_HEILES, quick
 
 from kahanmaps.algebra.fields import RR
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
@@ -26,7 +26,7 @@ from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, _facto
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 EPS = "1/10"

@@ -20,9 +20,9 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.maps import integer_steps
-from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import integer_steps
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kahanmaps.maps.inverse as module
-from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import SystemFileError
 from kahanmaps.maps.explicit import explicit_map

@@ -7,7 +7,7 @@ from planar_helpers import structure_and_system
 
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import NoStructure
-from kahanmaps.maps.methods import choose_method
+from kahanmaps.maps.orbits.methods import choose_method
 
 SPLIT, _ = structure_and_system("m = 2")
 UNSPLIT, _ = structure_and_system("m = 2, sqrt 2")

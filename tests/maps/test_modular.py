@@ -19,7 +19,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import orbit_period
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.maps.residues.ensemble import Arithmetic, ModularEnsemble, _split
 from kahanmaps.maps.residues.numba_kernel import kernels
 

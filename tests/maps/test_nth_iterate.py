@@ -28,14 +28,14 @@ from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.structure import structure_of
-from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import iterate, rational_iterate, tau_table
 from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.rational_iterate import OverBudget
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 NUMBERS = (0, 1, 2, 3, 5, 16, 17, 18, 23, 24, 25, 26, 33, 40)

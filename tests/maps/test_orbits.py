@@ -36,11 +36,11 @@ from planar_helpers import (
 )
 
 from kahanmaps.algebra.fields import GF, QQ, RR
-from kahanmaps.algebra.text import parse_number
+from kahanmaps.algebra.written.text import parse_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError
-from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint, IntegerSteps
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])

@@ -44,7 +44,7 @@ from kahanmaps.maps.normal_form.periods import (
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 from kahanmaps.maps.normal_form.translation import iterate
-from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 MERSENNE = 2**61 - 1

@@ -26,7 +26,7 @@ from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock, ShortElements
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.steps import NormalSteps
-from kahanmaps.maps.orbits import Iterates, Orbit
+from kahanmaps.maps.orbits.iteration import Iterates, Orbit
 
 FIELDS = {
     "sqrt 2": [-2, 0, 1],

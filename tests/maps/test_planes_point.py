@@ -15,11 +15,11 @@ from flint import fmpq, fmpz
 from helpers import random_point, step_or_none
 from planar_helpers import SPLIT, STARTS, side_by_side, structure_and_system
 
-from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planes_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint, _shared
 from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
 
 PAIRS = [
     ("one rational root", "three rational roots"),

@@ -18,7 +18,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.family.structure import Structure, structure_of
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import NthIterate
-from kahanmaps.maps.orbits import Iterates, Orbit, OrbitEnd
+from kahanmaps.maps.orbits.iteration import Iterates, Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 # Roots: three rational, one rational (in other coordinates), none rational, double, triple.

@@ -82,7 +82,7 @@ def test_claims_come_in_the_order_of_the_sections():
 
 def test_the_section_of_a_claim_is_that_of_its_file():
     for found in CLAIMS:
-        assert found.function.__module__ == f"kahanmaps.paper.{SECTIONS[found.section][1]}"
+        assert found.function.__module__ == f"kahanmaps.paper.claims.{SECTIONS[found.section][1]}"
 
 
 def test_every_control_is_named_by_a_claim():

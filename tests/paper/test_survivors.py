@@ -10,11 +10,11 @@ import pytest
 from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.maps.kahan import KahanMap, KahanMapOver
-from kahanmaps.paper.further_claims import STATEMENTS
-from kahanmaps.paper.survivors import smallest_counterexample, survivors, table
+from kahanmaps.paper.claims.further_claims import STATEMENTS
+from kahanmaps.paper.claims.survivors import smallest_counterexample, survivors, table
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 

@@ -18,7 +18,7 @@ from helpers import quick
 from paper.members import LARGE_SPECTRA, SPECTRA, file, member, point
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.plots.automatic_starts import COUNT, automatic_starts
-from kahanmaps.plots.trajectories import ensemble_for, walked
+from kahanmaps.plots.portraits.automatic_starts import COUNT, automatic_starts
+from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

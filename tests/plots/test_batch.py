@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.columns import value_pairs
-from kahanmaps.experiments.records import Outcome, Record, Row, Task
-from kahanmaps.experiments.summary import summarise
+from kahanmaps.experiments.results.columns import value_pairs
+from kahanmaps.experiments.results.records import Outcome, Record, Row, Task
+from kahanmaps.experiments.results.summary import summarise
 from kahanmaps.plots.batch import clipped, draw_batch, draw_pairs, groups_beyond
 from kahanmaps.plots.style import Style
 

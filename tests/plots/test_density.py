@@ -10,7 +10,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.plots import density
 from kahanmaps.plots.density import density_of
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.trajectories import ensemble_for, portions_of, walked
+from kahanmaps.plots.portraits.trajectories import ensemble_for, portions_of, walked
 
 AXES = [point_function(name, ["x", "y"]) for name in "xy"]
 UNIT = ((0.0, 1.0), (0.0, 1.0))

@@ -16,9 +16,9 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
-from kahanmaps.plots.draw_drift import clipped_from, draw_drift
-from kahanmaps.plots.drift import BINS, _Bins, _edges, small_start, survey_drift
-from kahanmaps.plots.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
+from kahanmaps.plots.drifts.draw_drift import clipped_from, draw_drift
+from kahanmaps.plots.drifts.drift import BINS, _Bins, _edges, small_start, survey_drift
+from kahanmaps.plots.drifts.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem

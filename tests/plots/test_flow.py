@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kahanmaps.plots.equilibria import equilibria, isolated_equilibria
-from kahanmaps.plots.flow import plane_flow, solutions
-from kahanmaps.plots.neighbours import neighbours
+from kahanmaps.plots.portraits.equilibria import equilibria, isolated_equilibria
+from kahanmaps.plots.portraits.flow import plane_flow, solutions
+from kahanmaps.plots.portraits.neighbours import neighbours
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 BOX = ((-3.0, 3.0), (-3.0, 3.0))

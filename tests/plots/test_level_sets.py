@@ -8,9 +8,9 @@ from flint import fmpq
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.plots.level_sets import level_curves, levels_through
+from kahanmaps.plots.curves.level_sets import level_curves, levels_through
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.trajectories import ensemble_for, walked
+from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
 STARTS = np.array([[-0.5, 0.0], [-0.3, 0.4]])

@@ -9,9 +9,9 @@ import pytest
 from flint import arb, ctx
 
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.plots.plane_cubics import PlaneCubic
-from kahanmaps.plots.plane_views import Disc, Rectangle
-from kahanmaps.plots.symmetric_planes import (
+from kahanmaps.plots.curves.plane_cubics import PlaneCubic
+from kahanmaps.plots.curves.plane_views import Disc, Rectangle
+from kahanmaps.plots.curves.symmetric_planes import (
     ONE_LINE,
     REPEATED,
     THREE_LINES,

@@ -10,14 +10,21 @@ from matplotlib.collections import PathCollection
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
+from kahanmaps.plots.curves.level_sets import level_curves
 from kahanmaps.plots.density import density_of
-from kahanmaps.plots.draw_portrait import draw_density, draw_portrait
 from kahanmaps.plots.figures import picture_bytes
-from kahanmaps.plots.level_sets import level_curves
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portrait import portrait_of
+from kahanmaps.plots.portraits.draw_portrait import draw_density, draw_portrait
+from kahanmaps.plots.portraits.portrait import portrait_of
+from kahanmaps.plots.portraits.trajectories import (
+    MAX_POINTS,
+    Trajectories,
+    ensemble_for,
+    euler_orbits,
+    require_points,
+    walked,
+)
 from kahanmaps.plots.style import Style
-from kahanmaps.plots.trajectories import MAX_POINTS, Trajectories, ensemble_for, euler_orbits, require_points, walked
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 STYLE = Style(width=8.6, font_size=8)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.windows import fullest_axes, main_range, outside, require_window, window_of
+from kahanmaps.plots.portraits.windows import fullest_axes, main_range, outside, require_window, window_of
 
 CIRCLE = np.stack([np.cos(np.linspace(0, 6, 500)), np.sin(np.linspace(0, 6, 500))], axis=1)
 

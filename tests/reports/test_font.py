@@ -11,7 +11,7 @@ from fontTools.pens.boundsPen import BoundsPen
 from fontTools.ttLib import TTFont
 from page_helpers import letters_of_formulas, letters_of_the_font
 
-from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.display.latex import GREEK_NAMES
 from kahanmaps.display.mathml import formula
 from kahanmaps.reports.stylesheet import font_face

@@ -10,10 +10,10 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
-from kahanmaps_cli.search import symbols_and_eps
-from kahanmaps_cli.terminal import echo, formula, on_terminal, tell
+from kahanmaps_cli.runs.search import symbols_and_eps
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.render import print_json
+from kahanmaps_cli.screen.terminal import echo, formula, on_terminal, tell
 
 INTERRUPTED = 130
 

@@ -10,8 +10,12 @@ from typing import Any, TypeVar
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.batch_run import dry_run, run_batch
-from kahanmaps_cli.batch_show import (
+from kahanmaps_cli.complete import complete_toml
+from kahanmaps_cli.groups import SuggestingGroup
+from kahanmaps_cli.options import json_option, output_options
+from kahanmaps_cli.params import Shard
+from kahanmaps_cli.runs.batch_run import dry_run, run_batch
+from kahanmaps_cli.runs.batch_show import (
     export_rows,
     found_data,
     print_found,
@@ -20,14 +24,10 @@ from kahanmaps_cli.batch_show import (
     print_tasks,
     status_data,
 )
-from kahanmaps_cli.complete import complete_toml
-from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.options import json_option, output_options
-from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.params import Shard
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import echo
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.render import envelope, print_json
+from kahanmaps_cli.screen.terminal import echo
 
 F = TypeVar("F", bound=Callable[..., Any])
 

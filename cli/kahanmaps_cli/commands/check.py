@@ -14,8 +14,8 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.params import ExactNumber
-from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.render import print_report
+from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.render import print_report
 
 _STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
 

@@ -8,8 +8,8 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
-from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.progress import as_typed, say
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import as_typed, say
 
 # Those of kahanmaps.languages.convert, which --help does not load.
 _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran", "toml")

@@ -9,10 +9,10 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.render import record_of
-from kahanmaps_cli.terminal import tell
-from kahanmaps_cli.value_rows import Cell, table
+from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.render import record_of
+from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.value_rows import Cell, table
 
 _SHOWN = 8  # degrees in a line of a table
 

@@ -10,14 +10,14 @@ import click
 from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, structure_for
-from kahanmaps_cli.ensemble_starts import asked_starts
-from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, Whole
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json, record_of
+from kahanmaps_cli.runs.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, structure_for
+from kahanmaps_cli.runs.ensemble_starts import asked_starts
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.render import print_json, record_of
+from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.signals import interruptible
-from kahanmaps_cli.terminal import tell
 
 _MAX_STEPS = 10**13  # years
 _MAX_BITS = 61

@@ -11,13 +11,13 @@ import click
 from kahanmaps.errors import quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.numbers import read_matrix
-from kahanmaps_cli.outputs import OutputFile, OutputFolder, file_name, will_write
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import formula, tell
+from kahanmaps_cli.runs.draw import draw_member, draw_options
+from kahanmaps_cli.screen.numbers import read_matrix
+from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
+from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.render import envelope, print_json
+from kahanmaps_cli.screen.terminal import formula, tell
 
 
 @click.group("family", cls=SuggestingGroup)

@@ -9,9 +9,7 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.render import print_json
-from kahanmaps_cli.search import (
+from kahanmaps_cli.runs.search import (
     asked,
     heading,
     print_search,
@@ -20,8 +18,10 @@ from kahanmaps_cli.search import (
     scope,
     search_options,
 )
-from kahanmaps_cli.terminal import formula, tell
-from kahanmaps_cli.value_rows import Cell, rows_of, table
+from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.render import print_json
+from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 
 
 @click.command("find-integrals")

@@ -8,9 +8,9 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.search import asked, print_search, require_one_form, search_options
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
+from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.terminal import tell
 
 
 @click.command("find-poisson")

@@ -8,9 +8,9 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system, output_options, seconds_option, system_options
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.render import print_json
+from kahanmaps_cli.screen.terminal import tell
 
 
 @click.command("find-symmetry")

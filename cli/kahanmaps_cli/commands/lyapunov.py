@@ -9,10 +9,10 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.ensemble_starts import asked_starts
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json, record_of
-from kahanmaps_cli.terminal import on_terminal, print_table, tell
+from kahanmaps_cli.runs.ensemble_starts import asked_starts
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.render import print_json, record_of
+from kahanmaps_cli.screen.terminal import on_terminal, print_table, tell
 
 _MAX_STEPS = 10**9
 _DEFAULT_STARTS = 16

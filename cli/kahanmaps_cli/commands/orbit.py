@@ -15,15 +15,15 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.numbers import json_float, short_float
-from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer, meta_of
-from kahanmaps_cli.orbit_run import OrbitRun
-from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, PointText, Steps, Whole
-from kahanmaps_cli.progress import Progress, TimeLeft, say
-from kahanmaps_cli.render import ending
+from kahanmaps_cli.runs.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer, meta_of
+from kahanmaps_cli.runs.orbit_run import OrbitRun
+from kahanmaps_cli.screen.numbers import json_float, short_float
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import Progress, TimeLeft, say
+from kahanmaps_cli.screen.render import ending
+from kahanmaps_cli.screen.streams import is_read
 from kahanmaps_cli.signals import interruptible
-from kahanmaps_cli.streams import is_read
 
 _FORMATS = ("text", "json", "jsonl", "csv", "npz", "npy")
 _TEXT = ("", ".txt", ".tsv", ".out", ".dat", ".log")  # endings of files of text

@@ -9,9 +9,9 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, PointText
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import envelope, print_json, record_of
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.render import envelope, print_json, record_of
+from kahanmaps_cli.screen.terminal import tell
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _WALK = "To walk instead: kahanmaps orbit ... --steps N says when the start comes back"
@@ -172,6 +172,7 @@ def _record(
         "period",
         file,
         _arithmetic(options),
+        seed=None,
         structure=structure.text,
         eps=str(eps),
         time_step=str(2 * eps),

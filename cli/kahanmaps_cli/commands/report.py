@@ -10,10 +10,10 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.runs.draw import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import Progress, say
 
 _ONLY_FOR = {
     "symbolic": ("analyze",),
@@ -157,7 +157,7 @@ def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tu
 
 
 def _analysis(system: str | None, options: dict[str, Any], progress: Progress, how: dict[str, Any]) -> tuple[str, int]:
-    from kahanmaps_cli.search import symbols_and_eps
+    from kahanmaps_cli.runs.search import symbols_and_eps
 
     symbols, eps = symbols_and_eps(options)
     file = opt.load_system(system, options)

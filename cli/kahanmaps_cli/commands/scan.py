@@ -10,12 +10,12 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import output_options
-from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
 from kahanmaps_cli.params import Seconds, Shard
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json, record_of
-from kahanmaps_cli.scan_run import ending, scan_options, scanned
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.runs.scan_run import ending, scan_options, scanned
+from kahanmaps_cli.screen.outputs import OutputFolder, file_name, will_write
+from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.render import print_json, record_of
+from kahanmaps_cli.screen.terminal import tell
 
 
 @click.command("scan")

@@ -6,7 +6,7 @@ import json
 
 import click
 
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.screen.render import envelope, print_json
 
 
 def _complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:

@@ -8,9 +8,9 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json, record_of
-from kahanmaps_cli.terminal import formula, tell
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.render import print_json, record_of
+from kahanmaps_cli.screen.terminal import formula, tell
 
 
 @click.command("singularities")

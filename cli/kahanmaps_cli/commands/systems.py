@@ -9,8 +9,8 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
-from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import formula, tell, tell_entry
+from kahanmaps_cli.screen.render import envelope, print_json
+from kahanmaps_cli.screen.terminal import formula, tell, tell_entry
 
 
 @click.command("systems")

@@ -8,9 +8,9 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.verify_table import print_verification
+from kahanmaps_cli.runs.draw import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.runs.verify_table import print_verification
+from kahanmaps_cli.screen.progress import Progress
 
 
 @click.command("verify")

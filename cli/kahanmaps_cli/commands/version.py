@@ -9,8 +9,8 @@ from importlib.metadata import version as version_of
 import click
 
 from kahanmaps_cli.options import json_option
-from kahanmaps_cli.render import print_json
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.screen.render import print_json
+from kahanmaps_cli.screen.terminal import tell
 
 
 @click.command("version")

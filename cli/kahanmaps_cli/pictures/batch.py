@@ -10,7 +10,7 @@ from click.core import ParameterSource
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 _TOLD = 1000  # rows between words of progress
 

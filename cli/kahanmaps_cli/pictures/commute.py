@@ -10,7 +10,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
 from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from, two_variables
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 
 @picture(

@@ -12,7 +12,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 _WIDE = 24.0  # centimetres: in a terminal panels stand side by side, for its lines are few
 _LONGEST = 160  # characters of a start that is told

@@ -18,7 +18,7 @@ from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.commands.heights import require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 _MAX_BYTES = 64_000_000
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.

@@ -11,7 +11,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, two_variables
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 
 @picture(

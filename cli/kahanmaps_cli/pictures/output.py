@@ -17,10 +17,10 @@ import click
 from kahanmaps.errors import printable
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import stack
-from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType, PointText
-from kahanmaps_cli.progress import Progress, as_typed, say
-from kahanmaps_cli.terminal import is_coloured
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import Progress, as_typed, say
+from kahanmaps_cli.screen.terminal import is_coloured
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

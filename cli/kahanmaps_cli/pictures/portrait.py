@@ -14,7 +14,7 @@ from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
 from kahanmaps_cli.pictures.portrait_orbits import Orbits
 from kahanmaps_cli.pictures.stored import read_orbits
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.screen.progress import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -160,7 +160,7 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
 
 def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
 
-    from kahanmaps_cli.ensemble_starts import drawn, read_starts
+    from kahanmaps_cli.runs.ensemble_starts import drawn, read_starts
 
     file = opt.load_system(system, options)
     eps = opt.eps_of(file, options)

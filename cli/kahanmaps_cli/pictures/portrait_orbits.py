@@ -59,7 +59,7 @@ class Orbits:
     ) -> Orbits:
         """Orbits that are to be walked, from `starts` or where those are None from chosen ones."""
 
-        from kahanmaps_cli.ensemble_run import structure_for
+        from kahanmaps_cli.runs.ensemble_run import structure_for
 
         chosen = starts is None
         if chosen:

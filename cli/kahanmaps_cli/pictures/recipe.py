@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.render import print_json
-from kahanmaps_cli.terminal import echo
+from kahanmaps_cli.screen.render import print_json
+from kahanmaps_cli.screen.terminal import echo
 
 
 @click.command("recipe")

@@ -8,8 +8,8 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
-from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.scan_run import ending, names_of, primes_of, scan_options, scanned
+from kahanmaps_cli.runs.scan_run import ending, names_of, primes_of, scan_options, scanned
+from kahanmaps_cli.screen.progress import Progress
 
 
 @picture(

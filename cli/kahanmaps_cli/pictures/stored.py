@@ -19,7 +19,7 @@ import click
 
 from kahanmaps.errors import InputError
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.orbit_formats import meta_of
+from kahanmaps_cli.runs.orbit_formats import meta_of
 
 _ENDINGS = (".npy", ".npz", ".jsonl", ".csv")
 _MAX_POINTS = 4_000_000  # of a file that has to be read as text

@@ -7,15 +7,19 @@ from typing import Any
 
 from flint import fmpq_mat
 
-from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.family.tensor import TensorStructure, tensor_structure
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
-from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, ConstantStructures, constant_structures
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
+    MAX_DIMENSION,
+    ConstantStructures,
+    constant_structures,
+)
 
 
 def hamiltonian(run: Run, **_: Any) -> ConstantStructures | None:

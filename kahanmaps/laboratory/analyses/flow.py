@@ -7,7 +7,7 @@ from typing import Any
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.limits import FlowAndMap, flow_and_map
+from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map
 
 
 def flow(run: Run, **budget: Any) -> FlowAndMap | None:

@@ -15,7 +15,7 @@ from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
-from kahanmaps.laboratory.preserve.pencil import Pencil, pencil_of
+from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation, sparse_relations
 
 _NAMES = 6  # that are listed one by one

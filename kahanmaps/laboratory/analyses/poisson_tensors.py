@@ -8,7 +8,7 @@ from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch, find_poisson
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
 
 _DEGREES = {3: 3, 4: 2}  # of the tensors by dimension; in the plane they are densities
 

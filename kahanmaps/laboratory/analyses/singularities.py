@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings

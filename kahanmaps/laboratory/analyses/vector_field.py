@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings

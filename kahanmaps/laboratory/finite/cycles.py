@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
-from kahanmaps.algebra.plain import all_fields
+from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.symmetry.reversors import require_reversor

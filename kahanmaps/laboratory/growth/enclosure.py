@@ -34,8 +34,8 @@ from flint import Ordering, arb, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, nmod_mat, nmo
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import degree_in
+from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of

@@ -19,8 +19,8 @@ from typing import Any
 import flint
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
 
-from kahanmaps.algebra.plain import attributes, plain
-from kahanmaps.algebra.text import format_univariate
+from kahanmaps.algebra.written.plain import attributes, plain
+from kahanmaps.algebra.written.text import format_univariate
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 

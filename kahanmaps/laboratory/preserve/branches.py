@@ -21,7 +21,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator
 from kahanmaps.algebra.roots import Root
 from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 
 Pattern = tuple[tuple[bool, ...], ...]
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]

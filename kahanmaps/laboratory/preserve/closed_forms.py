@@ -24,7 +24,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to, interpolated
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 
 MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or more of them
 

@@ -16,9 +16,9 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
-from kahanmaps.algebra.text import format_factored
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex
@@ -26,7 +26,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.preserve.cofactors import (
+from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
     CofactorProduct,
     Sample,
@@ -34,9 +34,9 @@ from kahanmaps.laboratory.preserve.cofactors import (
     determinant_polynomial,
     points_needed,
 )
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, constant_structures
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
 

@@ -21,8 +21,8 @@ from typing import Any
 from flint import fmpq_mpoly, nmod_mat
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,

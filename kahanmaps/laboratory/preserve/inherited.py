@@ -21,8 +21,12 @@ from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.errors import counted
 from kahanmaps.invariants.integrals import modified
 from kahanmaps.laboratory.modular_points import ModularMap, Point, rank
-from kahanmaps.laboratory.preserve.affine_functions import QuotientForms, affine_integrals, quotient_by
-from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, closed_forms, hamiltonian_function
+from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
+    MAX_DIMENSION,
+    closed_forms,
+    hamiltonian_function,
+)
 from kahanmaps.maps.kahan import Kahan, KahanMapOver
 from kahanmaps.systems.quadratic import QuadraticSystem
 

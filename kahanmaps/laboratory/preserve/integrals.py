@@ -19,17 +19,16 @@ from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree, ring
-from kahanmaps.algebra.text import format_factored, format_polynomial, format_rational_function
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_factored, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
-from kahanmaps.laboratory.preserve.cofactors import Cofactor
-from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
+from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.iterates import (
@@ -38,6 +37,7 @@ from kahanmaps.laboratory.preserve.iterates import (
     integrals_in_iterates,
     verdict_on_ratio,
 )
+from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
 from kahanmaps.laboratory.preserve.search import AFFINE, bases_of, may_be_conjugate, repeat, search

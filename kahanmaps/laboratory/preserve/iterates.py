@@ -24,9 +24,9 @@ from flint import fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.functions import BudgetExceeded
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
-from kahanmaps.algebra.text import format_number, format_polynomial, format_rational_function
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_number, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
@@ -36,8 +36,8 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
-from kahanmaps.laboratory.preserve.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.branches import pattern
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
 from kahanmaps.laboratory.preserve.search import Found, Step, bases_of

@@ -16,7 +16,7 @@ from functools import cache
 from typing import NamedTuple
 
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, exponents_up_to
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace, darboux_spaces
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span_of_relations
 
 DEGREE = 2

@@ -35,14 +35,14 @@ from kahanmaps.algebra.polynomials import (
     primitive_part,
     ring,
 )
-from kahanmaps.algebra.text import format_product
+from kahanmaps.algebra.written.text import format_product
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
-from kahanmaps.laboratory.preserve.cofactors import Cofactor
-from kahanmaps.laboratory.preserve.flow import coefficient_rows
+from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
+from kahanmaps.laboratory.preserve.limit.flow import coefficient_rows
 from kahanmaps.maps.implicit import StepOver
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -456,7 +456,7 @@ def _constant(map_: ModularMap, polynomials: Sequence[fmpq_mpoly], vector: Seque
 def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list[int]]:
     """A basis over Z of all k for which the product of the powers f_i^k_i is 1; none of the functions is 0.
 
-    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> from kahanmaps.algebra.written.text import parse_rational_function
     >>> functions = [parse_rational_function(text, ["a"]) for text in ("-4*a^2", "2*a", "3", "-1")]
     >>> multiplicative_relations(functions)
     [[1, -2, 0, 1], [0, 0, 0, 2]]

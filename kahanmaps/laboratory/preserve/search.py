@@ -24,7 +24,7 @@ from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, null_space
 from kahanmaps.laboratory.preserve.branches import Branches, Pattern, pattern, tell_apart
-from kahanmaps.laboratory.preserve.cofactors import (
+from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
     CofactorProduct,
     Sample,
@@ -32,10 +32,15 @@ from kahanmaps.laboratory.preserve.cofactors import (
     points_needed,
     search_cofactors,
 )
-from kahanmaps.laboratory.preserve.darboux_spaces import LARGEST_SPAN, DarbouxSpace, darboux_spaces, gradient_rank
-from kahanmaps.laboratory.preserve.flow import ModularFlow
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
+    LARGEST_SPAN,
+    DarbouxSpace,
+    darboux_spaces,
+    gradient_rank,
+)
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.lifted import Lift, lifted_spaces
+from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 from kahanmaps.maps.kahan import KahanMapOver
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.

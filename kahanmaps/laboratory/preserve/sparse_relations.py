@@ -15,7 +15,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.residues import rational_reconstruction
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.laboratory.modular_points import ModularMap, echelon, exponents_up_to
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 

@@ -10,9 +10,9 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, QQ, Field
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of

@@ -16,7 +16,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.written import name_of

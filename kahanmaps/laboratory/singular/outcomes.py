@@ -16,8 +16,8 @@ from flint import fmpq, nmod_poly
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import nullspace
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, gradient
+from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.following import Course, Range

@@ -17,7 +17,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Followed, Hypersurface, Tracking, Written, outcome_of

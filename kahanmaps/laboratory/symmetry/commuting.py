@@ -18,10 +18,10 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
-from kahanmaps.algebra.plain import attributes, plain
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import Component, decoupling, normal_form, solve_system, without_contained
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.plain import attributes, plain
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings

@@ -18,10 +18,10 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
-from kahanmaps.algebra.plain import attributes, plain
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.written.plain import attributes, plain
+from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED

@@ -18,14 +18,14 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 

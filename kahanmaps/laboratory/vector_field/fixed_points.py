@@ -15,10 +15,10 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
 from kahanmaps.algebra.small_systems import Component, groebner, normal_form, quotient_monomials, solve_system
-from kahanmaps.algebra.text import format_polynomial, format_product
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_polynomial, format_product
 from kahanmaps.errors import counted
 from kahanmaps.systems.quadratic import QuadraticSystem
 

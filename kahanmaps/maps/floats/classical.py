@@ -14,7 +14,7 @@ import numpy as np
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
-from kahanmaps.maps.orbits import OrbitEnd, require_steps
+from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHODS = {"rk4": "explicit RK4", "midpoint": "implicit midpoint"}

@@ -10,7 +10,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.text import parse_point
+from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.errors import InputError
 
 FloatArray = NDArray[np.float64]

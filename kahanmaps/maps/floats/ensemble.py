@@ -35,7 +35,7 @@ from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.kernels import choose_kernel, processors
-from kahanmaps.maps.orbits import OrbitEnd, require_steps
+from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SAMPLED = 1000  # steps between samples of the block integrals

@@ -30,7 +30,7 @@ from kahanmaps.maps.floats.ensemble import (
 from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import choose_kernel
-from kahanmaps.maps.orbits import OrbitEnd, require_steps
+from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 __all__ = [

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.plain import all_fields
+from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float

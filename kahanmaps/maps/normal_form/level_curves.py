@@ -1,7 +1,7 @@
 """The level cubics of a plane as groups: the order of the translation Psi, and whether a point is an image of another.
 
 Elements are FLINT's, of a field of q elements of characteristic at least 5 (or of a number field, where only single
-sums are wanted); the levels are smooth. See maps/planar_block.py for the cubic E, its Jacobian and T.
+sums are wanted); the levels are smooth. See planar_block.py for the cubic E, its Jacobian and T.
 """
 
 from __future__ import annotations

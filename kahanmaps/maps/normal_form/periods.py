@@ -1,6 +1,6 @@
 """The exact period of an orbit of a family member: over GF(p) without walking it, over Q with a proof.
 
-In every plane of the normal form the Kahan map is a translation of the level cubic (maps/planar_block.py), and its
+In every plane of the normal form the Kahan map is a translation of the level cubic (planar_block.py), and its
 period is the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, the same for all
 points of a level. Over a field of q elements a multiple of it lies in the Hasse interval q + 1 +- 2 sqrt(q), where baby
 steps and giant steps find it, about q^(1/4) of each; in large fields Schoof's algorithm narrows the interval first. The
@@ -31,7 +31,7 @@ from flint import (
 )
 
 from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.algebra.plain import all_fields
+from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm

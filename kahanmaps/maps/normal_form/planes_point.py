@@ -15,7 +15,6 @@ from functools import cached_property
 
 from flint import fmpq, fmpz
 
-from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
 from kahanmaps.maps.normal_form.planar_integers import (
@@ -25,6 +24,7 @@ from kahanmaps.maps.normal_form.planar_integers import (
     is_all,
     radical,
 )
+from kahanmaps.maps.orbits.integer_steps import IntegerPoint
 
 Block = IntegerBlock | AlgebraBlock
 

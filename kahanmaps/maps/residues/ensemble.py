@@ -1,9 +1,9 @@
 """Many orbits modulo a prime p < 2^61 at once, as arrays.
 
 Stepping takes no inverse. Where chi splits into linear factors modulo p, every plane of the normal form goes by itself
-in homogeneous coordinates (maps/planar_block.py). Any other map goes as (X : Z), x = X/Z: its equation (M | -r) is a
-matrix of forms of (X, Z), and the elimination multiplies rows instead of dividing them. The results are the same, and
-those of `Orbit` over GF(p).
+in homogeneous coordinates (normal_form/planar_block.py). Any other map goes as (X : Z), x = X/Z: its equation
+(M | -r) is a matrix of forms of (X, Z), and the elimination multiplies rows instead of dividing them. The results are
+the same, and those of `Orbit` over GF(p).
 
 Two kernels: "numpy" works on whole arrays; "numba" is compiled, and needs the extra `fast`.
 """
@@ -25,7 +25,7 @@ from kahanmaps.maps.implicit import BirationalMap, StepOver
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.maps.orbits import require_steps
+from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Residues = NDArray[np.uint64]

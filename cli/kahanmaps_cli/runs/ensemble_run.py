@@ -1,0 +1,258 @@
+"""Many orbits at once in the arithmetic that was asked for: how they went, what moved, and the records of them."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+from kahanmaps.errors import InputError
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.screen.numbers import json_float, json_number, short_float
+
+FAILURES_SHOWN = 20
+_WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded
+_LOOKS = 100  # at integrals that were asked for, unless --every says when
+_VALUES = 200_000  # of them at most
+_PIECE = 0.1  # seconds between looks at Ctrl-C
+
+Told = Callable[[int], None]
+
+
+def structure_for(file: lib.SystemFile, wish: str | None) -> lib.Structure | lib.NoStructure:
+    """The normal form that steps are made in, or why there is none."""
+    if wish == "generic":
+        return lib.NoStructure("generic, as asked for")
+    structure = file.structure
+    if not isinstance(structure, lib.NoStructure) and structure.T is not None:
+        structure = lib.NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
+    if isinstance(structure, lib.NoStructure) and wish == "normal-form":
+        raise InputError(f"the method normal-form needs a normal form, and there is none: {structure.reason}")
+    return structure
+
+
+class Asked(NamedTuple):
+    """What is asked of a run: `options` are those of the command."""
+
+    file: lib.SystemFile
+    eps: Any
+    starts: lib.NDArray[Any]
+    form: lib.NormalForm | None
+    integrals: Mapping[str, lib.RationalFunction]
+    options: Mapping[str, Any]
+
+    @property
+    def stepping(self) -> dict[str, Any]:
+        """How either kind of ensemble is to step."""
+        wish, steps = self.options["kernel"], self.options["steps"]
+        kernel = "numpy" if wish is None and len(self.starts) * steps < _WORTH_COMPILING else wish
+        return {"form": self.form, "kernel": kernel, "backward": self.options["backward"]}
+
+
+class _Walk(ABC):
+    """How far many orbits have come; what it tells is `counts`, `failures`, `moved` and `near`, for people and JSON."""
+
+    kind: Literal["<f8", "<i8"]  # of the numbers in a .npy file
+    ensemble: Any
+    method: str
+    kernel: str
+    look = 0  # steps between two looks at integrals, if these want more than the first and the last
+
+    def __init__(self, asked: Asked) -> None:
+        self.asked = asked
+        self.steps: int = asked.options["steps"]
+        self.shape: tuple[int, ...] = asked.starts.shape  # orbits and dimension
+        self.reached = 0
+        self.records = 0
+        self.interrupted = False
+
+    def interrupt(self) -> None:
+        """Ask to end after the portion in hand."""
+        self.interrupted = True
+
+    def walk(self, told: Told) -> None:
+        """Take the steps; the starts and multiples of --every, or the first and the last, go to a .npy file."""
+        output, every = self.asked.options["output"], self.asked.options["every"]
+        whole = every or max(1, self.steps)
+        interval = every or self.look or whole
+        with nullcontext() if output is None else lib.NpyFile(output, self.shape, self.kind) as file:
+            for k, points in enumerate(self.portions(interval, told)):
+                if file is not None and (interval == whole or k == 0):
+                    file.append(points)
+            if file is not None and interval != whole and self.reached == self.steps:
+                file.append(self.ensemble.x[None])
+            self.records = 0 if file is None else file.rows
+
+    @abstractmethod
+    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
+        """Take the steps; the starts, then points at multiples of the interval, some at a time."""
+
+
+class FloatRun(_Walk):
+    """In machine numbers."""
+
+    kind = "<f8"
+
+    def __init__(self, asked: Asked) -> None:
+        super().__init__(asked)
+        value = lib.to_float(asked.eps)  # backward too: the inverse conserves what the map conserves
+
+        def of_point(function: lib.RationalFunction) -> Callable[[Sequence[float]], float | None]:
+            found = lib.float_function(function)
+            return lambda x: found([*x, value])
+
+        self.ensemble: lib.FloatEnsemble = lib.FloatEnsemble(
+            asked.file.map,
+            asked.eps,
+            asked.starts,
+            **asked.stepping,
+            threads=asked.options["threads"],
+            integrals={name: of_point(function) for name, function in asked.integrals.items()},
+        )
+        self.method = "generic" if asked.form is None else "normal-form"
+        self.kernel = self.ensemble.kernel
+        if asked.integrals:
+            self.look = max(1, -(-self.steps // max(1, min(_LOOKS, _VALUES // self.shape[0]))))
+
+    def interrupt(self) -> None:
+        super().interrupt()
+        self.ensemble.interrupt()
+
+    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
+        def progress(step: int) -> None:
+            told(step)
+            if self.interrupted:
+                self.ensemble.interrupt()
+
+        yield from self.ensemble.records(self.steps, interval, progress=progress)
+        self.reached = self.ensemble.step
+
+    @property
+    def counts(self) -> dict[str, int]:
+        status = self.ensemble.status
+        return {word: int((status == word).sum()) for word in ("completed", "overflow", "singular")}
+
+    def failures(self) -> Iterator[dict[str, Any]]:
+        for orbit in (self.ensemble.failed_at >= 0).nonzero()[0].tolist():
+            end = self.ensemble.end(orbit)
+            yield {"orbit": orbit, "status": end.status, "steps": end.steps, "message": end.message}
+
+    def near(self) -> dict[str, Any]:
+        near = self.ensemble.near_singular
+        orbits = near.nonzero()[0].tolist()
+        first = None
+        if orbits:
+            at = self.ensemble.near_singular_at
+            orbit = min(orbits, key=lambda k: int(at[k]))
+            first = {"orbit": orbit, "step": int(at[orbit])}
+        return {"steps": int(near.sum()), "orbits": len(orbits), "first": first}
+
+    def moved(self) -> list[dict[str, Any]]:
+        going = (self.ensemble.failed_at < 0).nonzero()[0]
+        found = []
+        for drift in self.ensemble.drift:
+            record: dict[str, Any] = {"name": drift.name, "orbits": len(going)}
+            if len(going):
+                worst = int(going[drift.largest[going].argmax()])
+                record["largest"] = json_float(drift.largest[worst])
+                record["orbit"] = worst
+                record["initial"] = json_number(drift.initial[worst])
+            found.append(record)
+        return found
+
+    def moved_lines(self) -> list[str]:
+        lines = []
+        for record in self.moved():
+            told = "no orbit was completed"
+            if "largest" in record:
+                initial, largest = record["initial"], short_float(record["largest"])
+                is_complex = isinstance(initial, list)
+                start = "+-".join(map(short_float, initial)) + "i" if is_complex else short_float(initial)
+                told = f"at most {largest} (orbit {record['orbit']}, from {start})"
+            lines.append(f"{record['name']}\t{told}")
+        return lines
+
+
+class ModularRun(_Walk):
+    """Modulo a prime, where an integral either holds or does not."""
+
+    kind = "<i8"
+
+    def __init__(self, asked: Asked) -> None:
+        super().__init__(asked)
+        prime, threads = asked.options["arithmetic"][1], asked.options["threads"] or 1
+        self.ensemble: lib.ModularEnsemble = lib.ModularEnsemble(
+            asked.file.map, asked.eps, asked.starts, prime, **asked.stepping, threads=threads
+        )
+        if asked.options["method"] == "normal-form" and self.ensemble.method != "planes":
+            raise InputError("the method normal-form needs a chi that splits modulo P: take generic, or another prime")
+        self.method = "normal-form" if self.ensemble.method == "planes" else "generic"
+        self.kernel = f"{self.ensemble.kernel} {self.ensemble.method}"
+        self._initial = self._values()
+
+    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
+        yield self.ensemble.x[None]
+        while self.reached + interval <= self.steps and self._advance(self.reached + interval, told):
+            yield self.ensemble.x[None]
+        self._advance(self.steps, told)
+
+    def _advance(self, stop: int, told: Told) -> bool:
+        """To step `stop`, in pieces that take a moment; whether it was reached."""
+        piece = 1
+        while self.reached < stop and not self.interrupted:
+            began = time.monotonic()
+            count = min(piece, stop - self.reached)
+            self.ensemble.advance(count)
+            self.reached += count
+            if count == piece and time.monotonic() - began < _PIECE:
+                piece *= 2
+            told(self.reached)
+        return self.reached >= stop
+
+    def _values(self) -> dict[str, list[Any]]:
+        field = self.ensemble.field
+        claims = {name: lib.ClaimedIntegral(name, function) for name, function in self.asked.integrals.items()}
+        points = self.ensemble.x.tolist() if claims else []
+        return {
+            name: [claim.value(field, self.asked.eps, [field.convert(entry) for entry in x]) for x in points]
+            for name, claim in claims.items()
+        }
+
+    @property
+    def counts(self) -> dict[str, int]:
+        singular = int((self.ensemble.singular_at >= 0).sum())
+        return {"completed": len(self.ensemble) - singular, "singular": singular}
+
+    def failures(self) -> Iterator[dict[str, Any]]:
+        over = self.asked.file.map.at(self.asked.eps, self.ensemble.field)
+        det = lib.det_of(over.denominator_name(self.asked.options["backward"]))
+        for orbit in (self.ensemble.singular_at >= 0).nonzero()[0].tolist():
+            at = int(self.ensemble.singular_at[orbit])
+            message = f"{det} = 0 at step {at}: the map has no value there"
+            yield {"orbit": orbit, "status": "singular", "steps": at, "message": message}
+
+    def moved(self) -> list[dict[str, Any]]:
+        now = self._values()
+        found = []
+        for name, initial in self._initial.items():
+            pairs = list(zip(initial, now[name], strict=True))
+            defined = [k for k, (before, after) in enumerate(pairs) if before is not None and after is not None]
+            moved = [k for k in defined if pairs[k][0] != pairs[k][1]]
+            record = {"name": name, "orbits": len(defined), "changed": len(moved)}
+            found.append({**record, "orbit": moved[0] if moved else None})
+        return found
+
+    def moved_lines(self) -> list[str]:
+        lines = []
+        for record in self.moved():
+            first = f", the first of them orbit {record['orbit']}" if record["changed"] else ""
+            lines.append(f"{record['name']}\tchanged in {record['changed']} of {record['orbits']} orbits{first}")
+        return lines
+
+    def near(self) -> None:
+        """Residues are exact: no step is nearly singular."""
+
+
+Run: TypeAlias = FloatRun | ModularRun

@@ -1,0 +1,100 @@
+"""What scan and its picture share: the options, and the scan that they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import Event
+from typing import Any, TypeVar
+
+import click
+
+from kahanmaps.errors import quoted
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.signals import interruptible
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+scan_options: Callable[[F], F] = opt.stack(
+    opt.system_options,
+    click.option(
+        "--over",
+        required=True,
+        metavar="A,B,...",
+        help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
+    ),
+    opt.eps_options,
+    click.option(
+        "--by",
+        type=click.Choice(["degrees", "integrals", "density"]),
+        default="degrees",
+        show_default=True,
+        help="Look for smaller degrees of iterates, relations along orbits, or densities.",
+    ),
+    click.option(
+        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N, or relations and densities up to degree N."
+    ),
+    click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
+    opt.seconds_option(120.0, "Stop about then, and say what was seen."),
+    click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
+    opt.seed_option,
+)
+
+
+def names_of(options: dict[str, Any]) -> list[str]:
+    """The parameters of --over."""
+    names = [name.strip() for name in options["over"].split(",") if name.strip()]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise click.UsageError(f"found {quoted(twice)} twice in --over, expected different parameters")
+    return names
+
+
+def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Scan:
+    """The scan that a command line asks for."""
+    names = names_of(options)
+    if opt.is_inline(options, system):
+        given = {"eps", *(name for name, _ in options["parameters"])}
+        options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
+    if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
+        raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
+    file = opt.load_system(system, options)
+    interrupted = Event()
+
+    def told(sentence: str) -> None:
+        if interrupted.is_set():
+            raise lib.TimeOver
+        progress(sentence)
+
+    with Progress(quiet) as progress, interruptible(interrupted.set):
+        return lib.scan(
+            file,
+            names,
+            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
+            **opt.given(options, "by", "terms", "seconds", "seed", "jobs"),
+            primes=primes_of(options["primes"]),
+            analysis=options.get("analysis"),
+            kept=None if options.get("keep") is None else lib.Kept(options["keep"], *(options["shard"] or ())),
+            progress=told,
+        )
+
+
+def ending(found: lib.Scan, quiet: bool) -> int:
+    """The exit status, and a word where it is not 0."""
+    if found.ended in ("complete", "part"):
+        return 0
+    if not quiet:
+        why = "the time was over" if found.ended == "time" else "interrupted"
+        say(f"stopped early: {why} before {', '.join(found.omitted)}")
+    return 3 if found.ended == "time" else 130
+
+
+def primes_of(text: str | None) -> list[int] | None:
+    """The numbers of --primes."""
+    if text is None:
+        return None
+    pieces = [piece.strip() for piece in text.split(",")]
+    if not all(piece.isascii() and piece.isdigit() and len(piece) < 10 for piece in pieces):
+        raise click.UsageError(f"found --primes {text[:60]!r}, expected primes separated by commas")
+    return [int(piece) for piece in pieces]

@@ -1,0 +1,100 @@
+"""What the commands share that search for formulas: find-integrals, find-density and analyze."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import click
+
+from kahanmaps_cli import library as lib
+from kahanmaps_cli import options as opt
+from kahanmaps_cli.screen.render import envelope, print_json
+from kahanmaps_cli.screen.terminal import formula, tell
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def search_options(section: str) -> Callable[[F], F]:
+    """eps, --symbolic, --seconds, --seed and the forms of output; `section` is that of a system file."""
+    return opt.stack(
+        opt.eps_options,
+        opt.symbolic_option,
+        opt.seconds_option(60, "Time for the search."),
+        opt.seed_option,
+        click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
+        click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
+        opt.output_options,
+    )
+
+
+def require_one_form(options: dict[str, Any]) -> None:
+    """At most one of --toml, --latex and --json."""
+    if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
+        raise click.UsageError("give one of --toml, --latex and --json")
+
+
+def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
+    """The names of --symbolic without eps, and the number eps or None."""
+    named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
+    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    if eps is not None and "eps" in named:
+        raise click.UsageError("give --eps as a number, or eps among --symbolic, not both")
+    return tuple(name for name in named if name != "eps"), eps
+
+
+def asked(options: dict[str, Any], *names: str) -> dict[str, Any]:
+    """What every search is asked with, and these options: symbols, eps, seconds, seed."""
+    symbols, eps = symbols_and_eps(options)
+    return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "seconds", "seed")}
+
+
+def scope(found: Any) -> str:
+    """For which eps and which symbols the formulas hold, to follow the name of the map."""
+    if getattr(found, "flow", False):
+        return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
+    step = lib.eps_words(lib.eps_record(found.eps, found.file.map))
+    return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
+
+
+def heading(name: str, found: Any) -> dict[str, Any]:
+    """What is needed to redo a search, as plain data."""
+    return {
+        **envelope(name),
+        "system": found.file.name,
+        "parameters": {key: str(value) for key, value in found.file.parameters.items()},
+        "symbols": list(found.symbols),
+        **lib.eps_record(found.eps, found.file.map),
+        "arithmetic": "exact formulas, from residues modulo primes",
+        "seed": found.seed,
+    }
+
+
+def record(name: str, found: Any, **more: Any) -> dict[str, Any]:
+    """All that a search found, as plain data."""
+    return {**heading(name, found), **found.to_json(), **more, "document": dict(found.file.document)}
+
+
+def print_search(
+    name: str, found: Any, options: dict[str, Any], formulas: Iterable[tuple[str, Any, str]], count: str = ""
+) -> None:
+    """The result of a search in the form that was asked for.
+
+    `formulas` are the name, the object (`text`, `verdict`, `evidence`) and the origin of each; `count` is a line below
+    them.
+    """
+    if options["as_json"]:
+        print_json(record(name, found))
+    elif options["as_toml"]:
+        click.echo(found.toml_section(), nl=False)
+    elif options["as_latex"]:
+        for label, one, _ in formulas:
+            click.echo(f"{label} = {one.to_json()['latex']}")
+    else:
+        tell(f"{name}: {found.file.name}{scope(found)}")
+        for label, one, origin in formulas:
+            tell(f"{label}\t{one.verdict}\t{formula(one.text)}\n\t{origin}{one.evidence.summary}")
+        if count:
+            tell(count)
+        for text in filter(None, (found.note, found.reason)):
+            tell(f"note\t{text}")

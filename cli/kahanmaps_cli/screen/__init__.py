@@ -1,0 +1,1 @@
+"""Tables, progress, colours and streams: everything that is written for a reader."""

@@ -1,0 +1,196 @@
+"""Talk on standard error: messages, and the progress of long work.
+
+Progress is nothing for the first second, then one line redrawn on a terminal, a line now and then elsewhere. Nobody
+has to listen: a standard error that cannot be written to changes neither the work nor its exit status.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from itertools import pairwise
+from threading import Event, RLock, Thread
+from types import TracebackType
+from typing import Self
+
+import click
+
+from kahanmaps.errors import printable
+
+_FIRST_TOLD = 16  # step; what the first ones take says nothing
+_SHORTEST = 0.01  # seconds that are measured well
+_CENTURIES = 22.0  # a growth of the time, as a logarithm, that nobody waits for
+
+
+def say(message: str) -> None:
+    """Print a message, with nothing in it that a terminal would obey; a terminal gets lines broken at words."""
+    text = printable(message)
+    with suppress(OSError):
+        click.echo(_fitted(text) if sys.stderr.isatty() else text, err=True)
+
+
+def as_typed(words: Iterable[str]) -> str:
+    """The words of a command as one would type them, on one line of UTF-8."""
+    return " ".join(map(_typed, words))
+
+
+def _typed(word: str) -> str:
+    """A word as a shell reads it; what cannot be printed is spelt out, such as bytes that are not UTF-8."""
+    if word.isprintable():
+        return shlex.quote(word)
+    spelt = "".join(chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
+    return f"$'{spelt}'"
+
+
+class Progress:
+    """Call it with a sentence as often as you like inside a `with` block, whose end clears the line.
+
+    On a terminal the clock behind the last sentence moves by itself, for a step may take minutes.
+    """
+
+    def __init__(self, quiet: bool = False) -> None:
+        self.quiet = quiet
+        self._terminal = sys.stderr.isatty()
+        self._start = self._last = time.monotonic()
+        self._shown = 0
+        self._sentence = ""
+        self._drawing = RLock()  # a signal may come while it is held
+        self._ended = Event()
+
+    def __call__(self, sentence: str) -> None:
+        self._sentence = sentence
+        now = time.monotonic()
+        if self.quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
+            return
+        self._last = now
+        self._draw(now)
+
+    def _draw(self, now: float) -> None:
+        text = f"{printable(self._sentence)} ({now - self._start:.0f} s)"
+        if not self._terminal:
+            _write(text + "\n")
+            return
+        with self._drawing:
+            text = text[: _width() - 1]
+            _write("\r" + text.ljust(self._shown))
+            self._shown = len(text)
+
+    def _tick(self) -> None:
+        while not self._ended.wait(1):
+            if self._sentence:
+                self._draw(time.monotonic())
+
+    def clear(self) -> None:
+        """Take the line away from a terminal, until the next sentence."""
+        with self._drawing:
+            self._sentence = ""
+            if self._shown:
+                _write("\r" + " " * self._shown + "\r")
+                self._shown = 0
+
+    def __enter__(self) -> Self:
+        if self._terminal and not self.quiet:
+            Thread(target=self._tick, daemon=True).start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self.clear()
+
+
+class TimeLeft:
+    """How long steps still take that become dearer.
+
+    What n of them took grew like a power of n, from n/2 to n: heights that grow like n^2 make it a power between 3 and
+    4. Where each of the last three steps made the time longer by two fifths it grows exponentially. Else the time is a
+    lower bound.
+
+    >>> clock = iter([0.0, 1.0, 8.0])
+    >>> left = TimeLeft(64, lambda: next(clock))
+    >>> left(16), left(32)
+    ('', ', at least 56 s left')
+    >>> clock = iter([0.0, 0.25, 0.5, 1.0, 2.0])
+    >>> left = TimeLeft(12, lambda: next(clock))
+    >>> [left(step) for step in (5, 6, 7, 8)][-1]
+    ', at least 30 s left'
+    """
+
+    def __init__(self, steps: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._steps, self._clock = steps, clock
+        self._start = clock()
+        self._before, self._last = (0, 0.0), (0, 0.0)
+        self._recent: list[tuple[int, float]] = []
+
+    def __call__(self, step: int) -> str:
+        """Words for behind the sentence of progress; empty where it is too early to tell."""
+        spent = self._clock() - self._start
+        self._recent = [*self._recent[-3:], (step, spent)]
+        if step >= 2 * self._last[0] and step >= _FIRST_TOLD:
+            self._before, self._last = self._last, (step, spent)
+        growth = self._growth(step, spent)
+        if growth is None or step >= self._steps:
+            return ""
+        seconds = spent * math.expm1(min(growth, _CENTURIES))
+        return f", at least {duration(seconds) if growth < _CENTURIES else 'centuries'} left"
+
+    def _growth(self, step: int, spent: float) -> float | None:
+        """The logarithm of how much longer all steps take than those up to this one; None if it is too early."""
+        (first, began), *later = self._recent
+        if len(later) == 3 and began > _SHORTEST and all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent)):
+            return math.log(spent / began) * (self._steps - step) / (step - first)
+        n, t = self._before
+        if step < _FIRST_TOLD or t <= 0 or spent <= t:
+            return None
+        return max(1.0, math.log(spent / t) / math.log(step / n)) * math.log(self._steps / step)
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 8 s, 3 min, 2 h 5 min, 3 d 3 h.
+
+    >>> duration(8.2), duration(200), duration(7500), duration(273_000)
+    ('8 s', '3 min 20 s', '2 h 5 min', '3 d 3 h')
+    """
+    whole = round(seconds)
+    parts = [(whole // 86400, "d"), (whole // 3600 % 24, "h"), (whole // 60 % 60, "min"), (whole % 60, "s")]
+    first = next((k for k, (number, _) in enumerate(parts) if number), 3)
+    return " ".join(f"{number} {unit}" for number, unit in parts[first : first + 2] if number) or "0 s"
+
+
+def _width() -> int:
+    """Columns of the terminal below standard error: a longer line could not be drawn again."""
+    try:
+        return max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
+    except (OSError, ValueError):
+        return 80
+
+
+def _fitted(text: str) -> str:
+    """The text in lines that fit the terminal; but a caret and the line above it stay, or it would point elsewhere, and
+    so do commands that are to be copied.
+    """
+    from kahanmaps_cli.screen.terminal import wrapped
+
+    lines = text.split("\n")
+    found = []
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        is_command = ": kahanmaps " in line and not line.startswith("Usage: ")
+        if len(line) <= _width() or is_command or "^" in (line.strip(), below.strip()):
+            found.append(line)
+        else:
+            words = line.lstrip()
+            margin = " " * (len(line) - len(words))
+            found += wrapped(words, _width(), margin, margin + "  ")
+    return "\n".join(found)
+
+
+def _write(text: str) -> None:
+    with suppress(OSError):
+        sys.stderr.write(text)
+        sys.stderr.flush()

@@ -1,0 +1,96 @@
+"""Parameters with ranges of values: -p a=-2..2 or -p a=-2..2:1/4, all combinations of them, and tables over these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import Any
+
+import click
+
+from kahanmaps.errors import KahanmapsError
+from kahanmaps_cli import library as lib
+from kahanmaps_cli.options import load_system
+from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.render import print_json
+from kahanmaps_cli.screen.terminal import tell
+
+_MOST = 10_000
+
+Row = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What was found for one combination of values: in a line, as JSON, all of it, and why it is not decided."""
+
+    line: str
+    record: Callable[[], dict[str, Any]]
+    show: Callable[[], None]
+    undecided: str = ""
+
+
+def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, Progress], Cell]) -> int:
+    """A line for each combination of values, without a range all that was found; in JSON a record each.
+
+    A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
+    raised. Returns the exit status.
+    """
+    quiet = options["quiet"]
+    rows = rows_of(options["parameters"], system)
+    if rows is None:
+        file = load_system(system, options)
+        with Progress(quiet) as progress:
+            cell = found(file, progress)
+        if options["as_json"]:
+            print_json(cell.record())
+        else:
+            cell.show()
+        if cell.undecided and not quiet:
+            say(cell.undecided)
+        return 3 if cell.undecided else 0
+    done, refused = 0, list[tuple[str, KahanmapsError]]()
+    for row in rows:
+        name = ", ".join(f"{name} = {value}" for name, value in row)
+        try:
+            file = load_system(system, {**options, "parameters": row})
+            with Progress(quiet) as progress:
+                cell = found(file, progress)
+        except KahanmapsError as error:
+            refused.append((name, error))
+            continue
+        if options["as_json"]:
+            print_json(cell.record())
+        else:
+            tell(f"{name}\t{cell.line}")
+        done += not cell.undecided
+    if len(refused) == len(rows):
+        raise refused[0][1]
+    for name, reason in refused:
+        say(f"{name}: {reason}")
+    if done < len(rows) and not quiet:
+        say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
+    return 0 if done == len(rows) else 3
+
+
+def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:
+    """The parameters for each combination of values, the last range running fastest; None without a range."""
+    if not any(lib.is_range(value) for _, value in parameters):
+        return None
+    if system == "-":
+        raise click.UsageError("found a range of values and the system on standard input: write it to a file")
+    axes: list[Sequence[Any]] = []
+    for _, value in parameters:
+        text, colon, step = value.partition(":")
+        axes.append(
+            lib.RationalRange.from_text(f"{text} step {step}" if colon else text) if lib.is_range(value) else [value]
+        )
+    if (size := prod(map(len, axes))) > _MOST:
+        raise click.UsageError(f"found {size} combinations of values, expected at most {_MOST}")
+    names = [name for name, _ in parameters]
+    return [
+        tuple((name, x if isinstance(x, str) else lib.format_number(x)) for name, x in zip(names, row, strict=True))
+        for row in product(*axes)
+    ]

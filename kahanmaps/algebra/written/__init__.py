@@ -1,0 +1,1 @@
+"""Expressions, numbers and polynomials as people write them."""

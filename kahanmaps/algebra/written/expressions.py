@@ -1,0 +1,532 @@
+"""Expressions in text to polynomials: how they are read, what is wrong in them, and arithmetic that refuses in time.
+
+Values are built from the bottom up while the text is read; no tree is kept and nothing is run as code. (Python's own
+`ast` gives up at sums of some thousand terms, and at integers of 4300 digits.) A value is a number, or a quotient of
+two polynomials. FLINT ends the process when memory runs out and does not see Ctrl-C, so the size of every result is
+bounded, and if need be refused, before FLINT is called; `Limits.words` bounds what all of them take together.
+
+Use `kahanmaps.algebra.written.text`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar, cast
+
+from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
+
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.written.numerals import BLANKS, Limits, is_name, number_in
+from kahanmaps.errors import ExpressionError, UnknownName, quoted
+
+_TOKEN = re.compile(
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*)|\*\*|[-+*/^()]"
+)
+_END = "end"
+
+_WRITE = {
+    "\u2212": "write the minus sign as -",
+    "\u2013": "write the minus sign as -",
+    "\u00b7": "write a product as x*y",
+    "\u00d7": "write a product as x*y",
+    "\u22c5": "write a product as x*y",
+    "\u00f7": "write a quotient as x/y",
+    "\u00b2": "write the power as ^2",
+    "\u00b3": "write the power as ^3",
+    "[": "write brackets as ( )",
+    "]": "write brackets as ( )",
+    "{": "write brackets as ( )",
+    "}": "write brackets as ( )",
+    "=": "give one expression, not an equation",
+    ",": "give one expression, and decimals with a point",
+}
+
+_OPERAND = "expected a number, a name or '('"
+_BRACKET = re.compile(r"[()]")
+
+
+class _Polynomial(NamedTuple):
+    """A polynomial of known size: `scale` times it has integer coefficients, of size at most 2**bits.
+
+    FLINT keeps one common denominator for all coefficients, so this is also the size that FLINT works with.
+    """
+
+    value: fmpq_mpoly
+    scale: fmpz
+    bits: int
+
+
+class _Quotient(NamedTuple):
+    """above/below; below has degree at least 1 and leading coefficient 1, or is None for 1."""
+
+    above: _Polynomial
+    below: _Polynomial | None
+
+
+_Value = fmpq | _Quotient
+_T = TypeVar("_T")
+
+
+def read_polynomial(text: str, ring: fmpq_mpoly_ctx, constants: Mapping[str, fmpq], limits: Limits) -> fmpq_mpoly:
+    """See `parse_polynomial`."""
+    work = _Arithmetic(text, ring, constants, limits, quotients=False)
+    return work.polynomial(_parse(work)).value
+
+
+def read_rational_function(
+    text: str, ring: fmpq_mpoly_ctx, constants: Mapping[str, fmpq], limits: Limits
+) -> RationalFunction:
+    """See `parse_rational_function`."""
+    work = _Arithmetic(text, ring, constants, limits, quotients=True)
+    value = _parse(work)
+    if isinstance(value, fmpq) or value.below is None or value.above.value.is_zero():
+        return RationalFunction(work.polynomial(value).value, ring.constant(1))
+    # Integer coefficients below, or bringing it to normal form would cost one lcm for each of them.
+    scale = value.below.scale
+    return RationalFunction(value.above.value * scale, value.below.value * scale)
+
+
+def read_constant(text: str, constants: Mapping[str, fmpq], limits: Limits) -> fmpq:
+    """See `parse_constant`."""
+    # There are no variables, hence no quotients of polynomials.
+    return cast(fmpq, _parse(_Arithmetic(text, None, constants, limits, quotients=False)))
+
+
+class Token(str):
+    """A piece of the text, and where it starts; `kind` is number, name, itself for a mark, or end."""
+
+    kind: str
+    start_pos: int
+
+    def __new__(cls, text: str, kind: str, start_pos: int) -> Token:
+        token = super().__new__(cls, text)
+        token.kind, token.start_pos = kind, start_pos
+        return token
+
+
+def _tokens(text: str) -> Iterator[Token]:
+    """The pieces of the text as they are asked for, so that the first mistake is the one that is told."""
+    column = 0
+    while column < len(text):
+        if text[column] in BLANKS:
+            column += 1
+            continue
+        match = _TOKEN.match(text, column)
+        if match is None:
+            hint = _WRITE.get(text[column], "use numbers, names and + - * / ^ ( )")
+            raise ExpressionError(f"found the character {_describe(text[column])}, {hint}", text, column)
+        yield Token(match[0], match.lastgroup or match[0], column)
+        column = match.end()
+    yield Token("", _END, len(text))
+
+
+def _parse(work: _Arithmetic) -> _Value:
+    """The value of the text, or `ExpressionError`."""
+    _check_shape(work.text, work.limits)
+    reader = _Reader(work)
+    value = reader.sum()
+    if reader.next.kind != _END:
+        raise _syntax_error(reader.next, work)
+    return value
+
+
+class _Reader:
+    """A sum of products of powers, read from the left.
+
+    Signs are below powers, so that -x^2 is -(x^2), and powers go from the right, so that 2^3^2 is 2^9. Brackets alone
+    are read by recursion, and their depth is limited.
+    """
+
+    def __init__(self, work: _Arithmetic) -> None:
+        self.work = work
+        self.tokens = _tokens(work.text)
+        self.next = next(self.tokens)
+
+    def take(self) -> Token:
+        token, self.next = self.next, next(self.tokens, self.next)
+        return token
+
+    def sum(self) -> _Value:
+        pieces: list[Any] = [self.product()]
+        while self.next.kind in ("+", "-"):
+            pieces += [self.take(), self.product()]
+        return self.work.sum(pieces) if len(pieces) > 1 else cast(_Value, pieces[0])
+
+    def product(self) -> _Value:
+        pieces: list[Any] = [self.power()]
+        while self.next.kind in ("*", "/"):
+            pieces += [self.take(), self.power()]
+        return self.work.product(pieces) if len(pieces) > 1 else cast(_Value, pieces[0])
+
+    def power(self) -> _Value:
+        bases = []
+        signs, value = self.signs(), self.atom()
+        while self.next.kind in ("^", "**"):
+            bases.append((signs, value, self.take()))
+            signs, value = self.signs(), self.atom()
+        value = self.work.negated(signs, value)
+        for signs, base, operator in reversed(bases):
+            value = self.work.negated(signs, self.work.power(base, operator, value))
+        return value
+
+    def signs(self) -> list[Token]:
+        found = []
+        while self.next.kind in ("+", "-"):
+            found.append(self.take())
+        return found
+
+    def atom(self) -> _Value:
+        token = self.take()
+        if token.kind == "(":
+            value = self.sum()
+            closing = self.take()
+            if closing.kind != ")":
+                raise _syntax_error(closing, self.work)
+            return value
+        if token.kind not in ("number", "name"):
+            raise _syntax_error(token, self.work)
+        if self.next.kind in ("number", "name", "("):  # before the name is looked up: sin(x) is a call
+            raise _syntax_error(self.next, self.work)
+        return self.work.number(token) if token.kind == "number" else self.work.name(token)
+
+
+def _check_shape(text: str, limits: Limits) -> None:
+    """Length and brackets, before anything else looks at the text."""
+    if len(text) > limits.characters:
+        raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
+    if not text.strip(BLANKS):
+        raise ExpressionError("found nothing, expected an expression such as x^2/2 - y", text)
+    opened: list[int] = []
+    for match in _BRACKET.finditer(text):
+        column = match.start()
+        if match[0] == ")":
+            if not opened:
+                raise ExpressionError("found ')' without its '(', expected brackets in pairs", text, column)
+            opened.pop()
+        else:
+            opened.append(column)
+            if len(opened) > limits.depth:
+                raise ExpressionError(f"found brackets nested more than {limits.depth} deep: simplify", text, column)
+    if opened:
+        raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, opened[-1])
+
+
+def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
+    """What could not be read, in words: a token that cannot stand where it does."""
+    text = work.text
+    if token.kind == _END:
+        return ExpressionError(f"found the end of the text, {_OPERAND}", text, len(text))
+    column = token.start_pos
+    before = text[:column].rstrip(BLANKS)
+    if token.kind not in ("name", "number", "(") or not before or before[-1] in "+-*/^(":
+        return ExpressionError(f"found {quoted(token)}, {_OPERAND}", text, column)
+    start = len(before) - 1
+    while start > 0 and (before[start - 1].isalnum() or before[start - 1] in "_.") and before[-1] != ")":
+        start -= 1
+    left = before[start:]
+    if token.kind == "(" and is_name(left) and left not in work.names:
+        call = f"found {quoted(left + '(')}, which looks like a function call"
+        return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
+    example = f"{left}*{token}" if len(left) + len(token) < 40 else "x*y"
+    found = f"found {quoted(token)} right after {quoted(left)}"
+    return ExpressionError(f"{found}, expected an operator between them: write {example}", text, column)
+
+
+def _describe(character: str) -> str:
+    if character.isascii() and character.isprintable():
+        return repr(character)
+    name = unicodedata.name(character, "")
+    return f"U+{ord(character):04X} {name}".rstrip()
+
+
+class _Arithmetic:
+    """The operations of one expression, each refused where it would pass a limit.
+
+    `pieces` are operands with the tokens of the operators between them.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        ring: fmpq_mpoly_ctx | None,
+        constants: Mapping[str, fmpq],
+        limits: Limits,
+        quotients: bool,
+    ) -> None:
+        self.text = text
+        self.ring = ring
+        self.limits = limits
+        self.quotients = quotients
+        self.words_left = limits.words
+        self.max_bits = limits.digits * 3322 // 1000 + 1
+        self.names: dict[str, _Value] = dict(constants)
+        if ring is not None:
+            self.one = self.polynomial(fmpq(1))
+            for name, variable in zip(ring.names(), ring.gens(), strict=True):
+                self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0), None)
+
+    def number(self, token: Token) -> _Value:
+        start = token.start_pos
+        value = number_in(self.text, start, start + len(token), self.limits.digits, self.limits)
+        self.spend(1, value.height_bits(), start)
+        return value
+
+    def name(self, token: Token) -> _Value:
+        value = self.names.get(token)
+        if value is None:
+            raise self.unknown(str(token), token.start_pos)
+        return self.checked(value, token.start_pos) if isinstance(value, fmpq) else value
+
+    def sum(self, pieces: list[Any]) -> _Value:
+        column = pieces[1].start_pos
+        numbers: list[fmpq] = []
+        polynomials: list[_Polynomial] = []
+        # Terms over one denominator come together before anything is multiplied out: a/d + b/d = (a + b)/d.
+        fractions: list[tuple[_Polynomial, list[_Polynomial]]] = []
+        for i in range(0, len(pieces), 2):
+            value: _Value = pieces[i]
+            if i and pieces[i - 1] == "-":
+                value = self.negative(value, pieces[i - 1].start_pos)
+            if isinstance(value, fmpq):
+                numbers.append(value)
+            elif value.below is None:
+                polynomials.append(value.above)
+            else:
+                for below, terms in fractions:
+                    if below.value == value.below.value:
+                        terms.append(value.above)
+                        break
+                else:
+                    fractions.append((value.below, [value.above]))
+                    degree = sum(int(below.value.total_degree()) for below, _ in fractions)
+                    self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
+
+        def add(left: _Polynomial, right: _Polynomial) -> _Polynomial:
+            return self.add(left, right, column)
+
+        number = _total(numbers, lambda left, right: self.add_numbers(left, right, column)) if numbers else fmpq(0)
+        if not polynomials and not fractions:
+            return number
+        if number != 0:
+            polynomials.append(self.polynomial(number))
+        if not fractions:
+            return _Quotient(_total(polynomials, add), None)
+        common, above = fractions[0][0], _total(fractions[0][1], add)
+        for below, terms in fractions[1:]:
+            crossed = self.times(_total(terms, add), common, column)
+            above = add(self.times(above, below, column), crossed)
+            common = self.times(common, below, column)
+        if polynomials:
+            above = add(above, self.times(_total(polynomials, add), common, column))
+        return _Quotient(above, common)
+
+    def product(self, pieces: list[Any]) -> _Value:
+        numbers: list[fmpq] = []
+        above: _Polynomial | None = None
+        below: _Polynomial | None = None
+        for i in range(0, len(pieces), 2):
+            value: _Value = pieces[i]
+            column = pieces[max(i - 1, 1)].start_pos
+            if i and pieces[i - 1] == "/":
+                value = self.reciprocal(value, column)
+            if isinstance(value, fmpq):
+                numbers.append(value)
+                continue
+            above = value.above if above is None else self.times(above, value.above, column)
+            if value.below is not None:
+                below = value.below if below is None else self.times(below, value.below, column)
+        column = pieces[1].start_pos
+        number = _total(numbers, lambda left, right: self.times_numbers(left, right, column)) if numbers else fmpq(1)
+        return number if above is None else _Quotient(self.scaled(above, number, column), below)
+
+    def negated(self, signs: list[Token], value: _Value) -> _Value:
+        minus = sum(sign == "-" for sign in signs) % 2
+        return self.negative(value, signs[0].start_pos) if minus else value
+
+    def power(self, base: _Value, operator: Token, power: _Value) -> _Value:
+        column = operator.start_pos
+        exponent = _constant(power)
+        if exponent is None:
+            raise self.refusal("found an exponent with variables in it, expected an integer", column)
+        if exponent.q != 1 or abs(exponent.p) > self.limits.exponent:
+            found = f"found the exponent {_show(exponent)}"
+            raise self.refusal(f"{found}, expected an integer of size at most {self.limits.exponent}", column)
+        n = int(exponent.p)
+        number = _constant(base)
+        if n < 0:
+            base, n = self.reciprocal(base, column), -n
+            number = _constant(base)
+        if number is not None:
+            bits = number.height_bits() * n
+            self.check_bits(bits, column)
+            self.spend(1, bits, column)
+            return number**n
+        if n == 0:
+            return fmpq(1)
+        above, below = cast(_Quotient, base)
+        return _Quotient(self.repeated(above, n, column), None if below is None else self.repeated(below, n, column))
+
+    def reciprocal(self, value: _Value, column: int) -> _Value:
+        number = _constant(value)
+        if number is not None:
+            if number == 0:
+                raise self.refusal("found a division by 0", column)
+            return 1 / number
+        above, below = cast(_Quotient, value)
+        if not self.quotients:
+            raise self.refusal("found a division by something with variables in it, expected a polynomial", column)
+        below = below or self.one
+        leading = above.value.leading_coefficient()
+        if above.value.is_constant():
+            return _Quotient(self.scaled(below, 1 / leading, column), None)
+        if leading == 1:
+            return _Quotient(below, above)
+        # Leading coefficient 1, so that denominators which differ by a constant are seen to be the same.
+        self.spend(len(above.value), above.bits, column)
+        monic = _Polynomial(above.value / leading, abs((leading * above.scale).p), above.bits)
+        return _Quotient(self.scaled(below, 1 / leading, column), monic)
+
+    def negative(self, value: _Value, column: int) -> _Value:
+        if isinstance(value, fmpq):
+            return -value
+        return _Quotient(self.scaled(value.above, fmpq(-1), column), value.below)
+
+    # Arithmetic of numbers and polynomials: estimate, refuse or compute.
+
+    def add_numbers(self, left: fmpq, right: fmpq, column: int) -> fmpq:
+        self.spend(1, max(left.height_bits(), right.height_bits()), column)
+        return self.checked(left + right, column)
+
+    def times_numbers(self, left: fmpq, right: fmpq, column: int) -> fmpq:
+        self.spend(1, left.height_bits() + right.height_bits(), column)
+        return self.checked(left * right, column)
+
+    def polynomial(self, value: _Value) -> _Polynomial:
+        """The numerator of a value, as a polynomial even if it is a number."""
+        if isinstance(value, _Quotient):
+            return value.above
+        return _Polynomial(cast(fmpq_mpoly_ctx, self.ring).constant(value), value.q, _bits(value.p))
+
+    def add(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
+        scale = left.scale
+        bits = max(left.bits, right.bits) + 1
+        if left.scale != right.scale:
+            scale = left.scale.lcm(right.scale)
+            size = _bits(scale)
+            bits = 2 + max(side.bits + size - side.scale.bit_length() for side in (left, right))
+            self.check_bits(size, column)
+        self.check_bits(bits, column)
+        self.spend(len(left.value) + len(right.value), bits, column)
+        return self.counted(left.value + right.value, scale, bits, column)
+
+    def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
+        if right is self.one:
+            return left
+        self.check_degree(int(left.value.total_degree()) + int(right.value.total_degree()), "a product", column)
+        pairs = len(left.value) * len(right.value)
+        bits = left.bits + right.bits + (max(1, min(len(left.value), len(right.value))) - 1).bit_length()
+        self.check_bits(max(bits, _bits(left.scale) + _bits(right.scale)), column)
+        bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
+        if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
+            found = f"found a product of polynomials with {len(left.value)} and {len(right.value)} terms"
+            raise self.refusal(f"{found}, which is too large to expand", column)
+        self.spend(pairs, bits_of_pair, column)
+        return self.counted(left.value * right.value, left.scale * right.scale, bits, column)
+
+    def scaled(self, value: _Polynomial, number: fmpq, column: int) -> _Polynomial:
+        if number == 1:
+            return value
+        bits = value.bits + _bits(number.p)
+        self.check_bits(max(bits, _bits(value.scale) + _bits(number.q)), column)
+        self.spend(len(value.value), bits, column)
+        return _Polynomial(value.value * number, value.scale * number.q, bits)
+
+    def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
+        """The n-th power by squaring, each product checked; n is positive."""
+        self.check_degree(int(value.value.total_degree()) * n, "a power", column)
+        if len(value.value) == 1:
+            bits = value.bits * n
+            self.check_bits(max(bits, _bits(value.scale) * n), column)
+            self.spend(1, bits, column)
+            return _Polynomial(value.value**n, value.scale**n, bits)
+        result = value
+        for digit in f"{n:b}"[1:]:
+            result = self.times(result, result, column)
+            if digit == "1":
+                result = self.times(result, value, column)
+        return result
+
+    # Refusals
+
+    def checked(self, number: fmpq, column: int) -> fmpq:
+        self.check_bits(number.height_bits(), column)
+        return number
+
+    def counted(self, value: fmpq_mpoly, scale: fmpz, bits: int, column: int) -> _Polynomial:
+        if len(value) > self.limits.terms:
+            found = f"found a polynomial of {len(value)} terms"
+            raise self.refusal(f"{found}, expected at most {self.limits.terms}", column)
+        return _Polynomial(value, scale, bits)
+
+    def check_bits(self, bits: int, column: int) -> None:
+        if bits > self.max_bits:
+            found = f"found a number of about {bits * 1000 // 3322} digits"
+            raise self.refusal(f"{found}, expected at most {self.limits.digits}", column)
+
+    def check_degree(self, degree: int, what: str, column: int) -> None:
+        if degree > self.limits.degree:
+            raise self.refusal(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
+
+    def spend(self, terms: int, bits: int, column: int) -> None:
+        """Count the machine words of so many terms with coefficients of so many bits."""
+        self.words_left -= terms * (bits // 64 + 1)
+        if self.words_left < 0:
+            raise self.refusal("found an expression that takes too much work to expand: simplify or split it", column)
+
+    def refusal(self, message: str, column: int) -> ExpressionError:
+        return ExpressionError(message, self.text, column)
+
+    def unknown(self, name: str, column: int | None) -> UnknownName:
+        known = list(self.names)
+        if not known:
+            return UnknownName(f"found the name {quoted(name)}, expected numbers only", self.text, column)
+        meant = ""
+        if len(name) <= 40:  # the search for a look-alike is quadratic
+            folded = {other.lower(): other for other in known}
+            meant = "".join(folded[other] for other in difflib.get_close_matches(name.lower(), folded, 1, 0.7))
+            products = (f"{name[:i]}*{name[i:]}" for i in range(1, len(name)) if {name[:i], name[i:]} <= set(known))
+            meant = next(products, meant)
+        hint = f"did you mean {meant}? " if meant else ""
+        listed = ", ".join(known[:30]) + (", ..." if len(known) > 30 else "")
+        return UnknownName(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
+
+
+def _total(values: list[_T], add: Callable[[_T, _T], _T]) -> _T:
+    """The sum, by halves: adding one by one would copy the growing sum once for each term."""
+    while len(values) > 1:
+        odd = values[-1:] if len(values) % 2 else []
+        values = [add(left, right) for left, right in zip(values[::2], values[1::2], strict=False)] + odd
+    return values[0]
+
+
+def _constant(value: _Value) -> fmpq | None:
+    """The number that a value is, or None where variables are left in it."""
+    if isinstance(value, fmpq):
+        return value
+    if value.above.value.is_zero():
+        return fmpq(0)
+    if value.below is None and value.above.value.is_constant():
+        return value.above.value.leading_coefficient()
+    return None
+
+
+def _bits(integer: fmpz) -> int:
+    """The least b >= 0 with |integer| <= 2**b: 0 for 1 and -1, so that a product by them does not grow."""
+    return int((abs(integer) - 1).bit_length()) if integer else 0
+
+
+def _show(number: fmpq) -> str:
+    return str(number) if number.height_bits() < 100 else f"of about {number.height_bits() * 1000 // 3322} digits"

@@ -1,0 +1,1 @@
+"""Records of experiments: stored, merged, summed up, written for other programs."""

@@ -1,0 +1,359 @@
+"""Results written out: JSON lines with all that is known, CSV and Parquet with one column for every entry.
+
+JSON lines lose nothing. A table has one cell for a value, so dicts become several columns (heights.max), lists JSON
+text, and neither None nor what is absent is told from an empty cell. Its columns, in this order:
+
+    experiment number key task      always
+    document m seed parameters.a    the parts of the recipe of the system, those of a family by their own names
+    eps steps                       options
+    outcome verdict                 always; a missing task has no outcome
+    dimension heights.max           entries of the result
+    message                         always
+    seconds peak_memory host finished   unless the export is to be stable
+
+A name belongs to the first of these that has it: the columns that are always there, options, the recipe, the result.
+Whoever comes later is called option.seed, family.seed (system.document) or result.seed, in all rows of the export.
+
+A stable export leaves out what depends on where, when and how the work was done, so that two exports of the same work
+are the same bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from fractions import Fraction
+from importlib import import_module
+from io import StringIO
+from typing import IO, Any, NamedTuple
+
+from kahanmaps.errors import InputError, quoted
+from kahanmaps.experiments.results.records import Row, encodable
+from kahanmaps.version import __version__
+from kahanmaps.whole_files import whole_file
+
+BEFORE = ("experiment", "number", "key", "task")
+BETWEEN = ("outcome", "verdict")
+AFTER = ("message",)
+OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # with stderr and versions: not in a stable export
+RESERVED = frozenset((*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN, "system", "options", "result", "stderr", "versions"))
+
+# An integer, p/q or a decimal. The bound on the exponent keeps 1e999999999 from filling the memory of who reads it.
+NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)")
+# What a spreadsheet would run. An apostrophe in front makes it text; since texts that begin with apostrophes and then
+# so get one more, taking one away leads back to what was there.
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
+
+_ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
+_ROW_GROUP = 10_000
+_CHARACTERS = 50_000_000  # of one row group: long lists would otherwise add up to gigabytes
+
+
+class Entry(NamedTuple):
+    """Where a value stands: in the "system", among the "option"s or in the "result", and the keys that lead to it."""
+
+    section: str
+    path: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """What it is called where nobody else has that name.
+
+        >>> Entry("system", ("family", "m")).name, Entry("system", ("parameters", "a")).name
+        ('m', 'parameters.a')
+        """
+        return ".".join(self.path[self._of_family :])
+
+    @property
+    def full_name(self) -> str:
+        """What it is called otherwise.
+
+        >>> Entry("system", ("family", "m")).full_name, Entry("option", ("eps",)).full_name
+        ('family.m', 'option.eps')
+        """
+        return ("family" if self._of_family else self.section) + "." + self.name
+
+    @property
+    def _of_family(self) -> bool:
+        return self.section == "system" and self.path[0] == "family" and len(self.path) > 1
+
+
+def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The entries of nested dicts, each with the keys that lead to it; lists are left whole.
+
+    >>> list(flatten({"a": 1, "b": {"c": [2, 3]}}))
+    [(('a',), 1), (('b', 'c'), [2, 3])]
+    """
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            yield from flatten(value, (*path, key))
+        else:
+            yield (*path, key), value
+
+
+def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
+    """The parts of the recipe, the options and the entries of the result of a row."""
+    result = row.record.result if row.record is not None else None
+    for section, data in (("system", row.task.system), ("option", row.task.options), ("result", result)):
+        for path, value in flatten(data or {}):
+            yield Entry(section, path), value
+
+
+def names_of(found: Iterable[Entry]) -> dict[Entry, str]:
+    """One name for each entry, different from all others: the rule is at the top of this file.
+
+    >>> names_of([Entry("result", ("seed",)), Entry("option", ("seed",)), Entry("option", ("verdict",))])
+    ... # doctest: +NORMALIZE_WHITESPACE
+    {Entry(section='option', path=('seed',)): 'seed',
+     Entry(section='option', path=('verdict',)): 'option.verdict',
+     Entry(section='result', path=('seed',)): 'result.seed'}
+    """
+    taken = set(RESERVED)
+    names = {}
+    for entry in sorted(found, key=lambda entry: (("option", "system", "result").index(entry.section), entry.path)):
+        name = entry.name
+        if name in taken:
+            name = entry.full_name
+        while name in taken:  # {"a": {"b": 1}, "a.b": 2}, or a result that is called result.seed
+            name = f"{entry.section}.{name}"
+        taken.add(name)
+        names[entry] = name
+    return names
+
+
+def plain(value: Any) -> str:
+    """A value as text: integers and texts as they are, nothing for None, lists as JSON.
+
+    >>> [plain(value) for value in (None, True, 10**20, 0.1, "7/3", [1, 8])]
+    ['', 'true', '100000000000000000000', '0.1', '7/3', '[1, 8]']
+    """
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return encodable(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    return _json(value)
+
+
+def cell(value: Any) -> str:
+    """The text of a value in a CSV file: texts that a spreadsheet would run get an apostrophe, numbers never do.
+
+    >>> [cell(value) for value in (-3, "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
+    ['-3', '-1/2', "'=HYPERLINK(1)", "'-x", "''-x"]
+    """
+    text = plain(value)
+    if isinstance(value, str) and _FORMULA.match(text) and not NUMBER.fullmatch(text):
+        return "'" + text
+    return text
+
+
+def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -> None:
+    """Write one JSON object a line: a header, a result for every row, an end that counts them.
+
+    What is not known of a missing task is null. Dicts inside a line are sorted by their keys.
+    """
+    from kahanmaps.maps.convention import CONVENTION  # loads FLINT: not before something is written
+
+    header = {"record": "header"} if stable else {"record": "header", "version": __version__}
+    stream.write(_line({**header, "convention": CONVENTION}))
+    count = 0
+    for row in rows:
+        stream.write(_line(_result(row, stable)))
+        count += 1
+    stream.write(_line({"record": "end", "results": count}))
+
+
+def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: bool = False) -> None:
+    """Write a table below a row of names. `rows` is called twice: for the columns, of which only names are kept, then
+    for the values. Open files with newline="", or "\\n" becomes what the machine likes.
+    """
+    layout = _Layout(rows(), stable)
+    stream.write(_csv_line(layout.names))
+    for row in rows():
+        stream.write(_csv_line(layout.values(row)))
+
+
+def _csv_line(values: Iterable[Any]) -> str:
+    # The csv module may quote only those line ends that are in its terminator: with both of them there, no cell can
+    # break a line, whatever the version of Python.
+    line = StringIO(newline="")
+    csv.writer(line, lineterminator="\r\n").writerow([cell(value) for value in values])
+    return line.getvalue().removesuffix("\r\n") + "\n"
+
+
+def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:
+    """Write the same table as Parquet, which needs pyarrow. `rows` is called twice, and the file replaces `path` when
+    it is complete.
+
+    A column is int64, bool or float64 if all of its values are, and text otherwise. Integers next to floats count as
+    floats up to 2^53, so that no digit is lost. Beside a column NAME of text whose values are all exact numbers such as
+    7/3 there is NAME.number with the nearest doubles. "Same bytes" takes the same version of pyarrow too.
+    """
+    try:
+        arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ModuleNotFoundError as error:
+        raise InputError("Parquet files need pyarrow, which is not installed: pip install pyarrow") from error
+    from kahanmaps.maps.convention import CONVENTION
+
+    layout = _Layout(rows(), stable)
+    types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}
+    metadata = {"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__}
+    fields = [arrow.field(plain(name), types[kind]) for name, kind in zip(layout.names, layout.types, strict=True)]
+    beside = [place for place, is_number in enumerate(layout.numbers) if is_number]
+    fields += [arrow.field(f"{plain(layout.names[place])}.number", types["float64"]) for place in beside]
+    schema = arrow.schema(fields, metadata=metadata)
+    with whole_file(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
+        for columns in _row_groups(layout, rows()):
+            columns += [list(map(_double, columns[place])) for place in beside]
+            arrays = [arrow.array(values, field.type) for values, field in zip(columns, fields, strict=True)]
+            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema), row_group_size=_ROW_GROUP)
+
+
+class _Layout:
+    """The columns of a table, with the kinds of values that occur in those that are not always there."""
+
+    def __init__(self, rows: Iterable[Row], stable: bool) -> None:
+        """The layout for these rows; they are read, not kept."""
+        kinds: defaultdict[Entry, set[str]] = defaultdict(set)
+        for row in rows:
+            for entry, value in entries(row):
+                kinds[entry].add(_kind(value))
+        called = names_of(kinds)
+        recipe, options, result = (
+            [entry for entry in called if entry.section == section] for section in ("system", "option", "result")
+        )
+        last = AFTER if stable else AFTER + OF_THE_RUN
+        columns: Sequence[str | Entry] = (*BEFORE, *recipe, *options, *BETWEEN, *result, *last)
+        self.names = [called[column] if isinstance(column, Entry) else column for column in columns]
+        self.types = [
+            _type(kinds[column]) if isinstance(column, Entry) else _FIXED.get(column, "string") for column in columns
+        ]
+        self.numbers = [
+            isinstance(column, Entry)
+            and {"number"} <= kinds[column] <= {*_NUMBERS, "none"}
+            and f"{name}.number" not in self.names
+            for column, name in zip(columns, self.names, strict=True)
+        ]
+        self._place = {entry: place for place, entry in enumerate(columns) if isinstance(entry, Entry)}
+        self._fixed = [(place, name) for place, name in enumerate(columns) if isinstance(name, str)]
+
+    def values(self, row: Row) -> list[Any]:
+        """The values of a row, one for each column, None where it has none."""
+        fixed = known(row)
+        values = [None] * len(self.names)
+        for place, name in self._fixed:
+            values[place] = fixed[name]
+        for entry, value in entries(row):
+            if entry not in self._place:
+                raise _changed(row, entry.name)
+            values[self._place[entry]] = value
+        return values
+
+
+# Types of Parquet and the kinds of values that each holds without loss; a column gets the first that will do.
+_HOLDS = {
+    "bool": {"bool", "none"},
+    "int64": {"small", "int64", "none"},
+    "float64": {"small", "float64", "none"},
+    "string": {"bool", "small", "int64", "float64", "number", "text", "none"},
+}
+_LONGEST_NUMBER = 2_000  # characters of a text that gets a double beside it
+_NUMBERS = {"small", "int64", "float64", "number"}
+_FIXED = {"number": "int64", "seconds": "float64", "peak_memory": "int64"}
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, bool):
+        return "bool"
+    if isinstance(value, int):
+        return "small" if abs(value) <= 2**53 else "int64" if -(2**63) <= value < 2**63 else "text"
+    if isinstance(value, float):
+        return "float64"
+    if isinstance(value, str) and len(value) <= _LONGEST_NUMBER and NUMBER.fullmatch(value):
+        return "number"
+    return "none" if value is None else "text"
+
+
+def _double(text: str | None) -> float | None:
+    """The double nearest to an exact number; None where it is beyond their range."""
+    try:
+        return None if not text else float(Fraction(text))
+    except OverflowError:
+        return None
+
+
+def _type(kinds: Set[str]) -> str:
+    """The type of a column of Parquet with values of these kinds.
+
+    >>> [_type(kinds) for kinds in ({"small", "none"}, {"small", "float64"}, {"int64", "float64"}, {"none"})]
+    ['int64', 'float64', 'string', 'string']
+    """
+    if kinds <= {"none"}:
+        return "string"
+    return next(name for name, holds in _HOLDS.items() if kinds <= holds)
+
+
+def _changed(row: Row, name: str) -> InputError:
+    return InputError(
+        f"found the value {quoted(name)} of task {row.number} changed while the table was written: "
+        "export again when nobody works on the batch"
+    )
+
+
+def _row_groups(layout: _Layout, rows: Iterable[Row]) -> Iterator[list[list[Any]]]:
+    """The columns of so many rows at a time, converted to their types."""
+    columns: list[list[Any]] = [[] for _ in layout.names]
+    characters = 0
+    for row in rows:
+        for column, name, kind, value in zip(columns, layout.names, layout.types, layout.values(row), strict=True):
+            if _kind(value) not in _HOLDS[kind]:
+                raise _changed(row, name)
+            if kind == "string" and value is not None:
+                value = plain(value)
+                characters += len(value)
+            elif kind == "float64" and value is not None:
+                value = float(value)
+            column.append(value)
+        if len(columns[0]) == _ROW_GROUP or characters > _CHARACTERS:
+            yield columns
+            columns = [[] for _ in layout.names]
+            characters = 0
+    if columns[0]:
+        yield columns
+
+
+def known(row: Row) -> dict[str, Any]:
+    """What every row has, in the order of JSON lines; of a missing task, None for what its record would say."""
+    task, record = row.task, row.record
+    return {
+        "experiment": row.experiment,
+        "number": row.number,
+        "key": task.key,
+        "task": task.kind,
+        "system": task.system,
+        "options": task.options,
+        "outcome": record and str(record.outcome),
+        **{name: getattr(record, name, None) for name in ("verdict", "result", "message", "stderr")},
+        **{name: getattr(record, name, None) for name in ("seconds", "peak_memory", "host", "versions", "finished")},
+    }
+
+
+def _result(row: Row, stable: bool) -> dict[str, Any]:
+    left_out = {*OF_THE_RUN, "stderr", "versions"} if stable else set()
+    return {"record": "result", **{name: value for name, value in known(row).items() if name not in left_out}}
+
+
+def _line(record: Mapping[str, Any]) -> str:
+    """A line of JSON: the record in its own order, all within it sorted."""
+    return "{" + ", ".join(f"{json.dumps(name)}: {_json(value)}" for name, value in record.items()) + "}\n"
+
+
+def _json(value: Any) -> str:
+    return _ENCODER.encode(value)

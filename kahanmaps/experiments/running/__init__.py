@@ -1,0 +1,1 @@
+"""Running experiments: in this process, in children, on a cluster."""

@@ -1,0 +1,159 @@
+"""Running tasks: jobs in, records out. What becomes of the records is not decided here.
+
+    for record in run("study.toml", jobs=2): ...                 nothing is kept
+    for record in run("study.toml", "results.db", jobs=2): ...   a record is in the database before it is yielded
+
+`Batch` is the loop itself, for any jobs and any executor.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+
+from kahanmaps.experiments.results.records import Documents, Executor, Job, Record
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results.tables import Planned
+from kahanmaps.experiments.running.children import GROUP_SECONDS, LocalChildren
+from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
+
+_TICK = 0.1  # seconds after which an interrupt is noticed, and it is said that nothing has come
+_SHARED = 4  # times as long as the last list took to be written, records go to the same list
+GRACE = 10.0  # seconds that tasks in flight have after an interrupt
+
+
+class Batch:
+    """Iterate over it for lists of records as they come in; at least ten a second, some of them empty.
+
+    Writing waits for the disk. So short tasks share a list for four times as long as writing the last one took, which
+    is milliseconds. Whoever writes a list down before asking for the next one loses at most that and what is in flight.
+    """
+
+    def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
+        self._jobs = iter(jobs)
+        self._executor = executor
+        self._grace = grace
+        self._until: float | None = None
+        self.abandoned = 0
+
+    @property
+    def was_interrupted(self) -> bool:
+        """Whether somebody asked for the end."""
+        return self._until is not None
+
+    def interrupt(self) -> None:
+        """Hand out nothing more, and give up what is not done within the grace (safe in a signal handler)."""
+        self._until = time.monotonic() + self._grace
+
+    def __iter__(self) -> Iterator[list[Record]]:
+        executor, took = self._executor, 0.0
+        try:
+            self._hand_out()
+            while executor.in_flight:
+                if self._until is not None and time.monotonic() > self._until:
+                    self.abandoned = executor.in_flight
+                    return
+                records = executor.wait(_TICK)
+                end = time.monotonic() + _SHARED * took
+                while records and executor.in_flight and time.monotonic() < end:
+                    self._hand_out()
+                    records += executor.wait(max(0.0, end - time.monotonic()))
+                self._hand_out()
+                began = time.monotonic()
+                yield records
+                if records:
+                    took = min(time.monotonic() - began, _TICK)
+        finally:
+            executor.close()
+
+    def _hand_out(self) -> None:
+        while self._until is None and self._executor.is_free:
+            job = next(self._jobs, None)
+            if job is None:
+                break
+            self._executor.submit(job)
+
+
+def plan(spec: Spec, store: Store) -> dict[str, Planned]:
+    """Plan every experiment of a spec in a store; what was done before stays done."""
+    return {
+        experiment.name: store.plan(
+            experiment.name, experiment.definition, experiment.limits, experiment.tasks(), spec.documents
+        )
+        for experiment in spec.experiments
+    }
+
+
+def executor_for(
+    documents: Documents,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    python: str | None = None,
+    group_seconds: float = GROUP_SECONDS,
+    talk: Callable[[str], None] | None = None,
+) -> Executor:
+    """`jobs` child processes here, or the workers of a dask scheduler ("tcp://host:port" or its scheduler file).
+
+    Short tasks are done in groups of about `group_seconds`. `python` is the interpreter on the workers, if it is
+    another one; `talk` is told what the cluster is waiting for.
+    """
+    if scheduler is None:
+        return LocalChildren(jobs, documents, group_seconds=group_seconds)
+    from kahanmaps.experiments.running.cluster import ClusterWorkers
+
+    return ClusterWorkers(scheduler, documents, python=python, group_seconds=group_seconds, talk=talk)
+
+
+def run(
+    spec: Spec | str | Path,
+    db: str | Path | None = None,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    only: Sequence[str] | None = None,
+    shard: tuple[int, int] = (1, 1),
+    retry_failed: bool = False,
+) -> Iterator[Record]:
+    """Do the tasks of a spec and yield their records as they come in.
+
+    `spec` is a path, the text of a spec (anything with a line break), or a Spec. With `db`, a path, tasks that have
+    a record there are not done again, and every record is in the database before it is yielded; without, nothing is
+    kept. `jobs` children work at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
+    the i-th of n parts, `retry_failed` does failed tasks again. A task that is killed from outside at every try is
+    yielded as lost, and stays without a record in `db`. Closing the generator kills what is in flight.
+
+    Raises SpecError, StoreError.
+
+    >>> table = '[experiments.space]\\ntask = "family-space"\\nsystem = "family"\\naxes = {m = "2..3", seed = "0..1"}'
+    >>> sorted(record.result["dimension"] for record in run(table))
+    [8, 8, 12, 12]
+    """
+    if not isinstance(spec, Spec):
+        spec = parse_spec(spec) if isinstance(spec, str) and "\n" in spec else read_spec(spec)
+    names = [experiment.name for experiment in spec.experiments] if only is None else only
+    if db is None:
+        with closing(executor_for(spec.documents.__getitem__, jobs, scheduler)) as executor:
+            for records in Batch(_jobs(spec, names, shard), executor):
+                yield from records
+        return
+    with Store.open(db, create=True) as store, closing(executor_for(store.document, jobs, scheduler)) as executor:
+        plan(spec, store)
+        for records in Batch(store.pending(names, retry_failed=retry_failed, shard=shard), executor):
+            if records:
+                store.add(records)
+            yield from records
+
+
+def _jobs(spec: Spec, names: Sequence[str], shard: tuple[int, int]) -> Iterator[Job]:
+    """The tasks of a spec, each once, in order; the keys of those that have come are kept."""
+    seen = set()
+    part, parts = shard
+    chosen = [experiment for experiment in spec.experiments if experiment.name in names]
+    rows = ((experiment, task) for experiment in chosen for task in experiment.tasks())
+    for number, (experiment, task) in enumerate(rows):
+        if task.key not in seen:
+            seen.add(task.key)
+            if number % parts == part - 1:
+                yield Job(task, experiment.limits)

@@ -1,0 +1,1 @@
+"""Darboux polynomials, their cofactors and the spaces that they make."""

@@ -1,0 +1,263 @@
+"""Cofactors that discrete Darboux polynomials of a map can be expected to have.
+
+P o Phi = C P with polynomials P and a rational function C. The zeros and poles of C lie on what Phi contracts, which
+the Jacobi determinant shows: for Kahan maps det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), and candidates are
+the products of
+
+    D_i(x~, -eps)/D_i(x, eps)   for the irreducible factors D_i of det(I - eps f'(x)) over Q,
+    l(x~)/l(x)                  for the affine l with l' = l L, which are Darboux polynomials themselves.
+
+A polynomial that is even in eps has a cofactor with C(x, eps) C(x~, -eps) = 1, as these have. For other maps they are
+the products of the irreducible factors of det dPhi(x), and of 1/det M(x). Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
+from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
+from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.invariants.measures import jacobian_determinant_sides
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, null_space
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.inverse import TooLarge
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+
+_SPARE = 8
+_DETERMINANT_BUDGET = 20_000_000
+_MAX_DIMENSION = 16  # beyond it the determinant is not expanded: even a sparse one costs more than it tells
+
+
+@dataclass(frozen=True, eq=False)
+class Cofactor:
+    """A function of x that is made of a polynomial g in the variables, the symbols and eps, as `kind` says.
+
+    "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps). Without a polynomial it is det dPhi
+    itself. `weight` says from which degree on polynomials may have it for a cofactor, about.
+    """
+
+    name: str
+    weight: int
+    polynomial: fmpq_mpoly | None
+    kind: str = "reversed"
+
+    def over(self, map_: MapOver, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
+        """Numerator and denominator of the value at a point, the symbols having these values."""
+        if self.polynomial is None:
+            return jacobian_determinant_sides(map_, x, image)
+        field, eps = map_.field, map_.eps
+        here = evaluate(self.polynomial, field, (*x, *values, eps))
+        if self.kind == "reversed":
+            return evaluate(self.polynomial, field, (*image, *values, -eps)), here
+        return (here, field.one) if self.kind == "factor" else (field.one, here)
+
+    def sides(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
+        """The same at a point modulo a prime."""
+        if self.polynomial is None:
+            return map_.determinant(x, image)
+        field = map_.map.field
+        given = ([field.convert(c) for c in entries] for entries in (x, image, map_.values))
+        above, below = self.over(map_.map, *given)
+        return int(above), int(below)
+
+    @property
+    def text(self) -> str:
+        """The function in words: C[g] is g(x~, -eps)/g(x, eps)."""
+        if self.polynomial is None or self.kind == "reversed":
+            return f"C[{self.name}]"
+        return f"({self.name})" if self.kind == "factor" else f"1/({self.name})"
+
+
+DETERMINANT = Cofactor("det dPhi", 1, None)
+
+
+def determinant_polynomial(map_: BirationalMap) -> fmpq_mpoly | None:
+    """det M in (variables, symbols, eps), for Kahan maps det(I - eps f'(x)); None where it is too large to expand."""
+    if map_.dim > _MAX_DIMENSION or map_.digits > LONG_COEFFICIENTS:
+        return None
+    field = FunctionField(map_.names, _DETERMINANT_BUDGET)
+    one, n = field.context.constant(1), map_.dim
+    try:
+        entries = [Function(field, entry, one) for row in map_.matrix for entry in row]
+        D: fmpq_mpoly = FunctionMatrix(field, n, n, entries).det().above
+    except (BudgetExceeded, TooLarge):
+        return None
+    return D
+
+
+def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
+    """The irreducible factors over Q of det dPhi(x) and those of 1/det M(x); det dPhi alone where it is too large."""
+    n, D = map_.dim, determinant_polynomial(map_)
+    field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
+    *x, eps = field.variables
+    try:
+        over = map_.at(eps, field, x[n:])
+        image = over.step(x[:n])
+        above, below = jacobian_determinant_sides(over, x[:n], image)
+        J = above / below
+    except BudgetExceeded:
+        D = None
+    if D is None:
+        return (Cofactor("det dPhi", n, None),)
+    degree_of_map = max(degree_in(part, n) for entry in image for part in (entry.above, entry.below))
+    found = []
+    for kind, polynomials in (("factor", [J.above]), ("pole", [J.below, D])):
+        factors = {str(factor): factor for polynomial in polynomials for factor, _ in polynomial.factor()[1]}
+        for factor in factors.values():
+            if weight := -(-degree_in(factor, n) // max(1, degree_of_map)):
+                found.append(Cofactor(format_polynomial(factor), weight, factor, kind))
+    return tuple(sorted(found, key=lambda one: (one.weight, one.kind, one.name)))
+
+
+def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
+    """The cofactors of the irreducible factors over Q of det(I - eps f'(x)); det dPhi alone where it is too large."""
+    n = map_.dim
+    D = determinant_polynomial(map_)
+    if D is None:
+        return (Cofactor("det dPhi", n, None),)
+    found = []
+    origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
+    for factor, _ in D.factor()[1]:
+        weight = degree_in(factor, n)
+        if weight == 0:
+            continue  # a number that depends on eps
+        # D is 1 at eps = 0, so that every factor is a number there: divide by it, and cofactors become 1 at eps = 0.
+        constant = factor.subs(origin)
+        found.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
+    return tuple(sorted(found, key=lambda one: (one.weight, one.name)))
+
+
+def cofactor_of_affine(function: fmpq_mpoly, system: QuadraticSystem) -> Cofactor:
+    """The cofactor of an affine Darboux function, given in the variables of the system."""
+    context = ring((*system.variables, *system.symbols, "eps"))
+    images = context.gens()[: system.dim]
+    return Cofactor(format_polynomial(function), 1, function.compose(*images, ctx=context))
+
+
+@dataclass(frozen=True)
+class CofactorProduct:
+    """A product of powers of cofactors; `powers` goes with a list of them."""
+
+    powers: tuple[int, ...]
+    weight: int
+
+    def text(self, cofactors: Sequence[Cofactor]) -> str:
+        """The product in words, e.g. C[x1]*C[x3]^2."""
+        parts = [
+            one.text + (f"^{power}" if power > 1 else "")
+            for one, power in zip(cofactors, self.powers, strict=True)
+            if power
+        ]
+        return "*".join(parts) or "1"
+
+
+def products(cofactors: Sequence[Cofactor], max_weight: int) -> list[CofactorProduct]:
+    """All products of weight at most `max_weight`, by increasing weight; the first is 1."""
+    found: list[tuple[int, ...]] = [()]
+    for one in cofactors:
+        found = [
+            (*powers, power)
+            for powers in found
+            for power in range(max_weight // one.weight + 1)
+            if sum(p * c.weight for p, c in zip((*powers, power), cofactors, strict=False)) <= max_weight
+        ]
+    weighed = [CofactorProduct(p, sum(e * c.weight for e, c in zip(p, cofactors, strict=True))) for p in found]
+    return sorted(weighed, key=lambda one: (one.weight, tuple(-p for p in one.powers)))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Random points with their images and the values of all cofactors there, for many searches on one map."""
+
+    map: ModularMap
+    pairs: list[tuple[Point, Point]]
+    sides: list[list[tuple[int, int]]]  # by cofactor, then by point
+
+    @classmethod
+    def of(cls, map_: ModularMap, cofactors: Sequence[Cofactor], count: int) -> Sample:
+        """So many points."""
+        pairs = list(map_.pairs(count))
+        return cls(map_, pairs, [[one.sides(map_, x, image) for x, image in pairs] for one in cofactors])
+
+    def values(self, product: CofactorProduct) -> list[tuple[int, int]]:
+        """Numerator and denominator of a product, at each point."""
+        prime = self.map.prime
+        found = [(1, 1)] * len(self.pairs)
+        for power, column in zip(product.powers, self.sides, strict=True):
+            if power:
+                found = [
+                    (a * pow(c, power, prime) % prime, b * pow(d, power, prime) % prime)
+                    for (a, b), (c, d) in zip(found, column, strict=True)
+                ]
+        return found
+
+
+def cofactor_space(
+    sample: Sample, product: CofactorProduct, degree: int, model: DarbouxSpace | None = None
+) -> DarbouxSpace:
+    """All polynomials P of degree at most `degree` with P(x~) = C(x) P(x); their basis may be empty.
+
+    With a `model`, the space modulo another prime, they have no other monomials than its elements. The sample must have
+    `points_needed`.
+    """
+    dim, prime = sample.map.dim, sample.map.prime
+    terms = len(exponents_up_to(dim, degree))
+    places = range(terms) if model is None else model.places
+    rows = []
+    for (x, image), (above, below) in zip(
+        sample.pairs[: points_needed(dim, degree, model)], sample.values(product), strict=False
+    ):
+        here, there = sample.map.moved(x, image, degree)
+        rows.append([(below * there[k] - above * here[k]) % prime for k in places])
+    vectors = [dict(zip(places, vector, strict=True)) for vector in null_space(rows, len(places), prime)]
+    whole = [[vector.get(k, 0) for k in range(terms)] for vector in vectors]
+    return DarbouxSpace.spanned_by(dim, degree, whole, prime)
+
+
+def points_needed(dim: int, degree: int, model: DarbouxSpace | None = None) -> int:
+    """How many points a sample needs for polynomials of this degree, with the monomials of the model if there is one.
+
+    >>> points_needed(2, 3), points_needed(2, 3, DarbouxSpace(2, 3, [[1, 0, 1] + [0] * 7]))
+    (18, 10)
+    """
+    return (len(exponents_up_to(dim, degree)) if model is None else len(model.places)) + _SPARE
+
+
+def search_cofactors(
+    map_: ModularMap,
+    cofactors: Sequence[Cofactor],
+    known: Sequence[DarbouxSpace],
+    wanted: int,
+    max_degree: int,
+    seconds: float,
+) -> Iterator[tuple[CofactorProduct, DarbouxSpace]]:
+    """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are found.
+
+    A space is new if the integrals of `known` and of those found before do not account for its own.
+    """
+    deadline = time.monotonic() + seconds
+    found = list(known)
+    independent = gradient_rank(map_, found)
+    sample = Sample.of(map_, cofactors, points_needed(map_.dim, max_degree))
+    candidates = products(cofactors, max_degree)
+    for degree in range(1, max_degree + 1):
+        for product in candidates:
+            if independent >= wanted or time.monotonic() > deadline:
+                return
+            if product.weight > degree + 1:
+                continue
+            space = cofactor_space(sample, product, degree)
+            if len(space.basis) < 2:
+                continue
+            more = gradient_rank(map_, [*found, space])
+            if more > independent:
+                independent = more
+                found.append(space)
+                yield product, space

@@ -1,0 +1,257 @@
+"""The discrete Darboux polynomials of a map: all P of bounded degree with P(x~) = C(x) P(x), for many C.
+
+C runs through the products of the cofactors in cofactors.py. A space of such P is listed unless products of elements of
+spaces listed before span it. Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.displayed import latex
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
+from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
+from kahanmaps.laboratory.preserve.darboux.cofactors import (
+    Cofactor,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    points_needed,
+    products,
+)
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.identities import judged
+from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
+from kahanmaps.laboratory.preserve.results import Search
+
+_MOST_TERMS = 2000  # of a polynomial: as many unknowns
+_MOST_PRODUCTS = 2000
+
+
+@dataclass(frozen=True)
+class DarbouxPolynomials:
+    """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
+
+    Of a flow it is K in P' = K P. The verdict is on the identity, for all of them: proved by expansion or supported at
+    random points.
+    """
+
+    cofactor: str
+    polynomials: tuple[fmpq_mpoly, ...]
+    verdict: Verdict
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        formulas = [latex(P) for P in self.polynomials]
+        return {**attributes(self, "cofactor", "polynomials"), "latex": formulas, **attributes(self, "verdict")}
+
+
+@dataclass(frozen=True)
+class DarbouxSearch(Search):
+    """What `darboux_polynomials` found: spaces by the weight of their cofactor; `reason` if the search ended early."""
+
+    degree: int
+    cofactors: tuple[str, ...]
+    spaces: tuple[DarbouxPolynomials, ...]
+    reason: str
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each polynomial, for `pandas.DataFrame(found.rows())` and the like."""
+        pairs = [(space, P) for space in self.spaces for P in space.polynomials]
+        return [
+            {"cofactor": one.cofactor, "polynomial": format_polynomial(P), "verdict": str(one.verdict)}
+            for one, P in pairs
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        known = attributes(self, "degree", "cofactors", "spaces", "reason", "primes")
+        return {**self.of_flow, **known}
+
+
+def darboux_polynomials(
+    file: SystemFile,
+    degree: int,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    flow: bool = False,
+    seconds: float = 60.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DarbouxSearch:
+    """All discrete Darboux polynomials of degree at most `degree` whose cofactor is a product of the usual ones.
+
+    Args:
+        file: the system.
+        degree: the largest degree of the polynomials, and of the products of cofactors.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        flow: ask for those of the differential equation instead, P' = K P with any K but 0 (flow_polynomials.py).
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). A space that
+        products of elements of others span is left out.
+
+    Raises:
+        InputError: for unknown symbols and eps = 0.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> for space in darboux_polynomials(load("lotka_volterra"), 2).spaces:
+    ...     print(space.cofactor, *space.polynomials, space.verdict)
+    C[x] x proved
+    C[y] y proved
+    """
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
+    deadline, cofactors, spaces = time.monotonic() + seconds, laboratory.cofactors(), list[DarbouxPolynomials]()
+    reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0
+    if flow:
+        reason = _of_flow(laboratory, degree, seconds, spaces)
+    elif not reason:
+        try:
+            reason = _of_map(laboratory, degree, cofactors, deadline, progress, spaces)
+        except NoPoint as error:
+            reason = str(error)
+    names = () if laboratory.defect else tuple(one.name for one in cofactors)
+    return DarbouxSearch(*laboratory.asked, degree, names, tuple(spaces), reason, flow=flow)
+
+
+def _of_map(
+    laboratory: Laboratory,
+    degree: int,
+    cofactors: Sequence[Cofactor],
+    deadline: float,
+    progress: Callable[[str], None],
+    found: list[DarbouxPolynomials],
+) -> str:
+    """Adds the spaces of polynomials to those found; why the search ended early, empty where it did not."""
+    asked, dim, reason = degree, laboratory.map.dim, ""
+    while comb(dim + degree, dim) > _MOST_TERMS:
+        degree -= 1
+    if degree < asked:
+        reason = f"degrees above {degree} were not tried: polynomials in dimension {dim} have too many terms"
+    candidates = products(cofactors, degree)
+    if len(candidates) > _MOST_PRODUCTS:
+        reason = f"{len(candidates)} products of cofactors, of which the first {_MOST_PRODUCTS} were tried"
+        candidates = candidates[:_MOST_PRODUCTS]
+    map_ = laboratory.maps[0]
+    sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
+    known: dict[CofactorProduct, DarbouxSpace] = {}
+    for product in candidates:
+        if time.monotonic() > deadline:
+            reason = "the time was over before all products of cofactors were tried"
+            break
+        progress(f"cofactor {product.text(cofactors)}")
+        space = _without_constants(cofactor_space(sample, product, degree), product)
+        if space.basis:
+            known[product] = space
+    # Different products of cofactors may be the same function, and one of them may show that products span the space.
+    listed = [space for product, space in known.items() if _is_spanned_by_products(known, product, map_.prime)]
+    for product, space in known.items():
+        if space not in listed:
+            listed.append(space)
+            written = _written(laboratory, cofactors, product, space, deadline)
+            if isinstance(written, str):
+                reason = written
+            else:
+                found.append(written)
+    return reason
+
+
+def _of_flow(laboratory: Laboratory, degree: int, seconds: float, found: list[DarbouxPolynomials]) -> str:
+    """The same with the Darboux polynomials of the flow, each with its own cofactor."""
+    assert laboratory.field is not None
+    known = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
+    for P in known.functions:
+        K = darboux_cofactor(laboratory.field, P)
+        assert K is not None  # or it would not have been listed
+        found.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
+    return "" if known.degree >= degree else f"degrees above {known.degree} are not settled: {known.reason}"
+
+
+def _without_constants(space: DarbouxSpace, product: CofactorProduct) -> DarbouxSpace:
+    """For C = 1 the constants solve the equation: they are left out."""
+    if any(product.powers):
+        return space
+    return DarbouxSpace(space.dim, space.degree, [vector for vector in space.basis if any(vector[1:])])
+
+
+def _is_spanned_by_products(known: dict[CofactorProduct, DarbouxSpace], product: CofactorProduct, prime: int) -> bool:
+    """Whether products P Q of elements of other spaces, whose cofactors multiply to the given one, span its space."""
+    space = known[product]
+    by_powers = {one.powers: other for one, other in known.items() if one != product}
+    rows = []
+    for powers, left in by_powers.items():
+        rest = tuple(a - b for a, b in zip(product.powers, powers, strict=True))
+        right = by_powers.get(rest)
+        if right is not None and powers <= rest:
+            rows += [product_of(P, Q, space.dim, space.degree, prime) for P in left.basis for Q in right.basis]
+    return len(echelon([row for row in rows if row is not None], prime)) == len(space.basis)
+
+
+def _written(
+    laboratory: Laboratory,
+    cofactors: Sequence[Cofactor],
+    product: CofactorProduct,
+    model: DarbouxSpace,
+    deadline: float,
+) -> DarbouxPolynomials | str:
+    """A space in closed form, or why there is none."""
+
+    def spaces_on(map_: ModularMap) -> list[DarbouxSpace]:
+        sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree, model))
+        return [_without_constants(cofactor_space(sample, product, model.degree, model), product)]
+
+    forms = laboratory.formulas([model], spaces_on, deadline)
+    if forms.bases is None:
+        return f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
+    polynomials = tuple(forms.bases[0])
+    outcomes = [_judged(laboratory, cofactors, product, P) for P in polynomials]
+    if not all(outcome.holds for outcome in outcomes):
+        return f"a formula for the cofactor {product.text(cofactors)} did not pass as an identity"
+    verdict = Verdict.PROVED if all(one is Verdict.PROVED for one in outcomes) else Verdict.SUPPORTED
+    return DarbouxPolynomials(product.text(cofactors), polynomials, verdict)
+
+
+def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> Verdict:
+    """Whether P(x~) = P(x) prod C^k, the denominators multiplied out."""
+    map_, n = laboratory.map, laboratory.map.dim
+
+    def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides:
+        point, values = place[:n], place[n:]
+        over = map_.at(eps, field, values)
+        image = over.step(point)
+        left, right = evaluate(P, field, (*image, *values, eps)), evaluate(P, field, (*place, eps))
+        for one, power in zip(cofactors, product.powers, strict=True):
+            above, below = one.over(over, point, image, values) if power else (field.one, field.one)
+            for _ in range(power):
+                left, right = left * below, right * above
+        return [left], [right]
+
+    subject = (
+        map_.symbols,
+        map_.subject,
+        P,
+        [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)],
+    )
+    identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)
+    return judged(identity, laboratory.seed)[0]

@@ -1,0 +1,1 @@
+"""Poisson tensors that a map preserves, their Casimirs and pencils."""

@@ -1,0 +1,151 @@
+"""Casimirs of a tensor that are functions of known integrals: products of their powers, and polynomials in them.
+
+C is a Casimir if P grad C = 0. For C = prod I^k that is sum k_i P grad I_i / I_i = 0, for a polynomial a sum of
+multiples of the P grad I_i: equations at random points modulo a prime, linear in the exponents k or the coefficients,
+which may contain eps and the symbols. What comes out is to be put to the proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import comb, lcm, prod
+
+from flint import fmpq_mpoly_ctx
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, ring
+from kahanmaps.algebra.residues import rational_vector
+from kahanmaps.algebra.written.text import format_rational_function
+from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, null_space, slopes
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral
+
+_DEGREE = 2  # of polynomials in the integrals
+_MOST_TERMS = 40  # of these
+_HIGHEST = 12  # exponent of a product
+_BUDGET = 200_000  # products of terms, for writing a candidate out
+_SPARE = 4
+
+
+def casimir_candidates(
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+) -> Iterator[tuple[str, RationalFunction]]:
+    """Functions of the integrals that may be Casimirs, as text in their names and written out.
+
+    Args:
+        laboratory: the maps.
+        tensor: one that the map preserves.
+        integrals: known ones, by their names.
+        deadline: for the coefficients of polynomials, a value of time.monotonic().
+
+    Yields:
+        Products of powers, then polynomials of degree 2 at most: right modulo a prime. Functions of single Casimirs may
+        be among them.
+    """
+    names = [one.name for one in integrals]
+    if set(names) & {*laboratory.symbols, "eps"}:
+        return
+    field = FunctionField(laboratory.map.names, _BUDGET)
+    written = [Function(field, one.function.numerator, one.function.denominator) for one in integrals]
+    context = ring((*names, *laboratory.symbols, "eps"))
+    try:
+        found = [
+            *_products(laboratory.maps[0], tensor, integrals, context),
+            *_polynomials(laboratory, tensor, integrals, deadline),
+        ]
+    except NoPoint:
+        return
+    for one in found:
+        try:
+            place = [*written, *field.variables[laboratory.map.dim :]]
+            value = evaluate(one.numerator, field, place) / evaluate(one.denominator, field, place)
+        except BudgetExceeded:
+            continue
+        common = value.above.gcd(value.below)
+        yield format_rational_function(one), RationalFunction(value.above / common, value.below / common)
+
+
+def _products(
+    map_: ModularMap, tensor: GivenTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
+) -> Iterator[RationalFunction]:
+    """The products of powers of at least two integrals, short ones, whose gradients the tensor kills."""
+    p, rows = map_.prime, list[list[int]]()
+    for _ in range(_SPARE + len(integrals)):
+        values, moved = _moved(map_, tensor, integrals)
+        columns = [[c * pow(I, -1, p) % p for c in v] for I, v in zip(values, moved, strict=True)]
+        rows += [list(row) for row in zip(*columns, strict=True)]
+    for vector in null_space(rows, len(integrals), p):
+        exponents = rational_vector(vector, p)
+        if exponents is None:
+            continue
+        below = lcm(*(int(e.q) for e in exponents))
+        powers = [int(e * below) for e in exponents]
+        if sum(e != 0 for e in powers) > 1 and max(map(abs, powers)) <= _HIGHEST:
+            above, below_ = (
+                prod(
+                    (I ** max(0, sign * e) for I, e in zip(context.gens(), powers, strict=False)),
+                    start=context.constant(1),
+                )
+                for sign in (1, -1)
+            )
+            yield RationalFunction(above, below_)
+
+
+def _polynomials(
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+) -> Iterator[RationalFunction]:
+    """A basis of the polynomials of degree at most 2 in the integrals whose gradients the tensor kills."""
+    degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MOST_TERMS else 1
+
+    def space(map_: ModularMap) -> DarbouxSpace:
+        p, rows = map_.prime, list[list[int]]()
+        powers = exponents_up_to(len(integrals), degree)[1:]
+        for _ in range(_SPARE + len(powers)):
+            values, moved = _moved(map_, tensor, integrals)
+            columns = []
+            for exponents in powers:
+                weights = [
+                    e
+                    * prod(pow(I, k - (i == j), p) for j, (I, k) in enumerate(zip(values, exponents, strict=True)) if k)
+                    if e
+                    else 0
+                    for i, e in enumerate(exponents)
+                ]
+                columns.append(
+                    [sum(w * v[k] for w, v in zip(weights, moved, strict=True)) % p for k in range(map_.dim)]
+                )
+            rows += [list(row) for row in zip(*columns, strict=True)]
+        vectors = [[0, *vector] for vector in null_space(rows, len(powers), p)]
+        return DarbouxSpace.spanned_by(len(integrals), degree, vectors, p)
+
+    model = space(laboratory.maps[0])
+    if not model.basis:
+        return
+    eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
+    names = [one.name for one in integrals]
+    forms = laboratory.formulas([model], lambda map_: [space(map_)], deadline, names, eps_enters)
+    for P in forms.bases[0] if forms.bases is not None else ():
+        if degree_in(P, len(integrals)) > 1 or len(P) > 1:
+            yield RationalFunction(P, P.context().constant(1))
+
+
+def _moved(
+    map_: ModularMap, tensor: GivenTensor, integrals: Sequence[FoundIntegral]
+) -> tuple[list[int], list[list[int]]]:
+    """The values of the integrals at a random point, and P times their gradients. Raises NoPoint at a pole or zero."""
+    field = GF(map_.prime)
+    x = [field.convert(c) for c in (*map_.random_point(), *map_.values)]
+    eps = field.convert(map_.eps)
+    P = tensor.value(field, eps, tuple(x))
+    values, moved = [], []
+    for one in integrals:
+        value, below = one.function.value(field, [*x, eps]), evaluate(one.function.denominator, field, [*x, eps])
+        if P is None or value is None or value == 0:
+            raise NoPoint("an integral or the tensor has no value other than 0 at a random point modulo a prime")
+        column = (P * field.column(slopes(one.function, field, [*x, eps], map_.dim))).entries()
+        values.append(int(value))
+        moved.append([int(entry / (below * below)) for entry in column])
+    return values, moved

@@ -1,0 +1,318 @@
+"""The curves P = c Q on which a planar map with the integral P/Q moves: their genus, and the points that all have.
+
+All is computed modulo a prime, where a residue stands for eps, in random projective coordinates. A curve C is the
+component through a random point of the curve of the pencil there: it is irreducible over GF(p), and the point is
+smooth on it, so that it is irreducible over the closure. Where curves of the pencil have several components these are
+a pencil as well, and are taken instead. Two such curves of degree d meet in the base points only, and outside of them
+both are smooth, by Bertini's theorem (hartshorne-1977, III.10). The resultant tells how often they meet in each. Where
+that may be more than the square of the multiplicity m the point is blown up, and so are those infinitely near to it,
+until the curves are apart. Then (hartshorne-1977, V.3)
+
+    sum m_i^2 = d^2,        genus = (d - 1)(d - 2)/2 - sum m_i (m_i - 1)/2.
+
+Nothing is said where the first of these fails, or where primes disagree.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+from flint import Ordering, fmpq, fq_default_ctx, fq_default_poly_ctx, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
+
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.fields import GF, PrimeField
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in
+from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.errors import BadPrime
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.singular.jets import modulo
+
+MAX_DEGREE = 12
+_TRIES = 3
+_BITS = 31  # of primes: FLINT's Python cannot sort several factors with larger coefficients
+# Of the degrees of a planar map of infinite order that keeps all curves of a pencil, by genus: diller-favre-2001.
+GROWTH_ON = {0: Growth.LINEAR, 1: Growth.QUADRATIC}
+_Local = dict[tuple[int, int], Any]  # a power series in x, y at a point, its coefficients by exponents
+
+
+@dataclass(frozen=True)
+class BasePoints:
+    """How many base points have a multiplicity, and how many of them are infinitely near to others."""
+
+    multiplicity: int
+    count: int
+    infinitely_near: int
+
+    @property
+    def text(self) -> str:
+        """As a phrase."""
+        near = f" ({self.infinitely_near} infinitely near)" if self.infinitely_near else ""
+        return f"{self.count} of multiplicity {self.multiplicity}{near}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return attributes(self, "multiplicity", "count", "infinitely_near")
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """What is measured of the curves I = c of a planar map, for generic c: I is the integral of this name.
+
+    A curve has so many `components`; `degree`, `genus` and `base_points` are those of the pencil of these.
+    """
+
+    integral: str
+    components: int
+    degree: int
+    genus: int
+    base_points: tuple[BasePoints, ...]
+
+    @property
+    def text(self) -> str:
+        """All of it in a line."""
+        kind = "is" if self.components == 1 else f"has {self.components} components"
+        points = ", ".join(points.text for points in self.base_points)
+        return (
+            f"the generic curve {self.integral} = c {kind} of degree {self.degree} and genus {self.genus}; "
+            f"base points: {points}"
+        )
+
+    def motion(self, growth: Growth) -> str:
+        """What the map is on these curves, given how its degrees grow; empty where nothing follows.
+
+        An automorphism of a curve of genus 1 is a translation or has finite order.
+        """
+        if self.genus > 1:
+            return "the map has finite order, for on such a curve there are finitely many automorphisms"
+        if self.genus == 1 and growth is Growth.QUADRATIC:
+            who = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
+            return f"{who} is a translation, for the degrees grow"
+        return ""
+
+    def against(self, growth: Growth) -> str:
+        """Why the degrees cannot grow so; empty where they can."""
+        grows = growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
+        possible = not grows or growth is GROWTH_ON.get(self.genus)
+        return "" if possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return attributes(self, "integral", "components", "degree", "genus", "base_points", "text")
+
+
+def pencil_of(
+    name: str, integral: RationalFunction, eps: fmpq | None, *, seed: int = 0, seconds: float = 2.0
+) -> Pencil | None:
+    """Genus and base points of the generic curve I = c, measured modulo two primes.
+
+    Args:
+        name: of the integral.
+        integral: a function that is not constant, in two variables and eps.
+        eps: an exact number, or None: then a random residue stands for it.
+        seed: of everything random.
+        seconds: after which it is given up.
+
+    Returns:
+        None where the degree is above 12, where the time was over, and where anything was not as it has to be.
+
+    Source: docs/mathematics.md.
+
+    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> found = pencil_of("I", parse_rational_function("y^2 - x^3 - x", ["x", "y", "eps"]), None)
+    >>> found.text
+    'the generic curve I = c is of degree 3 and genus 1; base points: 9 of multiplicity 1 (8 infinitely near)'
+    """
+    if max(degree_in(part, 2) for part in (integral.numerator, integral.denominator)) > MAX_DEGREE:
+        return None
+    rng = random.Random(f"pencil {seed_for(seed, integral, eps)}")
+    deadline = time.monotonic() + seconds
+    found: list[Pencil] = []
+    for _ in range(_TRIES):
+        try:
+            _require(time.monotonic() < deadline)
+            field = GF(random_prime(rng, _BITS))
+            residue = field.random(rng) if eps is None else field.convert(eps)
+            pencil = _Reduced(field, rng, deadline).pencil(name, integral, int(residue))
+        except (BadPrime, _Unclear):
+            continue
+        if pencil in found:
+            return pencil
+        found.append(pencil)
+    return None
+
+
+class _Unclear(Exception):
+    """Something is not as it is for generic curves, or the time is over."""
+
+
+def _require(condition: bool) -> None:
+    if not condition:
+        raise _Unclear
+
+
+class _Reduced:
+    """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, whether near)."""
+
+    def __init__(self, field: PrimeField, rng: random.Random, deadline: float) -> None:
+        self.field, self.prime, self._rng, self._deadline = field, field.prime, rng, deadline
+        self.ring = nmod_mpoly_ctx.get(("x", "y"), modulus=self.prime, ordering=Ordering.degrevlex)
+        self.points: Counter[tuple[int, bool]] = Counter()
+
+    def pencil(self, name: str, integral: RationalFunction, eps: int) -> Pencil:
+        """The pencil of the components. Raises BadPrime, _Unclear."""
+        P, Q = self._in_random_coordinates([integral.numerator, integral.denominator], eps)
+        curves = [self._component(P, Q) for _ in range(3)]
+        d = int(curves[0].total_degree())
+        coefficients = [[int(C[i, j]) for i in range(d + 1) for j in range(d + 1 - i)] for C in curves]
+        _require(all(C.total_degree() == d for C in curves) and nmod_mat(coefficients, self.prime).rank() == 2)
+        components, rest = divmod(int(max(P.total_degree(), Q.total_degree()) - P.gcd(Q).total_degree()), d)
+        _require(rest == 0)
+        self._find_points(curves[0], curves[1], d)
+        _require(sum(count * m * m for (m, _), count in self.points.items()) == d * d)
+        loss = sum(count * m * (m - 1) // 2 for (m, _), count in self.points.items())
+        multiplicities = sorted({m for m, _ in self.points}, reverse=True)
+        points = (
+            BasePoints(m, self.points[m, False] + self.points[m, True], self.points[m, True]) for m in multiplicities
+        )
+        return Pencil(name, components, d, (d - 1) * (d - 2) // 2 - loss, tuple(points))
+
+    def _random(self) -> int:
+        return self._rng.randrange(1, self.prime)
+
+    def _in_random_coordinates(self, forms: Sequence[Any], eps: int) -> list[nmod_mpoly]:
+        """Polynomials in (x, y, eps) made homogeneous, all of the same degree, and affine forms put for x, y and z."""
+        x, y = self.ring.gens()
+        flat = [modulo(f, self.field).compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
+        d = int(max(f.total_degree() for f in flat))
+        X, Y, Z = (
+            [line**k for k in range(d + 1)]
+            for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
+        )
+        zero = self.ring.constant(0)
+        return [sum((X[i] * Y[j] * Z[d - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in flat]
+
+    def _component(self, P: nmod_mpoly, Q: nmod_mpoly) -> nmod_mpoly:
+        """That of the member through a random point on which the point is: irreducible over the closure of GF(p)."""
+        at = [self._random(), self._random()]
+        member = P * int(Q(*at)) - Q * int(P(*at))
+        _require(not member.is_zero())
+        through = [(C, e) for C, e in member.factor()[1] if not int(C(*at))]
+        _require(len(through) == 1 and through[0][1] == 1)
+        C: nmod_mpoly = through[0][0]
+        _require(any(int(C.derivative(k)(*at)) for k in range(2)))
+        return C
+
+    def _find_points(self, C: nmod_mpoly, D: nmod_mpoly, d: int) -> None:
+        eliminant = [0] * (d * d + 1)
+        for (i, _), c in C.resultant(D, "y").terms():
+            eliminant[i] = int(c)
+        _require(eliminant[-1] != 0)
+        for factor, number in nmod_poly(eliminant, self.prime).factor()[1]:
+            if number < 4:  # less than 2^2: simple points, each but the first infinitely near to the one before
+                self._add_simple(int(factor.degree()), int(number), near=False)
+                continue
+            K = fq_default_ctx(self.prime, int(factor.degree()))
+            a = _root(K, [K(int(c)) for c in factor.coeffs()])
+            on_line = [_on_line(K, F, a) for F in (C, D)]
+            common = on_line[0].gcd(on_line[1])
+            k = int(common.degree())
+            _require(k > 0)
+            b = -common[k - 1] / K(k)
+            _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates one point to each a
+            local = [_moved({(i, j): K(int(c)) for (i, j), c in F.terms()}, a, b, int(number)) for F in (C, D)]
+            self._resolve(K, local[0], local[1], int(number), exact=True, near=False)
+
+    def _add_simple(self, conjugates: int, chain: int, near: bool) -> None:
+        self.points[1, near] += conjugates
+        self.points[1, True] += conjugates * (chain - 1)
+
+    def _resolve(self, K: Any, f: _Local, g: _Local, most: int, *, exact: bool, near: bool) -> None:
+        """Count a point over K that two curves may share, and those infinitely near to it.
+
+        The curves meet there at most `most` times, or `exact`ly so often: terms of a higher degree make no difference.
+        """
+        _require(time.monotonic() < self._deadline)
+        m = min(map(sum, f), default=most + 1)
+        _require(m == min(map(sum, g), default=most + 1) and m * m <= most)
+        if m == 0:
+            return
+        if m == 1 and exact:
+            self._add_simple(K.degree(), most, near)
+            return
+        self.points[m, near] += K.degree()
+        if m * m == most:
+            return
+        shear = K(self._random())  # so that x = 0 touches neither curve
+        f, g = (_sheared(F, shear) for F in (f, g))
+        cones = [_polynomial(K, [F.get((m - j, j), K(0)) for j in range(m + 1)]) for F in (f, g)]
+        _require(all(cone.degree() == m for cone in cones))
+        directions = cones[0].gcd(cones[1]).factor()[1]
+        for direction, _ in directions:
+            k = int(direction.degree())
+            L = fq_default_ctx(self.prime, K.degree() * k)
+            embedded = _embedding(K, L)
+            slope = _root(L, [embedded(c) for c in direction.coeffs()])
+            left = (most - m * m) // (k if len(directions) == 1 else 1)
+            blown = [_blown_up({e: embedded(c) for e, c in F.items()}, m, slope, left) for F in (f, g)]
+            self._resolve(L, blown[0], blown[1], left, exact=exact and len(directions) == 1, near=True)
+
+
+def _polynomial(K: Any, coefficients: list[Any]) -> Any:
+    return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub forgets lists
+
+
+def _root(K: Any, coefficients: list[Any]) -> Any:
+    return _polynomial(K, coefficients).roots()[0][0]
+
+
+def _embedding(K: Any, L: Any) -> Any:
+    """A way to take elements of K into L, which contains it."""
+    if K.degree() == L.degree():
+        return lambda c: c
+    gen = _root(L, [L(int(c)) for c in K.modulus().coeffs()])
+    powers = [gen**k for k in range(K.degree())]
+    return lambda c: sum((power * L(int(part)) for part, power in zip(c.to_list(), powers, strict=False)), L(0))
+
+
+def _on_line(K: Any, F: nmod_mpoly, a: Any) -> Any:
+    """F(a, y) as a polynomial over K."""
+    coefficients = [K(0)] * (int(F.total_degree()) + 1)
+    for (i, j), c in F.terms():
+        coefficients[j] += a**i * K(int(c))
+    return _polynomial(K, coefficients)
+
+
+def _moved(F: _Local, a: Any, b: Any, most: int) -> _Local:
+    """F(x + a, y + b), as all that follows without what is 0 and what is of a degree above `most`."""
+    found: _Local = {}
+    for (i, j), c in F.items():
+        for k in range(min(i, most) + 1):
+            left = c * comb(i, k) * a ** (i - k)
+            for l in range(min(j, most - k) + 1):
+                found[k, l] = found.get((k, l), 0) + left * comb(j, l) * b ** (j - l)
+    return {e: c for e, c in found.items() if not c.is_zero()}
+
+
+def _sheared(F: _Local, s: Any) -> _Local:
+    """F(x + s y, y)."""
+    found: _Local = {}
+    for (i, j), c in F.items():
+        for k in range(i + 1):
+            found[i - k, j + k] = found.get((i - k, j + k), 0) + c * comb(i, k) * s**k
+    return {e: c for e, c in found.items() if not c.is_zero()}
+
+
+def _blown_up(F: _Local, m: int, slope: Any, most: int) -> _Local:
+    """F(x, x (y + slope))/x^m, where m is the multiplicity."""
+    found: _Local = {}
+    for (i, j), c in F.items():
+        for k in range(min(j, most - (i + j - m)) + 1):
+            found[i + j - m, k] = found.get((i + j - m, k), 0) + c * comb(j, k) * slope ** (j - k)
+    return {e: c for e, c in found.items() if not c.is_zero()}

@@ -1,0 +1,571 @@
+"""Poisson tensors that a map preserves, found: skew P(x) with polynomial entries and dPhi P(x) dPhi^T = P(x~).
+
+At a random point modulo a prime the law is n (n - 1)/2 linear equations for the coefficients of P, so that all P up to
+a degree are one null space. A tensor is written as the polynomial sum P_ij d_i d_j, as bivectors are, with names d_i of
+their own: so its coefficients are lifted to functions of eps and the symbols as those of any polynomial. With a
+function psi for a common denominator it is B = psi P that is found: psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
+
+The Jacobi identity is not linear in P. Where several tensors are found that satisfy it, one identity with a symbol for
+each of them decides whether all their combinations do.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, reduce
+from itertools import combinations
+from math import comb
+from typing import Any
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_factored, format_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.expand import MAX_DIMENSION
+from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
+from kahanmaps.displayed import latex
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, KahanmapsError, counted
+from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import (
+    Independent,
+    ModularMap,
+    NoPoint,
+    exponents_up_to,
+    monomial_values,
+    null_space,
+    product_of,
+    rank,
+    slopes,
+)
+from kahanmaps.laboratory.preserve.darboux.cofactors import CofactorProduct, Sample, cofactor_space, points_needed
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.identities import judged
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
+from kahanmaps.laboratory.preserve.poisson.casimirs import casimir_candidates
+from kahanmaps.laboratory.preserve.products import candidates, products_of
+from kahanmaps.laboratory.preserve.results import Search
+
+_MAX_UNKNOWNS = 2000
+_MOST_LOGARITHMIC = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
+_SPARE = 8
+_SHOWN = 2000  # characters of the brackets of one tensor
+_MOST_INTEGRALS = 12  # of these all subsets are tried
+_LARGEST_PENCIL = 8  # so many tensors whose combinations are put to the Jacobi identity
+
+Exponents = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FoundTensor:
+    """A tensor that the map preserves, with the verdict on that, and on the Jacobi identity (`jacobi`).
+
+    `rank` is that at random points. Of the integrals that are known, `casimirs` names those whose gradient the tensor
+    kills and, where there are more Casimirs among functions of the integrals, products and polynomials of them, as
+    I1/I2; `in_involution` names as many integrals as there are in involution with each other, `involution` being the
+    verdict on that, None without any.
+    """
+
+    name: str
+    tensor: GivenTensor
+    verdict: Verdict
+    evidence: Evidence
+    jacobi: Verdict
+    jacobi_evidence: Evidence
+    rank: int
+    casimirs: tuple[str, ...] = ()
+    in_involution: tuple[str, ...] = ()
+    involution: Verdict | None = None
+
+    @property
+    def text(self) -> str:
+        """The brackets that are not 0."""
+        return self.tensor.formula
+
+    @property
+    def short_text(self) -> str:
+        """The brackets, or how many there are where they would fill pages."""
+        if len(self.text) <= _SHOWN:
+            return self.text
+        return f"{counted(len(self.tensor.brackets), 'bracket')} that find-poisson writes out"
+
+    @property
+    def is_liouville_integrable(self) -> bool:
+        """Whether as many integrals are known to be in involution as the theorem of Liouville asks for."""
+        enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
+        return enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
+
+    @property
+    def statement(self) -> str:
+        """What is known of it beside the law, in words."""
+        parts = [f"rank {self.rank}"]
+        if self.jacobi.holds:
+            parts.append(f"a Poisson tensor ({self.jacobi})")
+        else:
+            parts.append("no Poisson tensor: the Jacobi identity fails")
+        if self.casimirs:
+            parts.append(f"{'a Casimir' if len(self.casimirs) == 1 else 'Casimirs'}: {', '.join(self.casimirs)}")
+        if self.involution is not None and self.involution.holds and len(self.in_involution) > 1:
+            parts.append(f"{', '.join(self.in_involution)} in involution ({self.involution})")
+        if self.is_liouville_integrable:
+            parts.append("Liouville integrable")
+        return "; ".join(parts)
+
+    @property
+    def latex(self) -> str:
+        """The matrix in LaTeX."""
+        rows = [" & ".join(latex(entry) for entry in row) for row in self.tensor.rows]
+        return "\\begin{pmatrix} " + " \\\\ ".join(rows) + " \\end{pmatrix}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        brackets = [{"of": list(pair), "is": format_factored(entry)} for pair, entry in self.tensor.brackets.items()]
+        return {
+            **attributes(self, "name"),
+            "brackets": brackets,
+            "latex": self.latex,
+            **attributes(self, "rank", "verdict", "evidence"),
+            "jacobi": {"verdict": str(self.jacobi), "evidence": self.jacobi_evidence.to_json()},
+            **attributes(self, "casimirs", "in_involution", "involution"),
+            "liouville_integrable": self.is_liouville_integrable,
+        }
+
+
+@dataclass(frozen=True)
+class PoissonSearch(Search):
+    """What `find_poisson` found: tensors up to `degree`, and why the search ended where it found none.
+
+    They span all of these, together with products of polynomial integrals and tensors of lower degrees.
+
+    `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None where that was not asked.
+    """
+
+    tensors: tuple[FoundTensor, ...]
+    integrals: tuple[FoundIntegral, ...]
+    degree: int
+    denominator: RationalFunction | None
+    pencil: Verdict | None
+    reason: str
+
+    @property
+    def note(self) -> str:
+        """What is to be said of all tensors together; empty where there is nothing."""
+        if self.pencil is None:
+            return ""
+        if self.pencil.holds:
+            return f"they are compatible: every combination of them is a Poisson tensor ({self.pencil})"
+        return "not every combination of them is a Poisson tensor"
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each tensor, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"name": one.name, "brackets": one.text, "verdict": str(one.verdict)} for one in self.tensors]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "tensors"),
+            "integrals": {one.name: one.text for one in self.integrals},
+            "degree_tried": self.degree,
+            "denominator": None if self.denominator is None else format_rational_function(self.denominator),
+            **attributes(self, "pencil", "note", "reason", "primes"),
+        }
+
+    def toml_section(self) -> str:
+        """The first tensor as a section [poisson], which `check-poisson --tensor` reads; empty where there is none."""
+        if not self.tensors:
+            return ""
+        return "\n".join([*self.toml_comments, self.tensors[0].tensor.toml_section()])
+
+
+def find_poisson(
+    file: SystemFile,
+    degree: int = 2,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    denominator: RationalFunction | None = None,
+    integrals: Sequence[FoundIntegral] | None = None,
+    seconds: float = 60.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> PoissonSearch:
+    """All tensors P with polynomial entries of at most a degree that the map of a file preserves.
+
+    Args:
+        file: the map; a system stands for its Kahan map.
+        degree: of the entries in the variables, or of their numerators.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps, where there is one).
+        denominator: a function of the variables and eps by which the entries are divided; None: where there are no
+            tensors without one, the factors of a density that is a product are tried, if that is little work.
+        integrals: those whose brackets are asked for; None: they are searched, if there is a tensor.
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        A `PoissonSearch`; formulas are exact, proved or supported. What products of polynomial integrals and other
+        tensors span is left out. Finding none up to a degree is measured.
+
+    Raises:
+        InputError: for unknown symbols, eps = 0, a negative degree, less than no time.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = find_poisson(load("lotka_volterra"))
+    >>> [(one.text, str(one.verdict), one.rank) for one in found.tensors]
+    [('{x,y} = x*y', 'proved', 2)]
+    """
+    if degree < 0 or not seconds > 0:
+        raise InputError(f"found the degree {degree} and {seconds} seconds, expected at least 0 and a time above 0")
+    laboratory = Laboratory(file, symbols, eps, seed)
+    deadline = time.monotonic() + seconds
+    dim, asked = file.dim, degree
+    pairs = dim * (dim - 1) // 2
+    if denominator is not None:
+        denominator = _in_names_of(laboratory, denominator)
+    while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
+        degree -= 1
+    found: list[FoundTensor] = []
+    reason = laboratory.defect
+    cut = f"degrees above {degree} were not tried" if degree < asked else ""
+    if pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
+        degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
+    if not reason:
+        progress(f"tensors of degree up to {degree}")
+        forms, reason = _tensors(laboratory, degree, denominator, deadline)
+        if not forms and degree < 2 <= asked and dim <= _MOST_LOGARITHMIC and denominator is None:
+            cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
+            forms, _ = _tensors(laboratory, 2, None, deadline, log_canonical(dim))
+        if not forms and denominator is None:
+            forms, denominator, more = _over_a_density(laboratory, degree, deadline)
+            reason = "" if forms else reason + more
+        if forms and integrals is None:
+            progress("integrals, for their brackets")
+            integrals = _integrals(laboratory, symbols, deadline, seed)
+        for k, tensor in enumerate(forms, 1):
+            progress(f"verifying tensor {k} of {len(forms)}")
+            one = _judged(laboratory, tensor, integrals or (), deadline)
+            found += [one] if one is not None else []
+        if len(found) < len(forms):
+            reason = "a tensor that was found modulo primes did not pass as an identity"
+        # Poisson tensors first, those of a high rank before others.
+        found.sort(key=lambda one: (not one.jacobi.holds, -one.rank))
+        found = [replace(one, name=f"P{k}" if len(found) > 1 else "P") for k, one in enumerate(found, 1)]
+    if cut:
+        cut = f"{cut}: such tensors have too many coefficients"
+        reason = f"{reason}; {cut}" if reason and not found else cut
+    pencil, known = _verdict_on_pencil(laboratory, found, deadline), tuple(integrals or ())
+    return PoissonSearch(*laboratory.asked, tuple(found), known, degree, denominator, pencil, reason)
+
+
+def _in_names_of(laboratory: Laboratory, function: RationalFunction) -> RationalFunction:
+    """A function of the variables and eps as one of the symbols too."""
+    context = ring(laboratory.map.names)
+    gens = (*context.gens()[: laboratory.map.dim], context.gens()[-1])
+    return RationalFunction(*(part.compose(*gens, ctx=context) for part in (function.numerator, function.denominator)))
+
+
+def _verdict_on_pencil(laboratory: Laboratory, found: Sequence[FoundTensor], deadline: float) -> Verdict | None:
+    """Whether all combinations are Poisson tensors; None where these are too many, or not all of them are."""
+    if not 1 < len(found) <= _LARGEST_PENCIL or not all(one.jacobi.holds for one in found):
+        return None
+    identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
+    return _verdict(laboratory, identity, deadline)[0]
+
+
+def _integrals(laboratory: Laboratory, symbols: Sequence[str], deadline: float, seed: int) -> tuple[FoundIntegral, ...]:
+    """The integrals in closed form that are found in half of the time that is left; none for maps without a search."""
+    left = max(1.0, (deadline - time.monotonic()) / 2)
+    try:
+        return find_integrals(laboratory.file, symbols=symbols, eps=laboratory.eps, seconds=left, seed=seed).integrals
+    except KahanmapsError:
+        return ()
+
+
+def _tensors(
+    laboratory: Laboratory,
+    degree: int,
+    denominator: RationalFunction | None,
+    deadline: float,
+    monomials: frozenset[Exponents] | None = None,
+) -> tuple[list[GivenTensor], str]:
+    """A basis of the tensors over the denominator in closed form, of these monomials, or a reason why there is none."""
+    try:
+        model, other = (tensor_space(map_, degree, denominator, monomials) for map_ in laboratory.maps)
+    except NoPoint as error:
+        return [], str(error)
+    if not model.basis:
+        return [], f"no tensor of degree at most {degree} is preserved (measured modulo a prime)"
+    if len(other.basis) != len(model.basis):
+        return [], "what was found at one eps was not found at another"
+    support = frozenset(model.support)
+    variables = laboratory.map.variables
+    forms = laboratory.formulas(
+        [model],
+        lambda map_: [tensor_space(map_, degree, denominator, support)],
+        deadline,
+        (*variables, *_directions(variables)),
+    )
+    if forms.bases is None:
+        return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
+    shown = [forms.bases[0][k] for k in _not_multiples(laboratory.maps[0], model, degree)]
+    return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in shown], ""
+
+
+def _over_a_density(
+    laboratory: Laboratory, degree: int, deadline: float
+) -> tuple[list[GivenTensor], RationalFunction | None, str]:
+    """Tensors whose denominator has the factors of a known density, each once, numerators as much higher in degree.
+
+    With that denominator, and what to add to the reason where there are none.
+    """
+    dim = laboratory.map.dim
+    try:
+        density = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+    except NoPoint:
+        return [], None, ""
+    factors = [g for g, _ in density.factors] if density is not None else []
+    higher = degree + sum(degree_in(g, dim) for g in factors)
+    if not factors or dim * (dim - 1) // 2 * comb(dim + higher, dim) > _MAX_UNKNOWNS // 2:
+        return [], None, ""
+    psi = reduce(lambda a, b: a * b, factors)
+    over = RationalFunction(psi, psi.context().constant(1))
+    forms, _ = _tensors(laboratory, higher, over, deadline)
+    if forms:
+        return forms, over, ""
+    return [], None, f", and none of degree at most {higher} over {format_rational_function(over)}"
+
+
+def log_canonical(dim: int) -> frozenset[Exponents]:
+    """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
+    pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
+    return frozenset((*pair, *pair) for pair in pairs)
+
+
+def _not_multiples(map_: ModularMap, space: DarbouxSpace, degree: int) -> list[int]:
+    """Which elements of the basis are not spanned by those before them and by products of an integral and a tensor."""
+    n, prime = map_.dim, map_.prime
+    integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
+    places = {exponent: k for k, exponent in enumerate(exponents_up_to(2 * n, degree))}
+    rows: list[list[int]] = []
+    for integral in integrals.basis:
+        if any(integral[1:]):
+            wide = [0] * len(places)
+            for exponent, c in zip(exponents_up_to(n, degree), integral, strict=True):
+                wide[places[(*exponent, *[0] * n)]] = c
+            rows += [P for v in space.basis if (P := product_of(wide, v, 2 * n, degree + 2, prime)) is not None]
+    found, dimension = [], rank(rows, prime)
+    for k, vector in enumerate(space.basis):
+        rows.append(vector)
+        if rank(rows, prime) > dimension:
+            found.append(k)
+            dimension += 1
+    return found
+
+
+def _directions(variables: Sequence[str]) -> list[str]:
+    """Names d_i for the directions, none of them that of a variable."""
+    prefix = "d_"
+    while any(name.startswith(prefix) for name in variables):
+        prefix += "_"
+    return [prefix + name for name in variables]
+
+
+def _tensor_of(bivector: fmpq_mpoly, n: int, names: Sequence[str], denominator: RationalFunction | None) -> GivenTensor:
+    """The matrix of sum P_ij d_i d_j, divided by the denominator."""
+    context = ring(names)
+    entries: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}
+    for monomial, coefficient in bivector.terms():
+        pair = tuple(k for k in range(n) if monomial[n + k])
+        entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
+    above, below = context.constant(1), context.constant(1)
+    if denominator is not None:
+        below, above = denominator.numerator, denominator.denominator
+
+    def entry(i: int, j: int) -> RationalFunction:
+        P = context.from_dict(entries.get((min(i, j), max(i, j)), {})) * above
+        return _reduced(P if i < j else -P, below)
+
+    return GivenTensor([[entry(i, j) for j in range(n)] for i in range(n)])
+
+
+def _reduced(above: fmpq_mpoly, below: fmpq_mpoly) -> RationalFunction:
+    common = above.gcd(below)
+    return RationalFunction(above / common, below / common)
+
+
+@cache
+def _unknowns(n: int, degree: int) -> tuple[list[tuple[int, int, int]], list[tuple[int, int]]]:
+    """For each monomial x^a d_i d_j its number among all monomials, that of d_i d_j and of x^a; and the pairs i < j."""
+    pairs = list(combinations(range(n), 2))
+    number = {exponent: k for k, exponent in enumerate(exponents_up_to(2 * n, degree + 2))}
+    found = []
+    for p, (i, j) in enumerate(pairs):
+        directions = tuple(int(k in (i, j)) for k in range(n))
+        for m, exponent in enumerate(exponents_up_to(n, degree)):
+            found.append((number[(*exponent, *directions)], p, m))
+    return found, pairs
+
+
+def tensor_space(
+    map_: ModularMap,
+    degree: int,
+    denominator: RationalFunction | None = None,
+    support: frozenset[Exponents] | None = None,
+) -> DarbouxSpace:
+    """All bivectors sum P_ij d_i d_j of degree at most `degree` that the map preserves, modulo its prime.
+
+    They are polynomials in x and the directions; the basis may be empty. With a `support` only those of its monomials.
+    Raises NoPoint.
+    """
+    n, prime = map_.dim, map_.prime
+    unknowns, pairs = _unknowns(n, degree)
+    length = len(exponents_up_to(2 * n, degree + 2))
+    if support is not None:
+        every = exponents_up_to(2 * n, degree + 2)
+        unknowns = [one for one in unknowns if every[one[0]] in support]
+    by_pair = [sum(p == q for _, q, _ in unknowns) for p in range(len(pairs))]
+    rows = []
+    for x, image in map_.pairs(max(by_pair, default=0) + _SPARE):
+        slope = map_.map.jacobian(x).tolist()
+        J = [[int(entry) for entry in row] for row in slope]
+        here, there = (monomial_values(point, degree, prime) for point in (x, image))
+        before, after = (_factor(map_, denominator, point) for point in (x, image))
+        for row, (i, j) in enumerate(pairs):
+            minors = [(J[i][a] * J[j][b] - J[i][b] * J[j][a]) * after % prime for a, b in pairs]
+            rows.append(
+                [(minors[p] * here[m] - (before * there[m] if p == row else 0)) % prime for _, p, m in unknowns]
+            )
+    vectors = []
+    for solution in null_space(rows, len(unknowns), prime):
+        vector = [0] * length
+        for (place, _, _), value in zip(unknowns, solution, strict=True):
+            vector[place] = value
+        vectors.append(vector)
+    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime)
+
+
+def _factor(map_: ModularMap, denominator: RationalFunction | None, x: Sequence[int]) -> int:
+    """The value of the denominator at a point, 1 without one. Raises NoPoint at its poles, which are everywhere."""
+    if denominator is None:
+        return 1
+    field = GF(map_.prime)
+    value = denominator.value(field, [field.convert(c) for c in (*x, *map_.values, map_.eps)])
+    if value is None:
+        raise NoPoint("the denominator has no value at a random point modulo a prime")
+    return int(value)
+
+
+def _judged(
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+) -> FoundTensor | None:
+    """The tensor with its verdicts; None where it is refuted."""
+    eps = laboratory.eps
+    law = transformation_identity(laboratory.map, tensor, eps)
+    # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
+    verdict, evidence = _verdict(laboratory, law, deadline if tensor.dim <= MAX_DIMENSION else 0.0)
+    if not verdict.holds:
+        return None
+    jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, eps), deadline)
+    map_ = laboratory.maps[0]
+    field, there = GF(map_.prime), Independent(map_)  # the gradients of Casimirs
+    x, at = tuple(field.convert(c) for c in (*there.point, *map_.values)), field.convert(map_.eps)
+    P = tensor.value(field, at, x)
+    rows = [there.gradient(one.function) for one in integrals]
+    casimirs: list[str] = []
+
+    def add_casimir(name: str, function: RationalFunction, row: list[int]) -> None:
+        is_killed = all(entry == 0 for entry in (P * field.column(row)).entries())
+        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), deadline)[0].holds:
+            casimirs.append(name)
+            there.add(row)
+
+    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
+    for one, row in zip(integrals, rows, strict=True):
+        add_casimir(one.name, one.function, row)
+    most = min(tensor.dim - rank_of_P, rank(rows, map_.prime))
+    if len(there.rows) < most and len(integrals) <= _MOST_INTEGRALS and time.monotonic() < deadline:
+        for name, function in casimir_candidates(laboratory, tensor, integrals, deadline):
+            row = there.gradient(function)
+            if len(there.rows) < most and there.adds(row):
+                add_casimir(name, function, row)
+    chosen = [integrals[k] for k in _in_involution(field, P, rows)]
+    involution = None
+    if chosen:
+        involution = _verdict(
+            laboratory, _brackets(laboratory, tensor, [one.function for one in chosen], False), deadline
+        )[0]
+    names = tuple(one.name for one in chosen)
+    found = (verdict, evidence, jacobi, jacobi_evidence, rank_of_P, tuple(casimirs), names, involution)
+    return FoundTensor("P", tensor, *found)
+
+
+def _in_involution(field: Field, P: Any, rows: Sequence[Sequence[Any]]) -> tuple[int, ...]:
+    """The most of the gradients `rows` whose brackets with each other are 0 at the point, the first such choice."""
+    moved = [(P * field.column(row)).entries() for row in rows]
+    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in moved] for row in rows]
+    most = range(min(len(rows), _MOST_INTEGRALS))
+    for size in range(len(most), 0, -1):
+        for choice in combinations(most, size):
+            if all(vanish[i][j] for i, j in combinations(choice, 2)):
+                return choice
+    return ()
+
+
+def _verdict(laboratory: Laboratory, identity: Identity, deadline: float) -> tuple[Verdict, Evidence]:
+    """The verdict on an identity, which is not multiplied out when the time is over."""
+    return judged(identity, laboratory.seed, expands=time.monotonic() < deadline)
+
+
+def _brackets(
+    laboratory: Laboratory, tensor: GivenTensor, functions: Sequence[RationalFunction], of_variables: bool
+) -> Identity:
+    """That all brackets of two functions vanish or, `of_variables`, those of a function and a variable."""
+    n = tensor.dim
+
+    def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides | None:
+        P = tensor.value(field, eps, place)
+        if P is None:
+            return None
+        with field.working():
+            columns = [field.column(slopes(one, field, (*place, eps), n)) for one in functions]
+            found: list[Any] = []
+            for k, column in enumerate(columns):
+                moved = P * column
+                if of_variables:
+                    found += moved.entries()
+                else:
+                    found += [(columns[j].transpose() * moved)[0, 0] for j in range(k)]
+        return found, [field.zero] * len(found)
+
+    subject = ("brackets", tensor.subject, list(functions), of_variables)
+    has_eps = laboratory.map.has_eps or tensor.has_eps
+    return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=subject)
+
+
+def _pencil(tensors: Sequence[GivenTensor]) -> GivenTensor:
+    """The sum of the tensors, each times a symbol of its own."""
+    names = tensors[0].rows[0][0].names
+    letter = "c"
+    while any(name.startswith(letter) for name in names):
+        letter += "_"
+    context = ring((*names[:-1], *(f"{letter}{k}" for k in range(len(tensors))), names[-1]))
+    gens = context.gens()
+    old, symbols = (*gens[: len(names) - 1], gens[-1]), gens[len(names) - 1 : -1]
+
+    def total(entries: Iterable[RationalFunction]) -> RationalFunction:
+        above, below = context.constant(0), context.constant(1)
+        for symbol, entry in zip(symbols, entries, strict=True):
+            N, D = (part.compose(*old, ctx=context) for part in (entry.numerator, entry.denominator))
+            above, below = above * D + symbol * N * below, below * D
+        return _reduced(above, below)
+
+    n = tensors[0].dim
+    return GivenTensor([[total(one.rows[i][j] for one in tensors) for j in range(n)] for i in range(n)])

@@ -1,0 +1,1 @@
+"""Orbits of any map, in every arithmetic: which way to step, and the steps."""

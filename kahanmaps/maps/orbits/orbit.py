@@ -1,0 +1,356 @@
+"""One door to all orbits: of any map, in any arithmetic, by the fastest way that gives what is asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
+
+from flint import fmpq
+
+from kahanmaps.algebra.etale import EtaleElement
+from kahanmaps.algebra.fields import GF, Field, rational
+from kahanmaps.algebra.written.text import parse_point
+from kahanmaps.displayed import data_frame
+from kahanmaps.errors import InputError
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
+from kahanmaps.maps.orbits.arithmetic import Arithmetic
+from kahanmaps.maps.orbits.iteration import (
+    DEFAULT_MAX_DIGITS,
+    Iterates,
+    Orbit,
+    OrbitEnd,
+    OrbitPoint,
+    require_short,
+    require_steps,
+)
+from kahanmaps.maps.orbits.methods import DOUBLING_FROM, choose_method, why_no_reduction
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.whole_files import write_whole
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import FamilyMember
+
+_TOO_FAR = 10**13  # years
+_FEW_STEPS = 3  # for which looking for a structure does not pay
+_LONG_INPUT = 4000  # bits of start and eps, from which on setting up a normal form pays later
+_LARGE_DIMENSION = 16
+_BITS_AT_LEAST = 4096  # where no precision is enough
+
+
+def orbit(
+    given: QuadraticSystem | BirationalMap | MapOver,
+    start: Any,
+    eps: Any = None,
+    steps: int | None = None,
+    *,
+    at: Sequence[int] | None = None,
+    arithmetic: str | Arithmetic | Field | type[float] = "exact",
+    method: str | None = None,
+    backward: bool = False,
+    every: int = 1,
+    max_digits: int | None = None,
+    hamiltonian: CubicHamiltonian | None = None,
+    member: FamilyMember | None = None,
+    structure: Structure | NoStructure | None = None,
+    kernel: str | None = None,
+    accuracy: int = 15,
+    progress: Callable[[str], None] | None = None,
+) -> Trajectory:
+    """The orbit of a start, or some of its iterates: iterate over it once, then look at `end`.
+
+    Args:
+        given: the map; a quadratic system stands for its Kahan map. A map at one eps, phi @ psi for example, is
+            iterated as it is, in its own numbers.
+        start: exact numbers, or text such as "1/2,-1/3"; floats may start float orbits.
+        eps: an exact number, for Kahan maps half the time step; none for a map without it.
+        steps: how many steps to take, or
+        at: which iterates alone are wanted.
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field such as GF(p).
+        method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
+        backward: step by the inverse map.
+        every: float orbits deliver only multiples of it; `wanted` tells for all.
+        max_digits: the digit budget in exact arithmetic (200,000 unless given).
+        hamiltonian, member: what is known of a quadratic system, so that its normal form need not be searched.
+        structure: the normal form itself, or why there is none; looked for where it pays unless given.
+        kernel: "numpy" or "numba", for floats.
+        accuracy: decimal digits, for "ball:auto".
+        progress: is told of trials.
+
+    Returns:
+        The points as they come, exact, enclosed or rounded as the arithmetic is; `method` says how and why.
+
+    Raises:
+        InputError: for wrong values, and for what the map, the method and the arithmetic do not allow together.
+
+    >>> riccati = QuadraticSystem.from_text(["x"], ["x^2"])
+    >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3)]
+    [['1/5'], ['1/4'], ['1/3'], ['1/2']]
+    >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3, arithmetic="mod:7")]
+    [['3'], ['2'], ['5'], ['4']]
+    """
+    if (steps is None) == (at is None):
+        raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
+    require_steps(steps)
+    arithmetic = Arithmetic.of(arithmetic)
+    start = _numbers(start, arithmetic)
+    if isinstance(given, MapOver):
+        return _orbit_at_one_eps(given, start, eps, steps, arithmetic, backward, max_digits)
+    map_ = as_map(given)
+    if eps is None and map_.has_eps:
+        raise InputError("found no eps, expected an exact number: the map depends on it")
+    exact_eps = fmpq(1) if eps is None else rational(eps)
+    far = max(at, default=0) if at is not None else (steps or 0)
+    require_steps(far)
+    if arithmetic.kind == "exact":
+        require_short(exact_eps, [rational(entry) for entry in start], max_digits)
+    if structure is None:
+        structure = _structure(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
+    chosen = choose_method(method, arithmetic.kind, structure, at)
+    if chosen.name != "doubling" and far > _TOO_FAR:
+        raise InputError(
+            f"step {far} is too far to be reached one step after the other (more than {_TOO_FAR:.0e}), "
+            f"and there is no other way here: {chosen.reason}"
+        )
+    used = structure if chosen.name != "generic" and isinstance(structure, Structure) else None
+    asked = _Asked(map_, start, exact_eps, far, at, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
+    remark = ""
+    if arithmetic == Arithmetic("ball"):
+        try:
+            bits = bits_for(lambda bits: asked.by(chosen.name, used, Arithmetic("ball", bits)), accuracy, progress)
+        except NotAccurate as error:
+            bits, remark = _BITS_AT_LEAST, str(error)
+        arithmetic = Arithmetic("ball", bits)
+    wanted = None if at is None else set(at)
+    points = asked.by(chosen.name, used, arithmetic)
+    return Trajectory(points, arithmetic, chosen.name, chosen.text, wanted, every, remark, map_.variables)
+
+
+class _Asked(NamedTuple):
+    """Which points of which orbit are wanted."""
+
+    map: BirationalMap
+    start: Sequence[Any]
+    eps: fmpq
+    steps: int
+    at: Sequence[int] | None
+    every: int
+    backward: bool
+    max_digits: int
+    kernel: str | None
+
+    def by(self, method: str, structure: Structure | None, numbers: Arithmetic) -> Any:
+        """The iterator over them by a method, in an arithmetic."""
+        if numbers.kind == "float":
+            from kahanmaps.maps.floats.fast import FloatOrbit
+
+            every = self.every if self.at is None else max(1, math.gcd(*self.at))
+            form = None if structure is None else structure.form
+            given = (self.map.rounded, self.eps, self.start, self.steps)
+            return FloatOrbit(*given, backward=self.backward, form=form, kernel=self.kernel, every=every)
+        over = self.map.at(self.eps, numbers.field)
+        limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
+        if method == "doubling" and structure is not None:
+            return Iterates(over, self.start, self.at or [], structure=structure, **limits)
+        normal = structure if method == "normal-form" else None
+        return Orbit(over, self.start, self.steps, structure=normal, **limits)
+
+
+class Trajectory:
+    """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it.
+
+    Iterate over it, and nothing is kept; or ask for its length, for points by their number, for a table or an array,
+    and all points are computed and kept.
+
+    >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
+    >>> len(found), found[-1].x, found.rows()[0]
+    (4, (1/2,), {'step': 0, 'x': '1/5'})
+    """
+
+    def __init__(
+        self,
+        orbit: Any,
+        arithmetic: Arithmetic,
+        method: str,
+        why: str,
+        at: set[int] | None,
+        every: int,
+        remark: str,
+        variables: Sequence[str],
+    ) -> None:
+        self.orbit = orbit
+        self.arithmetic = arithmetic
+        self.method = method
+        self.why = why
+        self._at, self._every, self._remark = at, every, remark
+        self.variables = tuple(variables)
+
+    def __repr__(self) -> str:
+        return f"Trajectory({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
+
+    def wanted(self, step: int) -> bool:
+        """Whether this step is one that was asked for: others may come as well."""
+        return step in self._at if self._at is not None else step % self._every == 0
+
+    def interrupt(self) -> None:
+        """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
+        self.orbit.interrupt()
+
+    @property
+    def end(self) -> OrbitEnd:
+        """How it ended; where not all points have come yet, they are computed and kept."""
+        if self.orbit.end is None:
+            _ = self.points
+        end: OrbitEnd = self.orbit.end
+        return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_whole else end
+
+    @cached_property
+    def points(self) -> list[OrbitPoint]:
+        """All points."""
+        return list(self._computed())
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @overload
+    def __getitem__(self, index: int) -> OrbitPoint: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[OrbitPoint]: ...
+    def __getitem__(self, index: int | slice) -> OrbitPoint | list[OrbitPoint]:
+        return self.points[index]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each point: its step and the coordinates, floats and residues as numbers, others as exact text."""
+        kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
+        return [
+            {"step": point.step, **{name: kind(x) for name, x in zip(self.variables, point.text, strict=True)}}
+            for point in self.points
+        ]
+
+    def to_pandas(self) -> Any:
+        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
+        return data_frame(self.rows())
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the points as `kahanmaps orbit -o` does: step and coordinates, exact."""
+        lines = [",".join(["step", *self.variables]), *(f"{p.step},{','.join(p.text)}" for p in self.points)]
+        write_whole(str(path), ("\n".join(lines) + "\n").encode())
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        """The coordinates (points, dim), rounded to doubles. Raises InputError for balls and over number fields."""
+        import numpy as np
+
+        from kahanmaps.maps.floats.doubles import to_float
+
+        if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
+            raise InputError(f'found {self.arithmetic} arithmetic, expected numbers: take arithmetic="float"')
+        rows = [[to_float(x) if isinstance(x, fmpq) else float(int(x)) for x in p.x] for p in self.points]
+        if self.arithmetic.kind == "float":
+            rows = [list(p.x) for p in self.points]
+        return np.array(rows, dtype=dtype or np.float64)
+
+    def __iter__(self) -> Iterator[OrbitPoint]:
+        # `list` asks for the length between here and the first point
+        yield from self.points if "points" in self.__dict__ else self._computed()
+
+    def _computed(self) -> Iterator[OrbitPoint]:
+        if self.arithmetic.kind != "float":
+            yield from self.orbit
+            return
+        from kahanmaps.maps.floats.fast import FLOATS
+
+        for step, x in self.orbit:
+            yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+def _numbers(start: Any, arithmetic: Arithmetic) -> Sequence[Any]:
+    """The entries of a start: of text its numbers, and of floats, for float orbits, exactly these."""
+    if isinstance(start, str):
+        start = parse_point(start)
+    if not hasattr(start, "__len__"):
+        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
+    if arithmetic.kind == "float":
+        start = [_exactly(x) if isinstance(x, float) else x for x in start]
+    numbers: Sequence[Any] = start
+    return numbers
+
+
+def _exactly(value: float) -> fmpq:
+    if not math.isfinite(value):
+        raise InputError(f"found {value} in the start, expected finite numbers")
+    return fmpq(*value.as_integer_ratio())
+
+
+def _orbit_at_one_eps(
+    phi: MapOver,
+    start: Sequence[Any],
+    eps: Any,
+    steps: int | None,
+    arithmetic: Arithmetic,
+    backward: bool,
+    max_digits: int | None,
+) -> Trajectory:
+    """The orbit of a map that has its eps and its field."""
+    if eps is not None or steps is None or arithmetic.kind != "exact":
+        raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
+    kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
+    points = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
+    return Trajectory(points, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
+
+
+def _structure(
+    map_: BirationalMap,
+    start: Sequence[Any],
+    eps: fmpq,
+    steps: int,
+    method: str | None,
+    arithmetic: Arithmetic,
+    hamiltonian: CubicHamiltonian | None,
+    member: FamilyMember | None,
+) -> Structure | NoStructure:
+    """The normal form, where it may be of use."""
+    if method == "generic":
+        return NoStructure("not looked for")
+    if not isinstance(map_, Kahan) or map_.system.symbols:
+        return NoStructure(f"it is {map_.kind}")
+    if method is None and (reason := _why_not_to_look(map_, start, eps, steps, arithmetic, member)):
+        return NoStructure(reason)
+    structure = structure_of(map_.system, hamiltonian, member)
+    if isinstance(structure, NoStructure):
+        return structure
+    if arithmetic.kind == "float" and structure.T is not None and method is None:
+        return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
+    reason = ""
+    if arithmetic.kind == "ball":
+        from kahanmaps.maps.normal_form.iterate import special_start
+
+        reason = special_start(structure, eps, start)
+    if arithmetic.kind == "mod":
+        reason = why_no_reduction(structure, GF(arithmetic.number), eps)
+    return NoStructure(reason) if reason else structure
+
+
+def _why_not_to_look(
+    map_: BirationalMap,
+    start: Sequence[Any],
+    eps: fmpq,
+    steps: int,
+    arithmetic: Arithmetic,
+    member: FamilyMember | None,
+) -> str:
+    """Empty, or why looking for a structure would cost more than it can save."""
+    few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
+    numbers = [eps, *(rational(entry) for entry in start)]
+    if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
+        few = max(few, 24)
+    if steps <= few:
+        return "not looked for, for so few steps"
+    if member is None and map_.dim > _LARGE_DIMENSION:
+        return f"not looked for in dimension {map_.dim}"
+    return ""

@@ -1,0 +1,365 @@
+"""Beyond the paper: what lies behind its theorems, how far they reach, and where they end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import comb
+from typing import Any
+
+from kahanmaps.paper.claims.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
+from kahanmaps.paper.evaluate import entries
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import ClaimFunction, Kind, Pairs, claim
+from kahanmaps.paper.variations import VARIATIONS, Variation, jordan_block, varied
+
+_ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
+
+
+@claim(
+    "Structure",
+    "",
+    "det(I - eps f') = prod (1 + eps^2 D_i),  x~ = (x + 2 eps f)/(1 + eps^2 D_i) on each block",
+    breaks=("H", "eps"),
+    distinct_roots=True,
+)
+def product_of_planar_maps(o: PaperObjects) -> Pairs:
+    """The map is a product of planar maps: no linear system has to be solved"""
+    product = o.K.one
+    for i in o.each:
+        E = o.projector(i).transpose()
+        factor = o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, o.x)
+        product = product * factor
+        yield E * o.x_tilde * factor, E * (o.x + o.fx * (o.number(2) * o.eps))
+    yield o.det(o.minus_eps_jac(o.f, o.x)), product
+
+
+@claim(
+    "Structure",
+    "",
+    "Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1",
+    breaks=("B", "H"),
+    distinct_roots=True,
+)
+def associated_maps_on_the_blocks(o: PaperObjects) -> Pairs:
+    """The map of an associated field is the map of f on some blocks and its inverse on the others"""
+    backwards = o.step(o.f, o.x, times=-1)
+    for signs in o.all_signs():
+        x_hat = o.step(o.g(o.B_signs(signs)), o.x)
+        for i in o.each:
+            E = o.projector(i).transpose()
+            yield E * x_hat, E * (o.x_tilde if signs[i] > 0 else backwards)
+
+
+@claim("Structure", "", "Phi_{-f} = Phi_f^{-1}", breaks=("map",), blockwise=True)
+def opposite_field(o: PaperObjects) -> Pairs:
+    """The map of -f is the inverse of the map of f"""
+    opposite = o.g(-o.I)
+    yield o.step(opposite, o.x_tilde), o.x
+
+
+@claim(
+    "Structure",
+    "",
+    "deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4",
+    kind=Kind.ATTAINED,
+    in_general=True,
+    at_most="docs/mathematics.md proves it for all n by the content rule",
+    breaks=("f",),
+    distinct_roots=True,
+)
+def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
+    """The degrees of the first four iterates are those of the theorem for all n"""
+    direction, form = o.vector("direction"), o.vector("form")
+    degrees = [o.m * (3 * n * n + 5) // 4 if n % 2 else 3 * o.m * n * n // 4 + 1 for n in range(1, _ITERATES + 1)]
+    size = degrees[-1] + 1  # one more, to see a larger degree
+    points = [o.x + direction * o.number(t) for t in range(2 * size)]
+    for degree in degrees:
+        points = [o.step(o.f, x) for x in points]
+        values = [o.dot(form, x) for x in points]
+        # Of a rational function of degree d of t the matrix (y(s) - y(t))/(s - t) has the rank d.
+        quotients = [(values[s] - values[t]) * o.number(1, s - t) for s in range(size) for t in range(size, 2 * size)]
+        yield o.rank(o.K.matrix(size, size, quotients)), degree
+
+
+@claim(
+    "Tensor theorem",
+    "",
+    "A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]",
+    breaks=("A",),
+    symplectic=False,
+    theorem="the tensor theorem (docs/mathematics.md)",
+)
+def map_over_the_algebra(o: PaperObjects) -> Pairs:
+    """The Kahan map of a system over Q[A^T] is one over Q[A^T]"""
+    jacobian = o.jacobian_of_step(o.arbitrary_system_over_the_algebra(), o.x)
+    yield o.AT * jacobian, jacobian * o.AT
+
+
+@claim(
+    "Tensor theorem",
+    "",
+    "Phi_f o Phi_g = Phi_g o Phi_f, g = B^T f, for any quadratic f over Q[A^T]",
+    breaks=("B",),
+    symplectic=False,
+    theorem="the splitting lemma (docs/mathematics.md)",
+)
+def commuting_systems_over_the_algebra(o: PaperObjects) -> Pairs:
+    """A system over Q[A^T] need not be Hamiltonian for its sign systems to commute"""
+    f = o.arbitrary_system_over_the_algebra()
+    for B in o.associates():
+        g = f.transformed(B.transpose())
+        yield o.step(f, o.step(g, o.x)), o.step(g, o.step(f, o.x))
+
+
+@claim(
+    "Tensor theorem",
+    "",
+    "dPhi (A^T)^k Pi(x) dPhi^T = (A^T)^k Pi(x~), k < m",
+    distinct_roots=True,
+    breaks=("H", "map"),
+    blockwise=True,
+)
+def poisson_map_for_each_power(o: PaperObjects) -> Pairs:
+    """Not one invariant Poisson tensor but m, one for each element of a basis of the algebra"""
+    jacobian = o.jacobian_of_step(o.f, o.x)
+    for k in range(o.m):
+        power = o.A_to(k).transpose()
+        yield jacobian * power * o.Pi(o.x) * jacobian.transpose(), power * o.Pi(o.x_tilde)
+
+
+@claim(
+    "Tensor theorem",
+    "",
+    "sum c_k (A^T)^k Pi is a Poisson tensor for any constants c_k",
+    least_m=2,
+    pairwise=True,
+    distinct_roots=True,
+    breaks=("H", "f"),
+)
+def compatible_poisson_tensors(o: PaperObjects) -> Pairs:
+    """The m invariant Poisson tensors are compatible"""
+    yield from jacobi_identity_of(o, o.polynomial_in_A([o.vector("c")[k, 0] for k in range(o.m)]).transpose())
+
+
+@claim(
+    "A with a Jordan block",
+    "",
+    "dim of the cubics = 4m, lambda_1 double, chi the minimal polynomial",
+    kind=Kind.ATTAINED,
+    at_most="docs/mathematics.md proves it for every A that is not derogatory",
+    least_m=2,
+    breaks=("J",),
+    distinct_roots=True,
+)
+def dimension_of_the_cubics_for_a_jordan_block(o: PaperObjects) -> Pairs:
+    """For A that is not diagonalisable, but not derogatory, the cubics form a space of dimension 4m as well"""
+    yield comb(o.n + 2, 3) - jordan_block(o).rank_of_cubic_equations(), 4 * o.m
+
+
+@claim(
+    "Maximality",
+    "",
+    "Phi_f o Phi_g = Phi_g o Phi_f for g = B^T f, B^3 = B",
+    least_m=2,
+    breaks=("roots",),
+    distinct_roots=True,
+    blockwise=True,
+)
+def commutativity_for_idempotents(o: PaperObjects) -> Pairs:
+    """B may have the eigenvalue 0 as well: the map of the part of f on one block commutes with that of f"""
+    for i in o.each:
+        g = o.g(o.projector(i))
+        yield o.step(o.f, o.step(g, o.x)), o.step(g, o.x_tilde)
+
+
+@claim(
+    "Maximality",
+    "",
+    "Res(N_1, N_2) != 0, (l^3 - l) N_i(l) the components of Phi_f o Phi_{l f} - Phi_{l f} o Phi_f on a block",
+    kind=Kind.DIFFERENT,
+    in_general=True,
+    breaks=("linear",),
+    distinct_roots=True,
+)
+def only_cube_roots_commute(o: PaperObjects) -> Pairs:
+    """The maps of f and l f, so those of f at eps and at l eps, commute for l^3 = l only; hence those of f and B^T f"""
+    for i in o.each:
+        x = o.projector(i).transpose() * o.x
+        fx, x_tilde = o.value(o.f, x), o.step(o.f, x)
+        square = o.eps * o.eps
+        # N has degree 5 in l over these denominators, and vanishes at 0, 1 and -1: a quadratic, known at 2, 3 and 4.
+        values = []
+        for l in (2, 3, 4):
+            below = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
+            moved = x + fx * (o.eps * o.number(2 * l))
+            first = o.K.one + square * o.number(l * l) * o.block_determinant(i, x_tilde)
+            second = below * below + square * o.block_determinant(i, moved)
+            difference = o.step(o.f, x_tilde, times=l) - o.step(o.f, o.step(o.f, x, times=l))
+            values.append(difference * (first * second * o.number(1, l**3 - l)))
+        low, middle, high = values
+        slope, curve = (high - low) * o.number(1, 2), (high + low) * o.number(1, 2) - middle
+        (a, b, c), (p, q, r) = ([o.dot(o.vector(form), v) for v in (curve, slope, middle)] for form in ("v", "w"))
+        yield (a * r - c * p) * (a * r - c * p) - (a * q - b * p) * (b * r - c * q), o.K.zero
+
+
+@claim(
+    "Periodic levels",
+    "",
+    "32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]",
+    breaks=("H", "f"),
+    distinct_roots=True,
+    blockwise=True,
+)
+def division_polynomials(o: PaperObjects) -> Pairs:
+    """Determinants [ijk] of points of an orbit in a plane: T has order 5 where g = 32/27, and 6 where g = 28/27"""
+    for i in o.free:
+        E = o.projector(i).transpose()
+        points = [E * o.x]
+        for _ in range(6):
+            points.append(o.step(o.f, points[-1]))
+
+        def det(*which: int, points: list[Any] = points) -> Any:
+            return o.sum([o.dot(points[a], o.J * points[b]) for a, b in zip(which, which[1:] + which[:1], strict=True)])
+
+        x, fx = points[0], o.value(o.f, points[0])
+        D, D_f = o.block_determinant(i, x), o.block_determinant(i, fx)
+        along, s = o.block_determinant(i, x + fx) - D - D_f, o.K.one + o.eps * o.eps * D
+        g = s * s * o.number(27) + (along * along + D * D * D) * o.eps**6 * o.number(4)  # 27 g s^2
+        five, six = s * s * o.number(32) - g, s * s * o.number(28) - g
+        yield s * s * o.number(32) * det(0, 1, 5) * det(2, 3, 4), five * det(0, 2, 4) * det(1, 3, 5)
+        yield five * det(0, 1, 6) * det(2, 3, 5), six * det(0, 2, 5) * det(1, 3, 6)
+
+
+def _commuting(o: PaperObjects) -> Pairs:
+    """The maps of the class commute"""
+    for B in o.associates():
+        yield o.step(o.f, o.step(o.g(B), o.x)), o.step(o.g(B), o.x_tilde)
+
+
+def _measure(o: PaperObjects) -> Pairs:
+    """The map of f has its invariant measure"""
+    determinant = o.det(o.jacobian_of_step(o.f, o.x))
+    yield determinant * o.det(o.minus_eps_jac(o.f, o.x)), o.det(o.minus_eps_jac(o.f, o.x_tilde))
+
+
+def _shared_measure(o: PaperObjects) -> Pairs:
+    """All maps of the class have that measure"""
+    for B in o.associates():
+        determinant = o.det(o.jacobian_of_step(o.g(B), o.x))
+        x_hat = o.step(o.g(B), o.x)
+        yield determinant * o.det(o.minus_eps_jac(o.f, o.x)), o.det(o.minus_eps_jac(o.f, x_hat))
+
+
+def _modified(o: PaperObjects) -> Pairs:
+    """The map of f conserves modified H"""
+    yield o.modified_H(o.x_tilde), o.modified_H(o.x)
+
+
+def _shared_modified(o: PaperObjects) -> Pairs:
+    """The modified Hamiltonians are shared by all maps of the class"""
+    for B in o.associates():
+        yield o.modified_H(o.step(o.g(B), o.x)), o.modified_H(o.x)
+        yield o.modified(B, o.x_tilde), o.modified(B, o.x)
+
+
+def _paper_integral(o: PaperObjects) -> Pairs:
+    """The map of f conserves the paper's form eps^{-1} x^T J^{-1} x~"""
+    images = [o.solve(o.J, o.step(o.f, x)) for x in (o.x_tilde, o.x)]
+    yield o.dot(o.x_tilde, images[0]), o.dot(o.x, images[1])
+
+
+def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
+    """The modified Hamiltonian of the k-th associated field, for other numbers as well."""
+    return lambda o, x: o.modified(list(o.associates())[k], x)
+
+
+def _all_integrals(o: PaperObjects) -> Pairs:
+    """The map of f conserves the m functions eps^{-1} x^T J (A^T)^k x~"""
+    for k in range(o.m):
+        yield o.H_tilde_(k, o.x_tilde), o.H_tilde_(k, o.x)
+
+
+def _gradients(o: PaperObjects) -> Pairs:
+    """The modified Hamiltonians satisfy the same differential equation as H and K"""
+    v = o.vector("v")
+    for k, B in enumerate(o.associates()):
+        left = o.slope(_modified_K(k), o.x, v)
+        yield left, o.slope(lambda o, x: o.modified_H(x), o.x, B.transpose() * v)
+
+
+def _involution(o: PaperObjects) -> Pairs:
+    """The modified Hamiltonians are in involution for Pi"""
+    gradient = o.gradient(lambda o, x: o.modified_H(x), o.x)
+    for k, _ in enumerate(o.associates()):
+        other = o.gradient(_modified_K(k), o.x)
+        yield o.dot(gradient, o.Pi(o.x) * other), o.K.zero
+
+
+def _formula(o: PaperObjects) -> Pairs:
+    """The formula (106) for the integral through H and the K_i"""
+    right = o.P0(o.x) * o.H(o.x)
+    for i in o.each:
+        right = right + o.eps * o.eps * o.Q(i, o.x) * o.Kf(o.B(i), o.x)
+    yield o.modified_H(o.x), right
+
+
+# What is asked of every variation: the formula, the controls of what holds, how it is proved, and an answer for each of
+# VARIATIONS in turn: + holds, - fails, and a blank where it is not asked: of a variation that concerns g nothing is
+# asked that concerns f alone.
+_ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
+STATEMENTS: list[tuple[ClaimFunction, str, tuple[str, ...], dict[str, Any], str]] = [
+    (_commuting, "Phi_f o Phi_g = Phi_g o Phi_f", ("B", "map"), _BOTH, "++--++"),
+    (_measure, "dx/det(I - eps f') is invariant for f", ("map",), _ALONE, "+++ ++"),
+    (_shared_measure, "dx/det(I - eps f') is invariant for g", ("B", "map"), _BOTH, "++--++"),
+    (_modified, "modified H is conserved by f", ("map",), _ALONE, "+++ ++"),
+    (_shared_modified, "modified H is conserved by g, modified K by f", ("B", "map"), _BOTH, "++--++"),
+    (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", ("map",), _ALONE, "-++ ++"),
+    (_all_integrals, "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m", ("map",), _ALONE, "-   ++"),
+    (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", ("map",), _ALONE, "++- +-"),
+    (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", ("B", "map"), _BOTH, "++--+-"),
+    (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", ("f''",), {"pairwise": True, "least_m": 2}, "++- +-"),
+    (_gradients, "nabla (modified K) = B nabla (modified H)", ("B",), _BOTH, "++--++"),
+    (_involution, "{modified H, modified K} = 0 for Pi", ("B",), {"pairwise": True, "needs_g": True}, "++--++"),
+    (_formula, "modified H = P_0 H + eps^2 sum Q_i K_i", ("B",), {}, "-+-   "),
+]
+
+
+def _register() -> None:
+    for function, formula, breaks, how, answers in STATEMENTS:
+        for (name, variation), answer in zip(VARIATIONS.items(), answers, strict=True):
+            if answer != " ":
+                _register_cell(function, formula, breaks, how, name, variation, answer == "+")
+
+
+def _register_cell(
+    function: ClaimFunction,
+    formula: str,
+    breaks: tuple[str, ...],
+    how: dict[str, Any],
+    name: str,
+    variation: Variation,
+    holds: bool,
+) -> None:
+    def cell(o: PaperObjects) -> Pairs:
+        pairs = list(function(varied(name, o)))
+        if holds or not pairs:
+            yield from pairs
+        else:  # one of them has to differ
+            yield tuple(o.K.column([e for pair in pairs for e in entries(pair[side])]) for side in (0, 1))
+
+    cell.__name__ = f"{function.__name__}_{name}"
+    cell.__doc__ = f"{(function.__doc__ or '').splitlines()[0].rstrip('.')}: {variation.title}"
+    more = dict(how)
+    needs_g = more.pop("needs_g", False) and variation.least_m > 1 and name != "any-structure"
+    least = max(variation.least_m, more.pop("least_m", 1), 3 if needs_g else 1)
+    more |= {"distinct_roots": True, "least_m": least, "statement": formula, "variation": name}
+    if holds:
+        more |= {"symplectic": not variation.theorem, "theorem": variation.theorem}
+    else:
+        more |= {"kind": Kind.DIFFERENT, "in_general": True}
+    claim(
+        variation.title, "", formula if holds else f"not {formula}", breaks=breaks if holds else ("unvaried",), **more
+    )(cell)
+
+
+_register()

@@ -1,0 +1,179 @@
+"""What survives of the paper's statements where its hypotheses are varied: proved or refuted, cell by cell.
+
+Each cell is a claim of section 10, decided like all of them for the member in general. A statement that fails is shown
+to by the smallest counterexample: all numbers 0 or 1 and eps = 1, as few ones as can be, in the order of m.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import monomials
+from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.settings import Settings
+from kahanmaps.paper.claims.further_claims import STATEMENTS
+from kahanmaps.paper.evaluate import UNDEFINED, Outcome, same, witness_of
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import ClaimFunction, claims
+from kahanmaps.paper.variations import VARIATIONS
+from kahanmaps.paper.verifier import VerifyOptions
+from kahanmaps.paper.verify import verify_universal
+
+_MOST_ONES = 7
+_KEY = "not "
+
+Slot = tuple[str, tuple[int, ...]]
+
+
+def survivors(m: int = 3, settings: Settings | None = None) -> Report:
+    """Every statement for every variation, in half the dimension m: what holds is proved, what fails is refuted.
+
+    Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
+    as `verify_universal` does.
+
+    >>> cells = {found.claim: found for found in survivors(1).findings}
+    >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary
+    'fails for m = 1, H = u1^3 + v1'
+    """
+    report = verify_universal(m, settings, VerifyOptions(beyond=True))
+    by_key = {claim.key: claim for claim in claims()}
+    functions = {formula: function for function, formula, *_ in STATEMENTS}
+    cells = []
+    for finding in report.findings:
+        claim = by_key[finding.place["key"]]
+        fails = finding.formula.startswith(_KEY)
+        verdict, evidence, witness = finding.verdict, finding.evidence, finding.witness
+        if fails and verdict is Verdict.PROVED:
+            verdict = Verdict.REFUTED
+            found = smallest_counterexample(functions[claim.statement], claim.variation)
+            if found is not None:
+                text, witness = found
+                evidence = Evidence("exact rational point", f"fails for {text}")
+        title = f"{claim.statement}: {VARIATIONS[claim.variation].title}"
+        place = {**finding.place, "statement": claim.statement, "variation": claim.variation}
+        cells.append(Finding(title, verdict, evidence, (), witness, claim.statement, control=fails, place=place))
+    return Report("verify", tuple(cells), {**report.context, "beyond": True}, report.notes)
+
+
+def table(report: Report) -> str:
+    """The cells as a table in Markdown, and the counterexamples below it."""
+    titles = [variation.title for variation in VARIATIONS.values()]
+    lines = [f"| statement | {' | '.join(titles)} |", "|---" * (len(titles) + 1) + "|"]
+    cells = {(found.place["statement"], found.place["variation"]): found for found in report.findings}
+    for _, formula, *_ in STATEMENTS:
+        row = [str(cells[formula, name].verdict) if (formula, name) in cells else "" for name in VARIATIONS]
+        lines.append(f"| `{formula}` | {' | '.join(row)} |".replace("  |", " |"))
+    lines.append("")
+    for found in report.findings:
+        if found.witness is not None:
+            left, right = found.witness.left[0], found.witness.right[0]
+            point = ", ".join(found.witness.point)
+            lines.append(f"* {found.claim}: {found.evidence.summary} at x = ({point}), eps = 1: {left} and {right}")
+    return "\n".join(lines)
+
+
+def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
+    """The data in words, and the point with both sides; None where there is none with at most seven ones."""
+    slots, make = _SMALL[variation]()
+    for count in range(2, _MOST_ONES + 1):
+        for ones in itertools.combinations(slots, count):
+            o = make(ones)
+            try:
+                failure = next((pair for pair in function(o) if not same(QQ, *pair)), None)
+            except UNDEFINED:
+                continue
+            if failure is not None:
+                witness = witness_of(Outcome(o, 1, failure))
+                return (_words(o, ones), witness) if witness is not None else None
+    return None
+
+
+def _words(o: PaperObjects, ones: Sequence[Slot]) -> str:
+    names = [f"{letter}{i + 1}" for letter in "uv" for i in range(o.m)]
+    terms = ["*".join(_power(names[i], e) for i, e in enumerate(place) if e) for kind, place in ones if kind == "H"]
+    text = f"m = {o.m}, H = {' + '.join(terms)}"
+    brackets = [f"{{{names[i]}, {names[j]}}}" for kind, (i, j) in _pairs(ones) if kind == "J"]
+    return f"{text}, {' = '.join(brackets)} = 1 the only brackets" if brackets else text
+
+
+def _pairs(ones: Sequence[Slot]) -> Iterator[tuple[str, tuple[int, int]]]:
+    return ((kind, (place[0], place[1])) for kind, place in ones if kind == "J")
+
+
+def _power(name: str, exponent: int) -> str:
+    return name if exponent == 1 else f"{name}^{exponent}"
+
+
+def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) -> PaperObjects:
+    """Objects in normal form with A = diag(roots, roots), H the sum of the monomials, x the sum of the unit vectors."""
+    n = 2 * m
+    cubic = [[0] * n for _ in range(n * n)]
+    hessian, linear, x = [[0] * n for _ in range(n)], [0] * n, [0] * n
+    for kind, place in ones:
+        where = [i for i, e in enumerate(place) for _ in range(e)] if kind == "H" else []
+        for i, j, k in itertools.permutations(where) if len(where) == 3 else ():
+            cubic[i * n + j][k] += 1
+        for i, j in itertools.permutations(where) if len(where) == 2 else ():
+            hessian[i][j] += 1
+        if len(where) == 1:
+            linear[where[0]] += 1
+        if kind == "x":
+            x[place[0]] += 1
+    vectors = {"x": x, "v": [1] * n}
+    return PaperObjects(
+        K=QQ,
+        A=QQ.matrix(n, n, [fmpq(roots[i % m] * (i == j)) for i in range(n) for j in range(n)]),
+        third=QQ.matrix(n * n, n, [fmpq(e) for row in cubic for e in row]),
+        hessian_of_quadratic_part=QQ.matrix(n, n, [fmpq(e) for row in hessian for e in row]),
+        gradient_of_linear_part=QQ.column([fmpq(e) for e in linear]),
+        eps=fmpq(1),
+        roots=tuple(map(fmpq, roots)),
+        draw=lambda name: QQ.column([fmpq(e) for e in vectors[name]]),
+        **more,
+    )
+
+
+def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
+    """The monomials of these degrees, each in the variables of one plane if `planar`, and the coordinates of x."""
+    found: list[Slot] = []
+    for degree in degrees:
+        for exponent in monomials(2 * m, degree):
+            planes = {i % m for i, e in enumerate(exponent) if e}
+            if not planar or len(planes) == 1:
+                found.append(("H", tuple(exponent)))
+    return found + [("x", (i,)) for i in range(2 * m)]
+
+
+Small = tuple[list[Slot], Callable[[Sequence[Slot]], PaperObjects]]
+
+
+def _steps() -> Small:
+    twice = QQ.identity(2) * fmpq(-2)
+    return _slots(1, (3,)), lambda ones: _objects(1, (1,), ones, associate_matrices=(twice,))
+
+
+def _any_structure() -> Small:
+    pairs: list[Slot] = [("J", pair) for pair in itertools.combinations(range(4), 2)]
+
+    def make(ones: Sequence[Slot]) -> PaperObjects:
+        entries = dict.fromkeys((pair for _, pair in _pairs(ones)), 1)
+        J = [fmpq(entries.get((i, j), 0) - entries.get((j, i), 0)) for i in range(4) for j in range(4)]
+        return _objects(2, (1, 2), ones, J=QQ.matrix(4, 4, J))
+
+    return pairs + _slots(2, (3,)), make
+
+
+_SMALL: dict[str, Callable[[], Small]] = {
+    "inhomogeneous": lambda: (_slots(1, (3, 2, 1)), lambda ones: _objects(1, (1,), ones)),
+    "steps": _steps,
+    "any-structure": _any_structure,
+    "derogatory": lambda: (
+        _slots(2, (3,), planar=False),
+        lambda ones: _objects(2, (1, 1), ones, associate_matrices=(QQ.identity(4),)),
+    ),
+}

@@ -1,0 +1,1 @@
+"""Invariant curves and the planes in which they are drawn."""

@@ -1,0 +1,188 @@
+"""Draws the planes of a member: in each the cubic and the orbit on it, every step in one colour in all of them.
+
+Dots of one colour are the planar parts of one point. That each of them runs along its own curve, at its own pace, while
+the point itself wanders through a cloud, is the product structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.curves.invariant_curves import InvariantCurves, InvariantPlane
+from kahanmaps.plots.curves.plane_cubics import Floats, PlaneCubic
+from kahanmaps.plots.curves.plane_views import Disc, Rectangle, clouds_of, view_of
+from kahanmaps.plots.figures import RASTERISE_ABOVE, beside, drawing, label_of, new_figure
+from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOUR_MAP, COLOURS, MARKS, Style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_CURVE, _FLOW = "#9a9a9a", "#444444"
+_CROWDED = 0.06  # of the width of a panel: a number would cover the one before
+_POINT = CENTIMETRES_PER_INCH / 72  # in centimetres
+_NUMBERED = 4  # steps whose dots have their number beside them
+
+
+def draw_invariant_curves(
+    found: InvariantCurves,
+    style: Style,
+    projective: bool = False,
+    flow: bool = False,
+    original: tuple[int, int] | None = None,
+    labels: Sequence[str] = (),
+) -> Figure:
+    """One panel for each real plane, two for a complex one: the cubics and, on them, the orbits.
+
+    With `projective` a panel shows the whole projective plane as a disc, opposite points of whose rim are the same
+    point at infinity. `flow` adds the level curve of the differential equation through each start, dashed. `original`
+    are the numbers of two variables: a first panel shows the orbit in them, before it is taken apart. `labels` name the
+    starts where there are several. Raises InputError for numbers that are none of variables.
+    """
+    if original is not None and not all(0 <= k < len(found.variables) for k in original):
+        raise InputError(f"found the variables {original}, expected two numbers from 0 to {len(found.variables) - 1}")
+    panels = panels_of(found)
+    count = len(panels) + (original is not None)
+    columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
+    columns = min(columns, max(1, int(style.width / (12 * style.font_size * _POINT))))  # or letters fill the panels
+    rows = ceil(count / columns)
+    with drawing(style):
+        from matplotlib.colors import Normalize
+
+        figure = new_figure(style, _aspect(style, rows, columns, projective))
+        steps = max(len(x) for x in found.originals) - 1
+        pen = _Pen(Normalize(0, max(1, steps)), len(found.originals) == 1, style)
+        every = list(figure.subplots(rows, columns, squeeze=False).flat)
+        grid = iter(every)
+        if original is not None:
+            _draw_original(next(grid), found, original, pen)
+        for place, plane, column in panels:
+            _draw_plane(next(grid), plane, column, place, projective, flow, pen)
+        for axes in grid:
+            axes.remove()
+        if pen.by_step and steps:
+            pen.add_bar(figure, found.poles[0])
+        elif not pen.by_step:
+            pen.add_legend(figure, found, labels)
+    return figure
+
+
+def panels_of(found: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
+    """The panels: the number of the root, the plane, and "uv" or, where it is complex, "u" and "v"."""
+    panels, number = [], 0
+    for plane in found.planes:
+        number += 1
+        if plane.is_real:
+            panels.append((str(number), plane, "uv"))
+        else:
+            panels += [(str(number), plane, "u"), (str(number), plane, "v")]
+            number += 1  # for the conjugate root
+    return panels
+
+
+def _aspect(style: Style, rows: int, columns: int, projective: bool) -> float:
+    """Height over width such that the panels are squares, with room for letters and a colour bar."""
+    width, letter = style.width, style.font_size * _POINT
+    side = max(1.0, width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
+    return float((rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter) / width)
+
+
+class _Pen:
+    """How dots are drawn: by step, where there is one orbit, otherwise by orbit."""
+
+    def __init__(self, scale: Any, by_step: bool, style: Style) -> None:
+        self.scale, self.by_step, self.style = scale, by_step, style
+
+    def orbit(self, axes: Axes, x: Floats, y: Floats, number: int, normals: Floats | None) -> None:
+        count = len(x)
+        size = 11.0 if count <= 120 else 6.0 if count <= 500 else 2.0 if count <= 5_000 else 0.6
+        how: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
+        if self.by_step:
+            how = {"c": np.arange(count), "norm": self.scale, "cmap": COLOUR_MAP}
+        axes.scatter(x, y, s=size, linewidths=0, zorder=2, rasterized=count > RASTERISE_ABOVE, **how)
+        if not self.by_step:
+            return
+        for k in range(min(_NUMBERED, count)):
+            aside = np.array([0.7, 0.7]) if normals is None else normals[k]
+            axes.plot(x[k], y[k], "o", markersize=4.2, fillstyle="none", color="black", markeredgewidth=0.5, zorder=3)
+            across, up = np.abs(x[:k] - x[k]) / np.ptp(axes.get_xlim()), np.abs(y[:k] - y[k]) / np.ptp(axes.get_ylim())
+            if np.any(np.hypot(across, up) < _CROWDED):
+                continue
+            offset = tuple(8 * aside * _inwards(axes, x[k], y[k], aside))
+            how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
+            beside(axes, str(k), (x[k], y[k]), offset, 1.5, zorder=4, **how)
+
+    def add_bar(self, figure: Figure, pole: int | None) -> None:
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.ticker import MaxNLocator
+
+        how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
+        bar = figure.colorbar(ScalarMappable(self.scale, COLOUR_MAP), ax=figure.axes, **how)
+        bar.set_label("step" if pole is None else f"step (a pole at step {pole} ends the orbit)")
+        bar.outline.set_linewidth(0.4)
+        bar.locator = MaxNLocator(nbins=6, integer=True)
+
+    def add_legend(self, figure: Figure, found: InvariantCurves, labels: Sequence[str]) -> None:
+        from matplotlib.lines import Line2D
+
+        handles = []
+        for k, pole in enumerate(found.poles):
+            label = (labels[k] if k < len(labels) else f"start {k + 1}").replace("$", r"\$")
+            label += "" if pole is None else f" (a pole at step {pole})"
+            handles.append(Line2D([], [], linestyle="none", marker=MARKS[k], color=COLOURS[k], label=label))
+        figure.legend(handles=handles, loc="outside lower center", ncols=2 if len(handles) > 1 else 1)
+
+
+def _draw_plane(
+    axes: Axes, plane: InvariantPlane, column: str, place: str, projective: bool, flow: bool, pen: _Pen
+) -> None:
+    view: Disc | Rectangle = Disc.of(plane, column) if projective else view_of(plane, column)
+    if plane.is_real:
+        names = f"$u_{{{place}}}$", f"$v_{{{place}}}$"
+        axes.set_title(rf"$\lambda_{{{place}}} = {plane.root_text}$")
+    else:
+        name = f"{column}_{{{place}}}"
+        names = rf"$\mathrm{{Re}}\,{name}$", rf"$\mathrm{{Im}}\,{name}$"
+        root = f"{plane.root.real:.3g}" * (plane.root.real != 0) + rf" \pm {plane.root.imag:.3g}\,\mathrm{{i}}"
+        axes.set_title(rf"$\lambda_{{{place},{int(place) + 1}}} = {root}$")
+    view.prepare(axes, names)
+    for orbit in plane.orbits:
+        if orbit.cubic is None:
+            continue
+        for rows in view.curves(orbit.cubic):
+            axes.plot(*rows.T, color=_CURVE, linewidth=0.9, zorder=1)
+        if flow:
+            for rows in view.curves(orbit.cubic.flow_through(float(orbit.u[0]), float(orbit.v[0]))):
+                axes.plot(*rows.T, color=_FLOW, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
+    for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
+        normals = None if orbit.cubic is None else _normals(orbit.cubic, x[:_NUMBERED], y[:_NUMBERED], view.stretch)
+        pen.orbit(axes, *view.place(x, y), number, normals)
+
+
+def _draw_original(axes: Axes, found: InvariantCurves, original: tuple[int, int], pen: _Pen) -> None:
+    clouds = [(x[:, original[0]], x[:, original[1]]) for x in found.originals]
+    names = label_of(found.variables[original[0]]), label_of(found.variables[original[1]])
+    Rectangle.around(clouds).prepare(axes, names)
+    axes.set_title("the orbit itself")
+    for number, (x, y) in enumerate(clouds):
+        pen.orbit(axes, x, y, number, None)
+
+
+def _inwards(axes: Axes, x: float, y: float, aside: Floats) -> int:
+    """1, or -1 where a number on that side of a dot would lie on the edge of its panel."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    place = (np.array([x, y]) - limits[:, 0]) / (limits[:, 1] - limits[:, 0])
+    return -1 if np.any(np.abs(place + 2 * _CROWDED * aside - 0.5) > 0.5) else 1
+
+
+def _normals(cubic: PlaneCubic, x: Floats, y: Floats, stretch: float) -> Floats:
+    """Unit vectors across the curve as it appears, for the numbers beside the dots."""
+    across, along = cubic.gradient(x, y)
+    rows = np.stack([across, along * stretch], axis=1)
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(np.where(length > 0, rows / np.where(length > 0, length, 1), np.sqrt(0.5)))

@@ -1,0 +1,272 @@
+"""A Kahan map of the family as a product: in each plane of its normal form the orbit, and the cubic that carries it.
+
+What is drawn is computed here, `draw_invariant_curves.py` draws it. At a real root of chi the plane is real, and its
+coordinates (u, v) are symplectic: those in which h = kappa (u^3 - 3 u v^2), if h has three real lines, or h =
+kappa (u^3 + 3 u v^2), if it has one; if h has a repeated factor they are those of `family show --normal-form`. A pair
+of complex roots has one plane with complex coordinates, those of the normal form at the root with positive imaginary
+part.
+
+The steps are taken in floating-point numbers of 256 bits, so that all digits that can be drawn are right. What comes
+closer to infinity than 2^96 counts as a pole, and ends the orbit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from flint import acb, acb_mat, arb, fmpq
+from numpy.typing import NDArray
+
+from kahanmaps.algebra.fields import RR, rational
+from kahanmaps.algebra.written.text import format_number
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.family.structure import NoStructure
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
+from kahanmaps.maps.normal_form.splitting import Splitting
+from kahanmaps.plots.curves.plane_cubics import PlaneCubic
+from kahanmaps.plots.curves.symmetric_planes import COMPLEX, Matrix, symmetric_coordinates, transformed
+
+MAX_POINTS = 1_000_000
+MAX_STARTS = 7  # as many colours as there are
+BITS = 256
+_POLE_BITS = 96
+_SAID_EVERY = 2_000
+_LARGEST = 1e60  # of what is drawn: cubes of it are still machine numbers
+
+Numbers = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneOrbit:
+    """An orbit in one plane: `u` and `v` at the steps 0, 1, ..., complex where the plane is; and its curve.
+
+    `cubic` is None in a complex plane.
+    """
+
+    u: Numbers
+    v: Numbers
+    cubic: PlaneCubic | None
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantPlane:
+    """One plane of the normal form: its root of chi, as a number and as text, and one orbit for each start.
+
+    `h` are the coefficients of the cubic in the coordinates (u, v), complex where the root is; `shape` says what h is:
+    one of the constants of `symmetric_planes`. `index` is the number of the plane in its splitting, `block` its map in
+    the coordinates (u, v), and `matrix` leads to them from those of the splitting.
+    """
+
+    index: int
+    root: complex
+    root_text: str
+    shape: str
+    h: tuple[complex, complex, complex, complex]
+    block: PlanarBlock
+    matrix: Matrix
+    orbits: tuple[PlaneOrbit, ...] = ()
+
+    @property
+    def is_real(self) -> bool:
+        """Whether the root is real, so that there is a curve to be drawn."""
+        return self.root.imag == 0
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantCurves:
+    """The planes of a member, real ones by increasing root; the orbits of all starts in them.
+
+    `poles[k]` is the step at which the orbit of the k-th start has no value, None if all of `steps` were taken.
+    `originals[k]` holds the orbit in the variables, a row for each step.
+    """
+
+    variables: tuple[str, ...]
+    eps: fmpq
+    steps: int
+    planes: tuple[InvariantPlane, ...]
+    originals: tuple[Numbers, ...]
+    poles: tuple[int | None, ...]
+    structure: str
+
+
+def find_invariant_curves(
+    file: SystemFile,
+    starts: Sequence[Sequence[Any]],
+    eps: Any,
+    steps: int,
+    progress: Callable[[str], None] = lambda _: None,
+) -> InvariantCurves:
+    """The orbits of some starts, plane by plane, and the cubics on which they move.
+
+    `starts` are exact points of the system, `eps` is exact, half the time step. A system that is not declared as a
+    member of the family is taken where an A is found for its Hamiltonian. Raises HypothesisError where there is no
+    normal form: no member, or chi has a repeated root; InputError for wrong sizes.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = find_invariant_curves(load("paper_m2"), [[1, 0, "1/2", 0]], "1/20", 100)
+    >>> [plane.root_text for plane in found.planes], found.poles
+    (['1', '2'], (None,))
+    >>> orbit = found.planes[0].orbits[0]
+    >>> orbit.cubic.defect(orbit.u, orbit.v) < 1e-13
+    True
+    """
+    _require_sizes(starts, steps)
+    structure = file.structure
+    if isinstance(structure, NoStructure):
+        raise HypothesisError(
+            f"{file.name} has no normal form whose planes could be drawn: {structure.reason}; expected a member of "
+            "the family, declared or hidden, whose chi has no repeated root (see kahanmaps family show)"
+        )
+    epsilon = rational(eps)
+    if epsilon == 0:
+        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    field = RR(BITS)
+    splitting = Splitting(structure.form, field, epsilon, structure.T)
+    with field.working():
+        frames = _frames(splitting)
+        runs, originals, poles = [], [], []
+        for number, start in enumerate(starts, 1):
+            triples = splitting.triples([arb(rational(entry)) for entry in start])
+            firsts = [_turned(frame.matrix, triples[frame.index]) for frame in frames]
+            said = f"start {number} of {len(starts)}" if len(starts) > 1 else "orbit"
+            orbits, pole = _orbits(frames, firsts, epsilon, steps, said, progress)
+            runs.append(
+                [
+                    PlaneOrbit(u, v, _cubic(frame, first, epsilon) if frame.is_real else None)
+                    for frame, first, (u, v) in zip(frames, firsts, orbits, strict=True)
+                ]
+            )
+            originals.append(_in_variables(frames, orbits, splitting))
+            poles.append(pole)
+    planes = tuple(replace(frame, orbits=found) for frame, found in zip(frames, zip(*runs, strict=True), strict=True))
+    return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), structure.text)
+
+
+def _require_sizes(starts: Sequence[Sequence[Any]], steps: int) -> None:
+    if not 1 <= len(starts) <= MAX_STARTS:
+        raise InputError(f"found {len(starts)} starts, expected 1 to {MAX_STARTS}")
+    if steps < 0 or (steps + 1) * len(starts) > MAX_POINTS:
+        raise InputError(
+            f"found {steps} steps from {len(starts)} {'start' if len(starts) == 1 else 'starts'}, expected 0 or more "
+            f"steps and at most {MAX_POINTS} points"
+        )
+
+
+def _frames(splitting: Splitting) -> list[InvariantPlane]:
+    """The planes, real ones by increasing root."""
+    rational_roots = [-factor[0] / factor[1] for factor, _ in splitting.form.chi.factor()[1] if factor.degree() == 1]
+    found = []
+    for index, plane in enumerate(splitting.planes):
+        root = plane.residue([arb(0), arb(1)])
+        if isinstance(root, arb):
+            exact = [number for number in rational_roots if root.contains(arb(number))]
+            text = format_number(exact[0]) if exact else f"{float(root.mid()):.5g}"
+            shape, matrix = symmetric_coordinates(plane.block)
+        else:
+            # A ball around 0 is the only way in which 0 comes as the real part of a root that is not rational.
+            real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
+            text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
+            shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
+        coefficients = [entry.mid() for entry in transformed(plane.block, matrix)]
+        h = tuple(map(_machine, coefficients))
+        if not np.isfinite(h).all():
+            raise InputError(
+                "the normal form leaves the range of machine numbers: its coefficients are too large to draw"
+            )
+        found.append(InvariantPlane(index, complex(_machine(root)), text, shape, h, PlanarBlock(*coefficients), matrix))
+    return sorted(found, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
+
+
+def _orbits(
+    frames: Sequence[InvariantPlane],
+    firsts: Sequence[Triple],
+    eps: fmpq,
+    steps: int,
+    said: str,
+    progress: Callable[[str], None],
+) -> tuple[list[tuple[Numbers, Numbers]], int | None]:
+    """u and v in every plane, up to the first pole in any of them, and the step of that pole."""
+    orbits, pole = [], None
+    for number, (frame, first) in enumerate(zip(frames, firsts, strict=True), 1):
+        wanted = steps if pole is None else pole - 1
+        orbits.append(_orbit(frame.block, first, eps, wanted, f"{said}: plane {number} of {len(frames)}", progress))
+        if len(orbits[-1][0]) <= wanted:
+            pole = len(orbits[-1][0])
+    length = steps + 1 if pole is None else pole
+    return [(np.array(us[:length]), np.array(vs[:length])) for us, vs in orbits], pole
+
+
+def _orbit(
+    block: PlanarBlock, first: Triple, eps: fmpq, steps: int, said: str, progress: Callable[[str], None]
+) -> tuple[list[Any], list[Any]]:
+    """u and v at the steps 0, 1, ..., fewer of them where the map has a pole."""
+    P = first
+    us, vs = [], []
+    step = 2 * arb(eps)
+    strength = max(abs(entry) for entry in (block.a, block.b, block.c, block.d))
+    closest = strength * arb(2) ** -_POLE_BITS
+    for k in range(steps + 1):
+        U, V, W = P
+        if k and abs(W) <= closest * max(abs(U), abs(V)):
+            break
+        us.append(_machine(U / W / step))
+        vs.append(_machine(V / W / step))
+        P = block.image(P)
+        size = max(abs(entry) for entry in P)
+        if size == 0:  # no value, even in projective space
+            P = (U, V, W * 0)
+            continue
+        P = tuple((entry / size).mid() for entry in P)
+        if k % _SAID_EVERY == 0:
+            progress(f"{said}, step {k}")
+    return us, vs
+
+
+def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
+    """The curve through the start, its level given as a fraction of numbers of moderate size."""
+    U, V, W = first
+    step = 2 * arb(eps)
+    p, q, r = frame.block.D
+    above, below = frame.block.h(U / W / step, V / W / step), 1 + (p * U * U + q * U * V + r * V * V) / (W * W)
+    parts = [arb(0) if part.contains(arb(0)) else part for part in (above, below)]
+    size = max(abs(part) for part in parts)
+    above, below = (float(part / size) if size > 0 else 0.0 for part in parts)
+    a, b, c, d = (entry.real for entry in frame.h)
+    cubic = PlaneCubic((a, b, c, d), float(arb(eps)), above, below)
+    largest = max(*map(abs, frame.h), float(abs(U / W / step)), float(abs(V / W / step)), cubic.length)
+    smallest = min(cubic.length, max(float(abs(U / W / step)), float(abs(V / W / step))) or cubic.length)
+    if not 1 / _LARGEST < smallest <= largest < _LARGEST:
+        raise InputError(
+            f"found numbers from {smallest:.0e} to {largest:.0e} in the plane of lambda = {frame.root_text}, expected "
+            f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the start, the system or eps"
+        )
+    return cubic
+
+
+def _in_variables(
+    frames: Sequence[InvariantPlane], orbits: Sequence[tuple[Numbers, Numbers]], splitting: Splitting
+) -> Numbers:
+    """The orbit in the variables of the system, a row for each step."""
+    total = np.zeros((len(orbits[0][0]), splitting.dim))
+    for frame, (u, v) in zip(frames, orbits, strict=True):
+        f, g, k, l = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
+        old = [f * u + g * v, k * u + l * v]
+        columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
+        parts = [old[0].real, old[0].imag, old[1].real, old[1].imag] if frame.root.imag else [old[0].real, old[1].real]
+        total += np.stack(parts, axis=1) @ columns.T
+    return total
+
+
+def _turned(matrix: Matrix, triple: Triple) -> Triple:
+    f, g, k, l = matrix.entries()
+    U, V, W = triple
+    return f * U + g * V, k * U + l * V, W
+
+
+def _machine(value: Any) -> Any:
+    """A ball as a machine number."""
+    return complex(float(value.real.mid()), float(value.imag.mid())) if isinstance(value, acb) else float(value.mid())

@@ -1,0 +1,141 @@
+"""Level curves of a rational function in the plane, as accurate as points of orbits are.
+
+The level F = c of F = N/D is drawn as the zeros of N - c D, which has no poles: on a grid, then each vertex is moved to
+the curve by Newton's method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.plots.figures import require_matplotlib
+from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.plots.portraits.windows import Window
+
+MAX_LEVELS = 200
+GRID = 301  # lines each way
+_NEWTON = 8
+
+
+@dataclass(frozen=True, eq=False)
+class LevelCurves:
+    """Curves F = level in a window: for each level pieces, arrays (n, 2) of vertices; `missing` levels have none."""
+
+    label: str
+    levels: tuple[float, ...]
+    pieces: tuple[tuple[FloatArray, ...], ...]
+
+    @property
+    def missing(self) -> int:
+        """How many levels have no curve in the window."""
+        return sum(not pieces for pieces in self.pieces)
+
+
+def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
+    """The values at starts (n, dim), each once (equal up to rounding is equal), in order; poles are passed over."""
+    values = np.sort(function(starts))
+    kept: list[float] = []
+    for value in values[np.isfinite(values)].tolist():
+        if not kept or abs(value - kept[-1]) > 1e-10 * max(abs(value), abs(kept[-1])):
+            kept.append(value)
+    return tuple(kept)
+
+
+def level_curves(
+    function: PointFunction, plane: Sequence[int], dim: int, levels: Sequence[float], window: Window
+) -> LevelCurves:
+    """The curves F = level in a window of the plane of two variables, given by their indices.
+
+    Raises InputError where F depends on other variables than these two, and for more than 200 levels.
+
+    >>> from kahanmaps.plots.point_functions import point_function
+    >>> circle = level_curves(point_function("x^2 + y^2", "xy"), (0, 1), 2, [1.0], ((-2, 2), (-2, 2)))
+    >>> bool(np.allclose((circle.pieces[0][0] ** 2).sum(axis=1), 1, rtol=1e-12))
+    True
+    """
+    if len(plane) != 2 or len(window) != 2:
+        raise InputError("level curves are for pictures of two variables")
+    further = sorted(function.used() - set(plane))
+    if further:
+        names = function.function.names
+        raise InputError(
+            f"{function.name}: found {', '.join(names[k] for k in further)} in it, expected a function of "
+            f"{names[plane[0]]} and {names[plane[1]]} alone: the level curves of others are not curves in this plane"
+        )
+    if len(levels) > MAX_LEVELS:
+        raise InputError(f"found {len(levels)} levels, expected at most {MAX_LEVELS}: choose some of them")
+
+    def sides(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return function.parts(_in_plane(points, plane, dim))
+
+    above, below = sides(_grid(window)[-1])
+    found = []
+    for level in levels:
+
+        def value(points: FloatArray, level: float = level) -> FloatArray:
+            over, under = sides(points)
+            return over - level * under
+
+        with np.errstate(all="ignore"):
+            found.append(zero_curves(value, window, above - level * below))
+    return LevelCurves(function.label, tuple(levels), tuple(found))
+
+
+def zero_curves(
+    value: Callable[[FloatArray], FloatArray], window: Window, on_grid: FloatArray | None = None
+) -> tuple[FloatArray, ...]:
+    """The curves in a window on which a function of points (..., 2) is 0: pieces, arrays (n, 2) of vertices.
+
+    They are found on a grid, `on_grid` the values there if they are known, and each vertex is moved onto the curve.
+
+    >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
+    >>> bool(np.allclose((circle**2).sum(axis=1), 1, rtol=1e-12))
+    True
+    """
+    require_matplotlib()
+    from contourpy import contour_generator
+
+    xs, ys, points = _grid(window)
+    with np.errstate(all="ignore"):
+        values = value(points) if on_grid is None else on_grid
+    if not np.isfinite(values).all():
+        values = np.ma.masked_invalid(values)
+    lines = contour_generator(xs, ys, values).lines(0.0)
+    return tuple(_moved_onto(value, np.asarray(line), window) for line in lines)
+
+
+def _grid(window: Window) -> tuple[FloatArray, FloatArray, FloatArray]:
+    xs, ys = (np.linspace(low, high, GRID) for low, high in window)
+    return xs, ys, np.stack(np.meshgrid(xs, ys), axis=-1)
+
+
+def _in_plane(points: FloatArray, plane: Sequence[int], dim: int) -> FloatArray:
+    full = np.zeros((*points.shape[:-1], dim))
+    full[..., list(plane)] = points
+    return full
+
+
+def _moved_onto(value: Callable[[FloatArray], FloatArray], line: FloatArray, window: Window) -> FloatArray:
+    """The vertices moved by Newton's method along the gradient, by less than a mesh of the grid."""
+    mesh = np.array([(high - low) / (GRID - 1) for low, high in window])
+    with np.errstate(all="ignore"):
+        moved = line.copy()
+        for _ in range(_NEWTON):
+            step = 1e-4 * mesh
+            gradient = np.stack(
+                [(value(moved + e * step) - value(moved - e * step)) / (2 * step[k]) for k, e in enumerate(np.eye(2))],
+                axis=-1,
+            )
+            # in units of the mesh, so that both axes count alike
+            scaled = gradient * mesh
+            change = -(value(moved) / (scaled**2).sum(axis=-1))[:, None] * scaled * mesh
+            moved = moved + change
+        good = np.isfinite(moved).all(axis=-1) & (np.abs(moved - line) <= mesh).all(axis=-1)
+        good &= np.abs(value(moved)) <= np.abs(value(line))
+    line[good] = moved[good]
+    return line

@@ -1,0 +1,1 @@
+"""How far integrals move along float orbits."""

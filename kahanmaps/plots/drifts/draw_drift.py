@@ -1,0 +1,119 @@
+"""The drift of integrals drawn: a panel for each function, a line for each method."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.curves.zero_band import log_scale_with_zero
+from kahanmaps.plots.drifts.drift import METHODS, DriftCurve, DriftSurvey
+from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, wrapped
+from kahanmaps.plots.style import COLOURS, LINES, Style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+SCALES = ("loglog", "semilog")
+_PANEL = 5.5  # centimetres that a panel needs beside another
+_LOST = 1e3
+_NO_VALUES = (1e-17, 1e-15)  # the axis where everything is 0
+
+
+def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = "loglog") -> Figure:
+    """The errors of a survey against the step, logarithmic: a panel for each function, a line for each method.
+
+    `scale` is "loglog", or "semilog" with a linear axis of steps. An error of exactly 0 lies in a band marked 0 at the
+    bottom, an arrow at the top stands for errors beyond `clipped_from`. A cross ends the line of an orbit that ended
+    early, and the legend says where. Raises InputError for a scale of another name.
+    """
+    if scale not in SCALES:
+        raise InputError(f"found the scale {scale[:40]!r}, expected {' or '.join(SCALES)}")
+    style = style or Style()
+    count = len(survey.labels)
+    columns = _columns(count, style.width)
+    rows = -(-count // columns)
+    with drawing(style):
+        labels = _methods(survey)
+        panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
+        aspect = panel * rows + legend_height(labels, style, title=True)
+        figure = new_figure(style, aspect)
+        room = 0.75 / rows * 72 * style.inches(aspect)[1]  # for what stands beside a panel, in points
+        panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+        for axes, name in zip(panels, survey.labels, strict=False):
+            _draw_panel(axes, survey, name, scale)
+            kind = "relative" if survey.relative[name] else "absolute"
+            label = f"{kind} error of {survey.labels[name]}"
+            axes.set_ylabel(label if label.endswith("$") else wrapped(label, room, style.font_size, most=2))
+        for k, axes in enumerate(panels):
+            if k >= count:
+                axes.set_visible(False)
+            elif k + columns >= count:
+                axes.set_xlabel("step $n$")
+                axes.tick_params(labelbottom=True)
+        title = rf"time step $2\varepsilon = {label_number(2 * survey.eps)}$"
+        legend_above(figure, [_handle(method) for method in survey.ends], labels, style, title)
+    return figure
+
+
+def clipped_from(survey: DriftSurvey, name: str) -> float:
+    """The error of a function beyond which a picture shows no more: an arrow at the top stands for what is larger.
+
+    A thousand, or ten times the largest error of methods that got through: what blows up would flatten all others.
+    """
+    whole = [curve.errors for curve in survey.curves if curve.function == name and survey.ends[curve.method].is_whole]
+    return max([_LOST, *(10 * float(errors.max()) for errors in whole if len(errors))])
+
+
+def _columns(count: int, width: float) -> int:
+    if width >= _PANEL * count and count <= 3:
+        return count
+    return 1 if count <= 3 else 3 if count > 4 and width >= 3 * _PANEL else 2
+
+
+def _draw_panel(axes: Axes, survey: DriftSurvey, name: str, scale: str) -> None:
+    curves = [curve for curve in survey.curves if curve.function == name]
+    errors = np.concatenate([curve.errors for curve in curves]) if curves else np.array([])
+    limit = clipped_from(survey, name)
+    positive = np.minimum(errors[errors > 0], limit)
+    least, largest = (positive.min(), positive.max()) if len(positive) else _NO_VALUES
+    zero = log_scale_with_zero(axes, float(least), float(largest), len(positive) < len(errors))
+    if scale == "loglog":
+        axes.set_xscale("log")
+        axes.set_xlim(1 if survey.steps > 9 else 0.9, max(survey.steps, 2))
+    else:
+        axes.set_xlim(0, survey.steps)
+    for curve in curves:
+        _draw_curve(axes, curve, zero, limit, survey.ends[curve.method].is_whole)
+
+
+def _draw_curve(axes: Axes, curve: DriftCurve, zero: float | None, limit: float, is_whole: bool) -> None:
+    if not len(curve.steps):
+        return
+    k = list(METHODS).index(curve.method)
+    heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
+    marker = "o" if len(heights) == 1 else None
+    axes.plot(curve.steps, heights, color=COLOURS[k], linestyle=LINES[k], linewidth=0.9, marker=marker)
+    above = np.flatnonzero(heights > limit)
+    if len(above):
+        axes.plot(curve.steps[above[:1]], [limit], color=COLOURS[k], marker="^", markersize=5, clip_on=False)
+    elif not is_whole:
+        axes.plot(curve.steps[-1:], heights[-1:], color=COLOURS[k], marker="x", markersize=5, clip_on=False)
+
+
+def _methods(survey: DriftSurvey) -> list[str]:
+    """The lines of the legend, with the step at which an orbit ended early."""
+    return [
+        METHODS[method] + ("" if end.is_whole else f" (ended at step {end.steps})")
+        for method, end in survey.ends.items()
+    ]
+
+
+def _handle(method: str) -> Line2D:
+    from matplotlib.lines import Line2D
+
+    k = list(METHODS).index(method)
+    return Line2D([], [], color=COLOURS[k], linestyle=LINES[k], linewidth=0.9)

@@ -1,0 +1,215 @@
+"""How far functions drift along float orbits of the Kahan map, and of other methods with the same time step."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.errors import InputError, counted
+from kahanmaps.family.planar import NormalForm
+from kahanmaps.maps.floats.classical import ClassicalOrbit
+from kahanmaps.maps.floats.doubles import FloatArray, to_floats
+from kahanmaps.maps.floats.fast import FloatOrbit
+from kahanmaps.maps.orbits.iteration import OrbitEnd
+from kahanmaps.plots.drifts.drift_functions import WatchedFunction
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+METHODS = {
+    "generic": "Kahan",
+    "normal-form": "Kahan, normal form",
+    "rk4": "RK4",
+    "midpoint": "implicit midpoint",
+}
+BINS = 200
+MAX_STEPS = 10**9
+MAX_FUNCTIONS = 6
+_TRIED = 40  # random starts
+_HALVED = 5  # of them before the next ones are half as large
+_PROBE = 1000  # steps
+
+
+@dataclass(frozen=True, eq=False)
+class DriftCurve:
+    """The error of one function along the orbit of one method: the largest in each bin of steps, and where it was.
+
+    An exact 0 is 0: all values of the bin were equal to that at the start. Bins without a value are left out;
+    `undefined` counts points of the orbit where the function has none.
+    """
+
+    method: str
+    function: str
+    steps: NDArray[np.int64]
+    errors: FloatArray
+    undefined: int
+
+
+@dataclass(frozen=True, eq=False)
+class DriftSurvey:
+    """The curves of all methods and functions; `relative` says for each function whether errors are relative to I(x_0).
+
+    They are absolute where I(x_0) = 0. `labels` are what a picture calls the functions; `ends` says how the orbit of
+    each method ended; `eps` is exact, half the time step.
+    """
+
+    eps: fmpq
+    start: tuple[fmpq, ...]
+    steps: int
+    labels: Mapping[str, str]
+    relative: Mapping[str, bool]
+    curves: tuple[DriftCurve, ...]
+    ends: Mapping[str, OrbitEnd]
+
+
+def survey_drift(
+    system: QuadraticSystem,
+    eps: Any,
+    start: Sequence[Any],
+    steps: int,
+    functions: Sequence[WatchedFunction],
+    methods: Sequence[str] = ("generic", "rk4", "midpoint"),
+    *,
+    form: NormalForm | None = None,
+    linear_bins: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DriftSurvey:
+    """Errors |I(x_n) - I(x_0)|/|I(x_0)| of functions along the orbits of several methods, `steps` steps each.
+
+    Every step is looked at; kept is the largest error in each of about 200 bins, which are equally long or (by
+    default) grow with n, so memory does not grow with `steps`. `eps` (half the time step) and `start` are exact;
+    `methods` are names of METHODS, and "normal-form" needs `form`. Raises InputError for wrong values, and where a
+    function has no value at the start.
+
+    >>> from kahanmaps.plots.drifts.drift_functions import known_functions
+    >>> from kahanmaps.documents.catalog import load
+    >>> top = load("euler_top")
+    >>> found = survey_drift(top.system, "1/10", [1, "1/2", "1/3"], 1000, known_functions(top, fmpq(1, 10)))
+    >>> [f"{curve.errors.max():.0e}" for curve in found.curves if curve.function == "F1"][1:]
+    ['5e-05', '1e-05']
+    """
+    eps = rational(eps)
+    point = tuple(rational(entry) for entry in start)
+    if not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    if eps == 0:
+        raise InputError("found eps = 0, expected another number: nothing moves")
+    if not 1 <= len(functions) <= MAX_FUNCTIONS:
+        raise InputError(f"found {len(functions)} functions, expected 1 to {MAX_FUNCTIONS} in one picture")
+    if len(point) != system.dim:
+        raise InputError(
+            f"found a start with {counted(len(point), 'coordinate')}, expected {system.dim}: "
+            f"{', '.join(system.variables)}"
+        )
+    origins = [_origin(function, point) for function in functions]
+    edges = _edges(steps, linear_bins)
+    curves, ends = [], {}
+    for method in methods:
+        orbit = _orbit(system, eps, point, steps, method, form)
+        bins = [_Bins(edges) for _ in functions]
+        for step, points in orbit.portions():
+            if step:  # the start is where errors are 0 by definition
+                for function, (at_start, scale), held in zip(functions, origins, bins, strict=True):
+                    with np.errstate(all="ignore"):
+                        held.add(step - len(points) + 1, np.abs(function(points) - at_start) / scale)
+            progress(f"{METHODS[method]}: step {step} of {steps}")
+        ends[method] = orbit.end
+        curves += [held.curve(method, function.name) for function, held in zip(functions, bins, strict=True)]
+    return DriftSurvey(
+        eps,
+        point,
+        steps,
+        {function.name: function.label for function in functions},
+        {function.name: scale is not _ABSOLUTE for function, (_, scale) in zip(functions, origins, strict=True)},
+        tuple(curves),
+        ends,
+    )
+
+
+def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq, ...]:
+    """A random start with small rational coordinates, the same one for the same seed.
+
+    The first of up to 40, smaller and smaller ones, from which RK4 gets through a thousand steps, if there is one:
+    elsewhere there is nothing to compare with. `eps` is half the time step.
+
+    >>> small_start(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]), "1/10")
+    (1/2, 2/3)
+    """
+    rng = random.Random(f"drift {seed}")
+    starts = [
+        tuple(
+            fmpq(rng.choice((-1, 1)) * rng.randint(1, 6), rng.randint(9, 16) << k // _HALVED) for _ in range(system.dim)
+        )
+        for k in range(_TRIED)
+    ]
+    for start in starts:
+        orbit = ClassicalOrbit(system, eps, start, _PROBE, "rk4")
+        for _ in orbit.portions():
+            pass
+        if orbit.end is not None and orbit.end.is_whole:
+            return start
+    return starts[0]
+
+
+_ABSOLUTE = 1.0
+
+
+def _origin(function: WatchedFunction, start: Sequence[fmpq]) -> tuple[float, float]:
+    """The value at the start in doubles, and what errors are divided by."""
+    exact = function.at(start)
+    value = float(function(to_floats(start)[None])[0])
+    if exact is None or not np.isfinite(value):
+        raise InputError(f"{function.name} has no value in machine numbers at the start: take another start")
+    # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
+    return value, _ABSOLUTE if exact == 0 or value == 0.0 else float(np.abs(value))
+
+
+def _orbit(
+    system: QuadraticSystem, eps: fmpq, start: Sequence[fmpq], steps: int, method: str, form: NormalForm | None
+) -> Any:
+    if method not in METHODS:
+        raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
+    if method not in ("generic", "normal-form"):
+        return ClassicalOrbit(system, eps, start, steps, method)
+    if method == "normal-form" and form is None:
+        raise InputError("the method normal-form needs a normal form, and there is none")
+    return FloatOrbit(system, eps, start, steps, form=form if method == "normal-form" else None)
+
+
+def _edges(steps: int, linear: bool) -> NDArray[np.int64]:
+    """Where bins end: 0 = e_0 < e_1 < ... = steps; bin k holds the steps e_(k-1) < n <= e_k."""
+    if steps <= BINS:
+        return np.arange(steps + 1)
+    made = np.linspace(0, steps, BINS + 1) if linear else np.geomspace(1, steps, BINS)
+    return np.unique(np.concatenate(([0], np.rint(made).astype(np.int64), [steps])))
+
+
+class _Bins:
+    """The largest error in each bin so far."""
+
+    def __init__(self, edges: NDArray[np.int64]) -> None:
+        self._edges = edges
+        self._largest = np.full(len(edges) - 1, -1.0)
+        self._where = np.zeros(len(edges) - 1, dtype=np.int64)
+        self._undefined = 0
+
+    def add(self, first: int, errors: FloatArray) -> None:
+        """Errors at the steps first, first + 1, ...; NaN where there is none."""
+        missing = ~np.isfinite(errors)
+        self._undefined += int(missing.sum())
+        errors = np.where(missing, -1.0, errors)
+        bins = np.searchsorted(self._edges, np.arange(first, first + len(errors))) - 1
+        for part in np.split(np.arange(len(errors)), np.flatnonzero(np.diff(bins)) + 1):
+            best = part[errors[part].argmax()]
+            if errors[best] > self._largest[bins[best]]:
+                self._largest[bins[best]], self._where[bins[best]] = errors[best], first + best
+
+    def curve(self, method: str, function: str) -> DriftCurve:
+        """What was found, bins without a value left out."""
+        kept = self._largest >= 0
+        return DriftCurve(method, function, self._where[kept], self._largest[kept], self._undefined)

@@ -1,0 +1,137 @@
+"""Functions whose drift is shown: integrals of the Kahan map with eps in them, and H of the differential equation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.written.text import format_polynomial, parse_rational_function
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+
+_LONGEST = 30
+
+
+class OfTheImage:
+    """An integral in which the image of the point under the Kahan map occurs: modified H, or one of the commutant."""
+
+    def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
+        self.name, self.label = function.name, label
+        self._function, self._eps = function, eps
+        hamiltonian = function.hamiltonian
+        self._values: Callable[[FloatArray, FloatArray], FloatArray]  # at points and their images
+        if isinstance(function, ModifiedHamiltonian):
+            polynomials = (hamiltonian.H, *hamiltonian.gradient)
+            H, *gradient = (PointFunction("", _as_function(hamiltonian, polynomial)) for polynomial in polynomials)
+            self._values = lambda x, image: (
+                H(x) + ((image - x) * np.stack([slope(x) for slope in gradient], axis=1)).sum(axis=1) / 3.0
+            )
+        else:
+            matrix = to_floats((hamiltonian.J * function.matrix).entries()).reshape(hamiltonian.dim, hamiltonian.dim)
+            self._values = lambda x, image: ((x @ matrix) * image).sum(axis=1) / to_float(eps)
+
+    def at(self, start: Sequence[fmpq]) -> fmpq | None:
+        """The exact value, None where the Kahan map has none."""
+        try:
+            value: fmpq | None = self._function.value(QQ, self._eps, start)
+        except SingularStep:
+            return None
+        return value
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """The values, from one step of the Kahan map for all points together."""
+        values = np.full(len(points), np.nan)
+        good = np.isfinite(points).all(axis=1)
+        if not good.any():
+            return values
+        x = points[good]
+        ensemble = FloatEnsemble(self._function.hamiltonian.system, self._eps, x, kernel="numpy")
+        ensemble.advance(1)
+        image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
+        with np.errstate(all="ignore"):
+            found = self._values(x, image)
+        found[~np.isfinite(found)] = np.nan
+        values[good] = found
+        return values
+
+
+WatchedFunction = PointFunction | OfTheImage
+
+
+def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
+    """What the Kahan map of a system is known to conserve, by name, and H of the differential equation.
+
+    The integrals that the file claims; the modified H of a cubic Hamiltonian; for a member of the family the integrals
+    of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is exact, half the time step.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
+    ['I1', 'I2', 'modified H', 'H~_1', 'H']
+    """
+    found: dict[str, WatchedFunction] = {
+        name: PointFunction(name, function, eps) for name, function in file.integrals.items()
+    }
+    hamiltonian = file.hamiltonian
+    if hamiltonian is not None and eps != 0:
+        found["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
+        if file.member is not None and hamiltonian.is_homogeneous and hamiltonian.is_standard:
+            letter = "H" if all(sign > 0 for sign in file.member.signs) else "K"  # as in check-integrals
+            for power in range(1, hamiltonian.dim // 2):
+                integral = CommutantIntegral(hamiltonian, file.member.A, power, letter)
+                found[integral.name] = OfTheImage(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
+    if hamiltonian is not None and "H" not in found:
+        found["H"] = PointFunction("H", _as_function(hamiltonian, hamiltonian.H), eps)
+    return found
+
+
+def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
+    """A choice of these without repetition: the claims of the file, or where there are none what follows; and H.
+
+    Raises InputError where nothing is known.
+    """
+    every = functions_of(file, eps)
+    chosen = list(file.integrals) or [name for name in every if name != "H"]
+    if "H" in every:
+        chosen.append("H")
+    if not chosen:
+        raise InputError(
+            f"found no known integral of {file.name}, expected one: give --integral NAME=EXPR, an expression in the "
+            "variables and eps"
+        )
+    return [every[name] for name in dict.fromkeys(chosen)]
+
+
+def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
+    """The functions that (name, text) pairs ask for: "known", one of `functions_of` by name, or an expression.
+
+    Expressions may contain eps. Raises InputError for text that cannot be read, for a name that comes twice, and where
+    nothing is known.
+    """
+    every = functions_of(file, eps)
+    found: list[WatchedFunction] = []
+    for name, text in requests:
+        if text == "known" and not name:
+            found += known_functions(file, eps)
+        elif text in every and name in ("", text):
+            found.append(every[text])
+        else:
+            function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
+            found.append(PointFunction(name or text[:_LONGEST], function, eps))
+    names = [function.name for function in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"found two functions of the name {name}: write --integral NAME=EXPR")
+    return found
+
+
+def _as_function(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> RationalFunction:
+    return parse_rational_function(format_polynomial(polynomial), (*hamiltonian.variables, "eps"))

@@ -1,0 +1,1 @@
+"""Portraits of planar maps and sections: orbits, equilibria, separatrices, the flow."""

@@ -1,0 +1,91 @@
+"""Starts for a picture of a system of which nothing else is known: around an equilibrium, as far out as orbits stay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.plots.portraits.equilibria import equilibria
+from kahanmaps.plots.portraits.trajectories import ensemble_for
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+COUNT = 16
+_CENTRES = 4  # equilibria tried
+_SIZES = 24
+_SHRINK = 0.8
+_STEPS = 300
+_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+_FAR = 4.0  # an orbit stays if it is never farther from the centre than so many times the largest start
+
+
+def automatic_starts(
+    system: QuadraticSystem, eps: Any, plane: Sequence[int] = (0, 1), *, backward: bool = False
+) -> FloatArray:
+    """Sixteen starts (16, dim) which make a good picture, the same ones every time; eps is half the time step.
+
+    Around an equilibrium, the most stable one that is found: on a ray in the plane of these two variables, or where
+    the field is homogeneous (and points of a ray move alike) on a circle; other coordinates are moved a little. They
+    are as far out as all their orbits stay nearby for 300 steps.
+
+    >>> lotka_volterra = QuadraticSystem.from_text(["x", "y"], ["x - x*y", "x*y - y"])
+    >>> starts = automatic_starts(lotka_volterra, "1/20")
+    >>> starts.shape, bool((starts > 1).all())
+    ((16, 2), True)
+    """
+    plane = [index for index in plane if index < system.dim][:2]
+    best: tuple[int, FloatArray] | None = None
+    for centre in _centres(system):
+        size = 3 * float(np.abs(centre[plane]).max()) or 1.5
+        # around the origin of a homogeneous field a smaller size is only a slower motion
+        for _ in range(1 if _is_scaled(system, centre) else _SIZES):
+            starts = _around(system, centre, size, plane)
+            staying = _staying(system, eps, starts, centre, backward)
+            if best is None or staying > best[0]:
+                best = staying, starts
+            if staying == COUNT:
+                return starts
+            size *= _SHRINK
+    if best is None:
+        raise AssertionError("no centre, and the origin is always one")
+    return best[1]
+
+
+def _around(system: QuadraticSystem, centre: FloatArray, size: float, plane: Sequence[int]) -> FloatArray:
+    starts = np.tile(centre, (COUNT, 1))
+    others = [index for index in range(system.dim) if index not in plane]
+    if _is_scaled(system, centre) and len(plane) == 2:
+        angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # so that no symmetry takes one start to another
+        starts[:, plane[0]] += size * np.cos(angles)
+        starts[:, plane[1]] += size * np.sin(angles)
+        starts[:, others] += size / 5
+        return starts
+    shares = np.arange(1, COUNT + 1) / COUNT * size
+    for index, part in zip(plane, (1.0, 0.25), strict=False):
+        starts[:, index] += part * shares
+    for place, index in enumerate(others):
+        starts[:, index] += shares / (4 + place)
+    return starts
+
+
+def _is_scaled(system: QuadraticSystem, centre: FloatArray) -> bool:
+    return system.is_homogeneous and not centre.any()
+
+
+def _staying(system: QuadraticSystem, eps: Any, starts: FloatArray, centre: FloatArray, backward: bool) -> int:
+    """How many of the orbits stay near the centre, and move at all."""
+    points = np.concatenate(list(ensemble_for(system, eps, starts, _STEPS, backward=backward).records(_STEPS, 1)))
+    with np.errstate(all="ignore"):
+        distance = np.abs(points - centre).max(axis=2)
+        moved = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
+    reach = _FAR * np.abs(starts - centre).max()
+    return int(((distance <= reach).all(axis=0) & moved).sum())
+
+
+def _centres(system: QuadraticSystem) -> list[FloatArray]:
+    """Equilibria, those first at which the field expands least, then those without negative coordinates; the origin."""
+    order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
+    centres = [one.point for one in order[:_CENTRES]]
+    return centres if any(not centre.any() for centre in centres) else [*centres, np.zeros(system.dim)]

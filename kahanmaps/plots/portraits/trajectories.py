@@ -1,0 +1,118 @@
+"""Float orbits to be drawn, all in memory or in portions, and explicit Euler's to compare them with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.errors import InputError
+from kahanmaps.family.planar import NormalForm
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.orbits.iteration import require_steps
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+MAX_POINTS = 4_000_000  # of all orbits together: beyond that a picture of single points shows nothing more
+_MAX_NUMBERS = 40_000_000
+# Up to so much work, and so many steps, numpy is done before compiled code is loaded.
+_LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Orbits side by side: `points` (records, orbits, dim), NaN where an orbit has ended; `steps` (records,).
+
+    `ended` says how many orbits ended early and why, in words; `interrupted` whether somebody stopped the work.
+    """
+
+    variables: tuple[str, ...]
+    points: FloatArray
+    steps: NDArray[Any]
+    ended: dict[str, int] = field(default_factory=dict)
+    interrupted: bool = False
+
+    @property
+    def orbits(self) -> int:
+        """How many orbits there are."""
+        return int(self.points.shape[1])
+
+
+def ensemble_for(
+    given: QuadraticSystem | BirationalMap,
+    eps: Any,
+    starts: FloatArray,
+    steps: int,
+    *,
+    backward: bool = False,
+    form: NormalForm | None = None,
+) -> FloatEnsemble:
+    """The ensemble that walks these starts (n, dim), by the kernel that is done first; eps is half the time step."""
+    work = len(starts) * steps * (1 + given.dim**3 // 8)
+    kernel = "numpy" if work < _LITTLE_WORK and steps < _FEW_STEPS else None
+    return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel)
+
+
+def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] | None = None) -> Trajectories:
+    """Take `steps` steps and keep every point. Raises InputError for more than MAX_POINTS points.
+
+    >>> system = QuadraticSystem.from_text(["x"], ["x"])
+    >>> found = walked(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
+    >>> found.points[:, :, 0].tolist(), found.ended
+    ([[1.0, 2.0], [3.0, 6.0], [9.0, 18.0]], {})
+    """
+    require_steps(steps)
+    require_points(steps + 1, ensemble.n, ensemble.system.dim)
+    points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
+    return Trajectories(
+        ensemble.system.variables,
+        points,
+        np.arange(len(points)),
+        ended_early(ensemble),
+        interrupted=ensemble.step < steps,
+    )
+
+
+def require_points(records: int, orbits: int, dim: int) -> None:
+    """Raises InputError where so many records of orbits are too much to be kept and drawn one by one."""
+    most = min(MAX_POINTS, _MAX_NUMBERS // dim)
+    if records * orbits > most:
+        raise InputError(
+            f"found {records} records of {orbits} orbits, expected at most {most} points: take fewer, or a density"
+        )
+
+
+def ended_early(ensemble: FloatEnsemble) -> dict[str, int]:
+    """How many orbits have ended before the last step, in words."""
+    status = ensemble.status
+    words = {"overflow": "left the range of machine floats", "singular": "met a singular matrix I - eps f'"}
+    counts = {text: int((status == word).sum()) for word, text in words.items()}
+    return {text: count for text, count in counts.items() if count}
+
+
+def portions_of(points: FloatArray, size: int = 1_000_000) -> Iterator[FloatArray]:
+    """Points (records, orbits, dim), perhaps on disk, in portions of about `size` points."""
+    rows = max(1, size // max(1, points.shape[1]))
+    for first in range(0, len(points), rows):
+        yield np.asarray(points[first : first + rows], dtype=np.float64)
+
+
+def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: int) -> Trajectories:
+    """Orbits of explicit Euler, x~ = x + 2 eps f(x), in doubles; those that leave the range of floats are NaN then.
+
+    `starts` (n, dim) are doubles, eps is exact, half the time step; a negative one steps backward.
+
+    >>> euler_orbits(QuadraticSystem.from_text(["x"], ["x"]), "1/2", np.array([[1.0]]), 2).points[:, 0, 0].tolist()
+    [1.0, 2.0, 4.0]
+    """
+    context = ring((*system.variables, "eps"))
+    *x, symbol = context.gens()
+    rhs = (f.compose(*x, ctx=context) for f in system.rhs)
+    image = [RationalFunction(y + 2 * symbol * f, context.constant(1)) for y, f in zip(x, rhs, strict=True)]
+    return walked(FloatEnsemble(explicit_map(system.variables, image), eps, starts, kernel="numpy"), steps)
