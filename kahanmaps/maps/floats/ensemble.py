@@ -105,8 +105,8 @@ class Stepping:
         planar: Callable[[PlanarRows], Engine]
         generic: Callable[[GenericEquation], Engine]
         if self.compiled:
-            from kahanmaps.maps.floats.numba_kernel import GenericNumba as generic
-            from kahanmaps.maps.floats.numba_kernel import PlanarNumba as planar
+            from kahanmaps.maps.floats.numba_kernel import generic_numba as generic
+            from kahanmaps.maps.floats.numba_kernel import planar_numba as planar
         else:
             from kahanmaps.maps.floats.numpy_kernel import GenericNumpy as generic
             from kahanmaps.maps.floats.numpy_kernel import PlanarNumpy as planar
