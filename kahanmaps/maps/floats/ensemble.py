@@ -130,7 +130,7 @@ class Stepping:
 
         The distances of the block integrals from the start are looked at every `sampled` steps.
         """
-        kept = NOTHING if record is None else Kept(every, record)
+        kept = NOTHING if record is None else Kept(every, record, first // every)
         self._engine.advance(lanes, first, steps, kept, 0 if self.rows is None else sampled)
 
     def points(self, record: FloatArray) -> FloatArray:

@@ -56,8 +56,9 @@ _inner = numba.njit(error_model="numpy", nogil=True)
 class Room(NamedTuple):
     """What the loop works in: how many lanes are taken together, in rows as long for fewer where they are `fixed`.
 
-    A lane that is `alone` is taken with all tests at once. `x` and `image` hold the rows of states before and after `piece` steps, one behind the other, `z` and `M` the state
-    and the matrix of one lane. `fine` is 0 in lanes where something is unusual; `work` is for steps of many.
+    A lane that is `alone` is taken with all tests at once. `x` and `image` hold the rows of states before and after
+    `piece` steps, one behind the other, `z` and `M` the state and the matrix of one lane. `fine` is 0 in lanes where
+    something is unusual; `work` is for steps of many.
     """
 
     lanes: int
@@ -288,7 +289,7 @@ def _planar_many(x: Any, image: Any, width: int, count: int, numbers: Numbers, f
         _sweep(image, width, runs[r], numbers.coefficients, count, fine)
     for i in range(size):
         good &= fine[i] != 0.0
-    # Where w overflows and the numerators do not, the image is 0, and stays there; see numpy_kernel.sound.
+    # Where w overflows and the numerators do not, the image is 0, and stays there; see numpy_kernel.py.
     for i in range(rows):
         good &= (abs(image[i]) <= LARGEST) & ((image[i] != 0.0) | (x[i] == 0.0))
     if not good:
