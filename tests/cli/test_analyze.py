@@ -85,6 +85,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     assert [run["verdict"] for run in found.pop("singularities")] == ["confined", "confined"]
     assert found == {
         "command": "analyze",
+        "arithmetic": "exact formulas, from residues modulo primes",
         "system": "euler_top",
         "version": __version__,
         "parameters": {"a1": "1", "a2": "-2", "a3": "1"},
