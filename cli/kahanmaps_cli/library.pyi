@@ -109,7 +109,7 @@ from kahanmaps.family.skew_hamiltonian import chi as chi
 from kahanmaps.family.skew_hamiltonian import diagnosis as diagnosis
 from kahanmaps.family.structure import NoStructure as NoStructure
 from kahanmaps.family.structure import Structure as Structure
-from kahanmaps.invariants.heights import Growth as Growth
+from kahanmaps.invariants.growth import Growth as Growth
 from kahanmaps.invariants.integrals import ClaimedIntegral as ClaimedIntegral
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as analyze
@@ -123,6 +123,7 @@ from kahanmaps.laboratory.growth.degrees import degree_growth as degree_growth
 from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey as HeightSurvey
 from kahanmaps.laboratory.growth.height_survey import height_survey as height_survey
+from kahanmaps.laboratory.known import Statement as Statement
 from kahanmaps.laboratory.laboratory import Laboratory as Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint as NoPoint
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch as DarbouxSearch
@@ -134,7 +135,6 @@ from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integ
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map as flow_and_map
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson as find_poisson
 from kahanmaps.laboratory.preserve.results import closing_note as closing_note
-from kahanmaps.laboratory.report import Statement as Statement
 from kahanmaps.laboratory.scan.kept import Kept as Kept
 from kahanmaps.laboratory.scan.result import Scan as Scan
 from kahanmaps.laboratory.scan.scan import scan as scan

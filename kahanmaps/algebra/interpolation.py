@@ -38,7 +38,7 @@ from kahanmaps.algebra.modular_fit import (
     Unlucky,
     Values,
     fit,
-    team,
+    split_group,
 )
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.residues import chinese, random_prime, rational_reconstruction, rational_vector
@@ -170,9 +170,9 @@ def _first_prime(values: Values, symbols: int, max_degree: int, rng: random.Rand
         groups: dict[tuple[str, ...], list[int]] = {}
         for i in moving:
             groups.setdefault(tuple(keys[i]), []).append(i)
-        teams = [team(group, [_up_to_factor(axes[j][i][0]) for i in group], shapes) for group in groups.values()]
+        pairs = [split_group(group, [_up_to_factor(axes[j][i][0]) for i in group], shapes) for group in groups.values()]
         fixed = {i: anchor[i] for i in order[stage + 1 :]}
-        for i, quotient in fit(values, shapes, teams, symbols, rng, fixed).items():
+        for i, quotient in fit(values, shapes, pairs, symbols, rng, fixed).items():
             found[i] = quotient
     return found
 
@@ -275,8 +275,9 @@ def _lift(
     groups: dict[object, list[int]] = {}
     for i, quotient in enumerate(first):
         groups.setdefault((quotient.shape.below, quotient.below), []).append(i)
-    teams = [
-        team(group, [str(first[i].numerator_up_to_factor(modulus)) for i in group], shapes) for group in groups.values()
+    pairs = [
+        split_group(group, [str(first[i].numerator_up_to_factor(modulus)) for i in group], shapes)
+        for group in groups.values()
     ]
     misfits = 0
     while True:
@@ -288,7 +289,7 @@ def _lift(
                 values = refuting
             else:
                 return functions
-            found = fit(values, shapes, teams, len(names), rng)
+            found = fit(values, shapes, pairs, len(names), rng)
             if any(found[i].shape.lead != shape.lead for i, shape in shapes.items()):
                 raise Unlucky(f"the prime {values.prime} divides a leading coefficient")
         except Unlucky:

@@ -22,7 +22,7 @@ BlackBox = Callable[[int, Point], Sequence[int] | None]
 
 NOTHING: Mapping[int, int] = MappingProxyType({})
 _BAD_POINTS = 20  # in a row, before the prime is blamed
-_TEAM = 4  # entries that determine their common denominator together: more would only make matrices larger
+_DETERMINING = 4  # entries that determine their common denominator together: more would only make matrices larger
 
 
 class Stop(Exception):
@@ -147,19 +147,19 @@ class Quotient:
         )
 
 
-def team(group: list[int], numerators: Sequence[str], shapes: dict[int, Shape]) -> tuple[list[int], list[int]]:
+def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, Shape]) -> tuple[list[int], list[int]]:
     """Entries with one denominator, as (those that determine it, the others); equal numerators would not help."""
     if len(shapes[group[0]].below) == 1:
         return group[:1], group[1:]
     different = dict(reversed(list(zip(numerators, group, strict=True))))
-    leaders = sorted(different.values())[:_TEAM]
-    return leaders, [i for i in group if i not in leaders]
+    determining = sorted(different.values())[:_DETERMINING]
+    return determining, [i for i in group if i not in determining]
 
 
 def fit(
     values: Values,
     shapes: dict[int, Shape],
-    teams: list[tuple[list[int], list[int]]],
+    pairs: list[tuple[list[int], list[int]]],
     symbols: int,
     rng: random.Random,
     fixed: Mapping[int, int] = NOTHING,
@@ -174,11 +174,11 @@ def fit(
     while True:
         usable = [k for k, point in enumerate(values.points) if all(point[i] == v for i, v in fixed.items())]
         wanted = 0
-        for leaders, others in teams:
-            if leaders[0] not in done:
-                wanted = max(wanted, _solve(values, usable, shapes, leaders, None, done))
-            if leaders[0] in done:
-                below = done[leaders[0]]
+        for determining, others in pairs:
+            if determining[0] not in done:
+                wanted = max(wanted, _solve(values, usable, shapes, determining, None, done))
+            if determining[0] in done:
+                below = done[determining[0]]
                 for i in others:
                     if i not in done:
                         wanted = max(wanted, _solve(values, usable, shapes, [i], below, done))

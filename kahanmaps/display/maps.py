@@ -102,9 +102,9 @@ def orbit_html(orbit: Orbit) -> str:
         word = orbit.end.status
         status = f"{markup.verdict(word)}: {markup.escape(orbit.end.message)}"
     elif last is not None:
-        status = f"walked to step {last.step}, not to its end"
+        status = f"computed to step {last.step}, not to its end"
     else:
-        status = "not walked yet: iterate over it"
+        status = "no point computed yet: iterate over it"
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
     eps = orbit.map.eps  # None where maps at several eps were composed

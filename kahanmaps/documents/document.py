@@ -87,48 +87,58 @@ class DocumentReader(CompositionReader):
                 f"found {found} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
             )
         self._read_parameters()
-        name = self.document.get("name", self._default_name())
-        if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
-            # It stands in the first line of many outputs, where nothing may break the line or colour the terminal.
-            self._mistake(
-                "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
-            )
+        name = self._read_name()
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
-        map_: BirationalMap | None = None
-        hamiltonian, member = None, None
-        section = self._table(kind) if kind else None
-        if section is not None:
-            self._unknown_keys(kind, section)
-            if self.root is not None and kind in ("family", "composition"):
-                self._mistake(
-                    f"parameters.{self.root[0]}", f"found an algebraic number in a [{kind}], expected rational ones"
-                )
-            elif self.root is not None and kind == "hamiltonian":
-                self.parameters[self.root[0]] = _STAND_IN
-                is_good = self._read_hamiltonian(section) is not None
-                del self.parameters[self.root[0]]
-                map_ = self._read_field(section) if is_good else None
-            elif kind == "hamiltonian":
-                hamiltonian = self._read_hamiltonian(section)
-            elif kind == "family":
-                member = self._read_member(section)
-                hamiltonian = member.chosen.hamiltonian if member else None
-            else:
-                map_ = self._read_given(kind, section)
-            if hamiltonian is not None:
-                map_ = Kahan(hamiltonian.system)
-            elif map_ is not None:
-                map_ = self._algebraic(kind, map_)
-                self.variables = map_.variables  # a polarised map has more of them
-                for clash in set(self.variables) & set(self.parameters):
-                    self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
+        map_, hamiltonian, member = self._read_section(kind, self._table(kind) if kind else None)
         integrals = self._read_integrals()
         density = self._read_density()
         self._read_catalog()
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
         return Contents(name, kind, self.parameters, map_, hamiltonian, member, integrals, density, self._normalised())
+
+    def _read_name(self) -> Any:
+        name = self.document.get("name", self._default_name())
+        if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
+            # It stands in the first line of many outputs, where nothing may break the line or colour the terminal.
+            self._mistake(
+                "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
+            )
+        return name
+
+    def _read_section(
+        self, kind: str, section: Mapping[str, Any] | None
+    ) -> tuple[BirationalMap | None, CubicHamiltonian | None, FamilyMember | None]:
+        """What the section says that the document is of; of a mistake nothing."""
+        if section is None:
+            return None, None, None
+        map_, hamiltonian, member = None, None, None
+        self._unknown_keys(kind, section)
+        if self.root is not None and kind in ("family", "composition"):
+            self._mistake(
+                f"parameters.{self.root[0]}", f"found an algebraic number in a [{kind}], expected rational ones"
+            )
+        elif self.root is not None and kind == "hamiltonian":
+            self.parameters[self.root[0]] = _STAND_IN
+            is_good = self._read_hamiltonian(section) is not None
+            del self.parameters[self.root[0]]
+            map_ = self._read_field(section) if is_good else None
+        elif kind == "hamiltonian":
+            hamiltonian = self._read_hamiltonian(section)
+        elif kind == "family":
+            member = self._read_member(section)
+            hamiltonian = member.chosen.hamiltonian if member else None
+        else:
+            map_ = self._read_given(kind, section)
+        if hamiltonian is not None:
+            map_ = Kahan(hamiltonian.system)
+        elif map_ is not None:
+            map_ = self._algebraic(kind, map_)
+            self.variables = map_.variables  # a polarised map has more of them
+            for clash in set(self.variables) & set(self.parameters):
+                self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
+        return map_, hamiltonian, member
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> BirationalMap:
         """The map of a section with these parameters as symbols. Raises InputError for a [family]."""

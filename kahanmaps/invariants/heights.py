@@ -39,7 +39,6 @@ import decimal
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -50,6 +49,7 @@ from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.written.numerals import wrong_kind
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_steps import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
@@ -61,18 +61,6 @@ _FEWEST_FOR_LOGARITHMIC = 32
 _NOISE = 4  # bits by which the rise of a quarter may differ from the rule without meaning anything
 _SHOWN = 20
 _NOT_GIVEN = NoStructure("none was given")
-
-
-class Growth(StrEnum):
-    """How heights grow, as far as a finite orbit shows it: evidence, and no proof (except for `PERIODIC`)."""
-
-    PERIODIC = "periodic"  # the start came back: exact
-    BOUNDED = "bounded"
-    LOGARITHMIC = "logarithmic"
-    LINEAR = "linear"
-    QUADRATIC = "quadratic"
-    EXPONENTIAL = "exponential"
-    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)

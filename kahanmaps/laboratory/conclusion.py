@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.curves import Ended
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
@@ -38,82 +40,137 @@ class Conclusion:
     ground: str
 
 
+class _Verdict(NamedTuple):
+    kind: str
+    sentence: str
+    sense: str = ""
+    ground: Known | None = Known.MEASURED
+
+
+class _Facts:
+    """What was found, and the phrases that several verdicts have in common."""
+
+    def __init__(self, found: Findings) -> None:
+        degrees = found.degrees
+        self.found, self.degrees, self.count = found, degrees, found.integral_count
+        self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
+        self.grown = degrees.known if degrees is not None else Known.MEASURED
+        self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
+        self.basis = f" ({degrees.basis})" if degrees is not None and degrees.basis else ""
+        self.integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
+        period = found.integrals.profile.period if found.integrals is not None else None
+        self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
+        self.is_linear = found.file.is_quadratic and found.file.system.degree <= 1
+        self.liouville = "" if self.is_linear else _liouville(found)
+
+
 def conclude(found: Findings) -> Conclusion:
-    """The verdict on what was found."""
-    count, degrees = found.integral_count, found.degrees
-    growth = degrees.growth if degrees is not None else GrowthClass.UNKNOWN
-    phrase = degrees.kind_text if degrees is not None else "degrees not measured"
-    basis = degrees.basis if degrees is not None else ""
-    known = f" ({basis})" if basis else ""
-    integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
-    period = found.integrals.profile.period if found.integrals is not None else None
-    suffix = f" All this at eps = {found.eps} only: other eps may differ." if found.eps is not None else ""
+    """The verdict on what was found: the first of `_RULES` that says something."""
+    facts = _Facts(found)
+    verdict = next(said for rule in _RULES if (said := rule(facts)))
+    sentence = verdict.sentence
+    if found.eps is not None:
+        sentence += f" All this at eps = {found.eps} only: other eps may differ."
     if found.symbols:
         parts = "integrals" if found.densities is None else "integrals and densities"
-        suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
-    linear = found.file.is_quadratic and found.file.system.degree <= 1
-    liouville = "" if linear else _liouville(found)
-    if liouville:
-        suffix += f" It is Liouville integrable, {liouville} (proved)."
+        sentence += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
+    if facts.liouville:
+        sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
+    sense, ground, growth = verdict.sense or verdict.kind, str(verdict.ground or ""), facts.growth
+    if verdict.kind == "not integrable" and ground != Known.PROVED:
+        growth = Growth.EXPONENTIAL  # also where that is estimated only
+    return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
-    def verdict(kind: str, sentence: str, sense: str = "", ground: Known | None = Known.MEASURED) -> Conclusion:
-        return Conclusion(kind, count, str(growth), sentence + suffix, sense or kind, str(ground or ""))
 
-    grown = degrees.known if degrees is not None else Known.MEASURED
-    if degrees is not None and degrees.ended == Ended.SINGULAR and len(degrees.degrees) == 1:
-        return verdict("singular", f"The map is nowhere defined: {degrees.message}.")
-    if linear:
-        closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
-        return verdict(
-            "linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.", ground=Known.PROVED
-        )
-    if said := contradictions(found):
-        return verdict(
-            "undecided",
-            f"The findings do not agree: {'; '.join(said)}. {integrals[0].upper()}{integrals[1:]}.",
-            ground=None,
-        )
-    if period is not None:
-        closes = f"Orbits close after {counted(period, 'step')} (measured)"
-        return verdict("linearisable", f"{closes}: the map is periodic there; {phrase}.")
-    if growth is GrowthClass.ZERO:
-        return verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
-    if growth is GrowthClass.BOUNDED:
-        sentence = f"The degrees of the iterates are bounded{known}: the map is linearisable in the sense of complexity"
-        return verdict("linearisable", f"{sentence}; {integrals}.", ground=grown)
-    if degrees is not None and degrees.enclosure is not None:
-        bound = f"the dynamical degree is at least {degrees.enclosure.lower}"
-        where = "" if found.eps is not None or not found.file.map.has_eps else ", for all eps but countably many"
-        return verdict(
-            "not integrable",
-            f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
-            f"function is an integral; {phrase}{known if growth is GrowthClass.EXPONENTIAL else ''}.",
-            _confining(found),
-            Known.PROVED,
-        )
+def _nowhere_defined(facts: _Facts) -> _Verdict | None:
+    degrees = facts.degrees
+    if degrees is None or degrees.ended != Ended.SINGULAR or len(degrees.degrees) > 1:
+        return None
+    return _Verdict("singular", f"The map is nowhere defined: {degrees.message}.")
+
+
+def _linear(facts: _Facts) -> _Verdict | None:
+    if not facts.is_linear:
+        return None
+    closes = facts.closes and f"; {facts.closes}"
+    sentence = f"The system is linear, and so is its Kahan map; {facts.integrals}{closes}."
+    return _Verdict("linear", sentence, ground=Known.PROVED)
+
+
+def _contradictory(facts: _Facts) -> _Verdict | None:
+    if not (said := contradictions(facts.found)):
+        return None
+    sentence = f"The findings do not agree: {'; '.join(said)}. {_capital(facts.integrals)}."
+    return _Verdict("undecided", sentence, ground=None)
+
+
+def _linearisable(facts: _Facts) -> _Verdict | None:
+    """Periodic maps, those with a constant iterate, and those of bounded degrees."""
+    if facts.closes:
+        return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.phrase}.")
+    if facts.growth is Growth.ZERO:
+        return _Verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
+    if facts.growth is not Growth.BOUNDED:
+        return None
+    bounded = f"The degrees of the iterates are bounded{facts.basis}"
+    sentence = f"{bounded}: the map is linearisable in the sense of complexity; {facts.integrals}."
+    return _Verdict("linearisable", sentence, ground=facts.grown)
+
+
+def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
+    """Where a dynamical degree above 1 is proved."""
+    found = facts.found
+    if facts.degrees is None or facts.degrees.enclosure is None:
+        return None
+    bound = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
+    where = "" if found.eps is not None or not found.file.map.has_eps else ", for all eps but countably many"
+    sentence = (
+        f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
+        f"function is an integral; {facts.phrase}{facts.basis if facts.growth is Growth.EXPONENTIAL else ''}."
+    )
+    return _Verdict("not integrable", sentence, _confining(found), Known.PROVED)
+
+
+def _on_curves(facts: _Facts) -> _Verdict | None:
+    """Where the orbits lie on curves, proved; or not, of maps whose growth is not known."""
+    found = facts.found
     if _orbits_on_curves_proved(found):
         sense = "superintegrable" if found.dim > 2 else "integrable"
-        where = f"so that orbits lie on {_curves(found, growth)}"
-        sentence = f"{sense.capitalize()} (proved): {integrals}, {where}; {phrase}{known}."
-        return verdict("integrable", sentence, sense, Known.PROVED)
-    if growth is GrowthClass.UNKNOWN and (liouville or orbits_lie_on_curves(found)):
-        curves = ", so that orbits lie on curves" if orbits_lie_on_curves(found) else ""
-        sentence = f"Integrable: {integrals}{curves}; of the degrees: {phrase}."
-        return verdict("integrable", sentence, *_sense(liouville))
-    if growth is GrowthClass.EXPONENTIAL or (degrees is not None and degrees.looks_exponential):
-        exact = growth is GrowthClass.EXPONENTIAL  # else the phrase says that it is estimated
-        growth = GrowthClass.EXPONENTIAL
+        where = f"so that orbits lie on {_curves(found, facts.growth)}"
+        sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
+        return _Verdict("integrable", sentence, sense, Known.PROVED)
+    on_curves = orbits_lie_on_curves(found)
+    if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
+        return None
+    curves = ", so that orbits lie on curves" if on_curves else ""
+    sentence = f"Integrable: {facts.integrals}{curves}; of the degrees: {facts.phrase}."
+    return _Verdict("integrable", sentence, *_sense(facts.liouville))
+
+
+def _by_growth(facts: _Facts) -> _Verdict | None:
+    """Exponential and polynomial growth, measured or explained."""
+    count, integrals = facts.count, facts.integrals
+    exact = facts.growth is Growth.EXPONENTIAL  # else the phrase says that it is estimated
+    if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
-        return verdict(
-            "not integrable",
-            f"Not integrable in the sense of complexity: {phrase}{known if exact else ''}{although}.",
-            _confining(found),
-            grown if exact else Known.ESTIMATED,
-        )
-    if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
-        sentence = f"Integrable in the sense of complexity: {phrase}{known}; {integrals}."
-        return verdict("integrable", sentence, *_sense(liouville, grown))
-    return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.", ground=None)
+        sentence = f"Not integrable in the sense of complexity: {facts.phrase}{facts.basis if exact else ''}{although}."
+        ground = facts.grown if exact else Known.ESTIMATED
+        return _Verdict("not integrable", sentence, _confining(facts.found), ground)
+    if facts.growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL):
+        sentence = f"Integrable in the sense of complexity: {facts.phrase}{facts.basis}; {integrals}."
+        return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.grown))
+    return None
+
+
+def _undecided(facts: _Facts) -> _Verdict:
+    return _Verdict("undecided", f"The growth is undecided: {facts.phrase}; {facts.integrals}.", ground=None)
+
+
+# The stronger ones first: what is proved before what is measured.
+_RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
+    *(_nowhere_defined, _linear, _contradictory, _linearisable, _of_positive_entropy, _on_curves, _by_growth),
+    _undecided,
+)
 
 
 def _sense(liouville: str, ground: Known | None = Known.MEASURED) -> tuple[str, Known | None]:
@@ -137,7 +194,7 @@ def _orbits_on_curves_proved(found: Findings) -> bool:
     return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
 
 
-def _curves(found: Findings, growth: GrowthClass) -> str:
+def _curves(found: Findings, growth: Growth) -> str:
     """The curves of integrals: in the plane with their genus, which the growth tells where it was not computed."""
     genus = found.pencil.genus if found.pencil is not None else None
     if genus is None and found.dim == 2:
@@ -164,3 +221,7 @@ def _count_text(found: Findings) -> str:
         return f"no integral{where} up to degree {search.profile.degree} (relations along orbits)"
     number = "no integral" if count == 0 else counted(count, "independent integral")
     return number + where if found.count_is_exact else f"at least {number}{where}"
+
+
+def _capital(sentence: str) -> str:
+    return sentence[0].upper() + sentence[1:]

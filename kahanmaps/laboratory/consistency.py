@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 
-_POLYNOMIAL = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
+_POLYNOMIAL = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
 def orbits_lie_on_curves(found: Findings) -> bool:
@@ -25,18 +24,18 @@ def orbits_lie_on_curves(found: Findings) -> bool:
 
 def contradictions(found: Findings) -> list[str]:
     """What excludes each other among integrals, closed orbits and degrees: sentences, none where all agree."""
-    growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
+    growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
     period = found.integrals.profile.period if found.integrals is not None else None
     said = []
-    if growth is GrowthClass.EXPONENTIAL and orbits_lie_on_curves(found):
+    if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(found):
         said.append("the degrees seem to grow exponentially, which they cannot where integrals leave curves only")
-    elif growth is GrowthClass.EXPONENTIAL and isinstance(found.structure, Structure):
+    elif growth is Growth.EXPONENTIAL and isinstance(found.structure, Structure):
         said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
     if found.degrees is not None and found.degrees.enclosure is not None and orbits_lie_on_curves(found):
         said.append("positive algebraic entropy is proved, which excludes an integral")
     if found.pencil is not None and (impossible := found.pencil.against(growth)):
         said.append(impossible)
-    if period is not None and growth in (GrowthClass.EXPONENTIAL, *_POLYNOMIAL):
+    if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
         said.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
     return said
 
@@ -46,12 +45,12 @@ def doubt_of_heights(found: Findings) -> str:
     if found.heights is None or found.degrees is None:
         return ""
     kind, growth = found.heights.kind, found.degrees.growth
-    bounded = growth in (GrowthClass.ZERO, GrowthClass.BOUNDED)
+    bounded = growth in (Growth.ZERO, Growth.BOUNDED)
     if bounded and kind in (Growth.QUADRATIC, Growth.EXPONENTIAL):
         reason = "the degrees are bounded"
     elif growth in _POLYNOMIAL and kind is Growth.EXPONENTIAL:
-        reason = f"the degrees grow {'linearly' if growth is GrowthClass.LINEAR else 'polynomially'}"
-    elif growth is GrowthClass.EXPONENTIAL and kind not in (Growth.EXPONENTIAL, Growth.UNDECIDED):
+        reason = f"the degrees grow {'linearly' if growth is Growth.LINEAR else 'polynomially'}"
+    elif growth is Growth.EXPONENTIAL and kind not in (Growth.EXPONENTIAL, Growth.UNDECIDED):
         reason = "the degrees grow exponentially"
     else:
         reason = ""

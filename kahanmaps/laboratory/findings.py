@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from flint import fmpq
 
@@ -27,7 +28,7 @@ from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch
 
 @dataclass
 class Findings:
-    """The results of the parts, None for those not reached."""
+    """The results of the parts, None for those not reached; `further` has those that no other part reads."""
 
     file: SystemFile
     eps: fmpq | None
@@ -49,11 +50,21 @@ class Findings:
     commuting: CommutingSystems | None = None
     hamiltonian: ConstantStructures | None = None
     structure: Structure | NoStructure | None = None  # in coordinates with the centre as origin
-    centre: tuple[fmpq, ...] | None = None
     tensor: TensorStructure | None = None  # over which algebra larger than Q it is a system
+    further: dict[str, Any] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     pending: list[str] = field(default_factory=list)  # the parts that were not gone through yet
     elapsed: float = 0.0
+
+    def __getitem__(self, result: str) -> Any:
+        """The result of a part, None if it was not reached."""
+        return getattr(self, result, self.further.get(result))
+
+    def __setitem__(self, result: str, value: Any) -> None:
+        if hasattr(self, result):
+            setattr(self, result, value)
+        else:
+            self.further[result] = value
 
     def stop(self, reason: str) -> None:
         """No pending part is gone through any more."""
@@ -64,6 +75,13 @@ class Findings:
     def dim(self) -> int:
         """The dimension of the phase space."""
         return self.file.dim
+
+    @property
+    def centre(self) -> tuple[fmpq, ...] | None:
+        """The origin of the coordinates that `structure` is in; None where H has no centre, or that was not reached."""
+        if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
+            return self.hamiltonian.hamiltonian.centre
+        return None if self.structure is None else (fmpq(0),) * self.dim
 
     @property
     def integral_count(self) -> int:

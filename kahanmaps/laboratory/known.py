@@ -1,7 +1,8 @@
-"""How what is said of a map is known, from an identity multiplied out to an estimate."""
+"""What is said of a map, and how it is known: from an identity multiplied out to an estimate."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 
 
@@ -18,3 +19,11 @@ class Known(StrEnum):
     ESTIMATED = "estimated"
     UNDECIDED = "undecided"
     NOTE = "note"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One line of a report and how it is known."""
+
+    status: Known
+    text: str

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.plots.curves.zero_band import log_scale_with_zero
 from kahanmaps.plots.figures import (
     drawing,
@@ -57,7 +56,7 @@ def draw_degrees(
     if not 1 <= len(growths) <= _MOST_SYSTEMS:
         raise InputError(f"found {len(growths)} systems, expected 1 to {_MOST_SYSTEMS} in one picture")
     style = style or Style()
-    is_log = any(one.looks_exponential or one.growth is GrowthClass.EXPONENTIAL for one in growths.values())
+    is_log = any(one.looks_exponential or one.growth is Growth.EXPONENTIAL for one in growths.values())
     scale = _scale(scale, "log" if is_log else "linear")
     rests = [_degree_label(growth) for growth in growths.values()]
     labels = [plain(shortened_name(name, rest, style)) + rest for name, rest in zip(growths, rests, strict=True)]
@@ -179,7 +178,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
     rate = growth.dynamical_degree
-    if growth.growth is GrowthClass.ZERO:
+    if growth.growth is Growth.ZERO:
         return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
     if growth.recurrence is None:
         if growth.looks_exponential:
@@ -190,7 +189,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
     formula = growth.recurrence.closed_form
     if formula and len(formula) <= _LONGEST_FORMULA and ";" not in formula:
         parts.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
-    elif growth.growth is not GrowthClass.EXPONENTIAL:
+    elif growth.growth is not Growth.EXPONENTIAL:
         parts.append(f"{growth.growth}")
     if rate is not None:
         whole = rate.minimal_polynomial.degree() == 1

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kahanmaps.algebra.written.text import parse_number
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 
 _MOST_ORBITS = 2000

@@ -13,7 +13,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.maps.floats.doubles import start_rows
-from kahanmaps.maps.orbits.orbit import Walk
+from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.automatic_starts import automatic_starts
 from kahanmaps.plots.portraits.portrait import portrait_of
@@ -47,10 +47,10 @@ class Plot:
         axes: Axes = draw_heights(given, scale=scale).axes[0]
         return axes
 
-    def orbit(self, found: Walk, x: int = 0, y: int = 1) -> Axes:
+    def orbit(self, found: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
         given: Any = found
-        if not isinstance(given, Walk):
+        if not isinstance(given, Trajectory):
             raise InputError(f"found a {type(given).__name__}, expected an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(found)[:, None]
         return _drawn(Trajectories(found.variables, points, np.array([point.step for point in found])), (x, y))

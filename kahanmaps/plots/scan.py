@@ -11,7 +11,7 @@ import numpy as np
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.scan.conditions import beside
 from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
 from kahanmaps.laboratory.scan.sweep import Sweep
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8
-_MANY = f"{GrowthClass.EXPONENTIAL} growth"  # drawn thin, and none of it is named
+_MANY = f"{Growth.EXPONENTIAL} growth"  # drawn thin, and none of it is named
 _LETTERS, _LETTER = 0.8, 0.5  # the size of conditions, of that of other text; the width of a letter, of its size
 _PLACES, _DOTS = 12, 300  # parts of a curve, at whose ends its condition may stand, and to tell what it crosses
 _INNER = (0.85, 0.85)  # of the picture, the axes
@@ -197,7 +197,7 @@ def _kinds(found: Scan) -> dict[str, list[Component]]:
     kinds: dict[str, list[Component]] = {}
     for _, some in found.classes:
         growth = growth_on(some)
-        kind = GrowthClass.UNKNOWN if growth is None else growth.growth
+        kind = Growth.UNKNOWN if growth is None else growth.growth
         kinds.setdefault(f"{kind} growth", []).extend(some)
     return kinds
 

@@ -85,6 +85,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     assert [run["verdict"] for run in found.pop("singularities")] == ["confined", "confined"]
     assert found == {
         "command": "analyze",
+        "arithmetic": "exact formulas, from residues modulo primes",
         "system": "euler_top",
         "version": __version__,
         "parameters": {"a1": "1", "a2": "-2", "a3": "1"},
@@ -183,16 +184,16 @@ def interrupted(*_, **__):
 @pytest.mark.parametrize(
     ("part", "sections"),
     [
-        ("constant_structures", ["not done"]),
-        ("find_integrals", ["vector field", "growth", "singularities", "structure", "not done"]),
+        ("family.constant_structures", ["not done"]),
+        ("integrals.find_integrals", ["vector field", "growth", "singularities", "structure", "not done"]),
         (
-            "linear_symmetries",
+            "symmetries.linear_symmetries",
             ["vector field", "integrals", "measure", "the flow", "growth", "singularities", "structure", "not done"],
         ),
     ],
 )
 def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, part, sections):
-    monkeypatch.setattr(f"kahanmaps.laboratory.analysis.{part}", interrupted)
+    monkeypatch.setattr(f"kahanmaps.laboratory.analyses.{part}", interrupted)
     outcome = kahanmaps("analyze weierstrass")
     _, lines, verdict = report(outcome.out)
     assert outcome.status == 130
@@ -200,7 +201,7 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
     assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
     skipped = [text for section, _, text in lines if section == "not done"]
     assert skipped[-1] == "commuting systems: interrupted"
-    assert (verdict[0] == "undecided") is (part == "constant_structures")
+    assert (verdict[0] == "undecided") is (part == "family.constant_structures")
     as_json = kahanmaps("analyze weierstrass --json")
     assert (as_json.status, as_json.json["skipped"]) == (130, skipped)
 
@@ -215,14 +216,19 @@ def test_sections_are_told_as_soon_as_they_are_final(kahanmaps, monkeypatch):
     told = []
     monkeypatch.setattr("kahanmaps_cli.commands.analyze.tell", lambda text, **_: told.append(text.strip()))
     seen = {}
-    for part in ("find_densities", "height_survey", "linear_symmetries"):
-        whole = getattr(import_module("kahanmaps.laboratory.analysis"), part)
+    for file, part in (
+        ("densities", "find_densities"),
+        ("growth", "height_survey"),
+        ("symmetries", "linear_symmetries"),
+    ):
+        module = import_module(f"kahanmaps.laboratory.analyses.{file}")
+        whole = getattr(module, part)
 
         def looked_at(*args, part=part, whole=whole, **options):
             seen[part] = list(told)
             return whole(*args, **options)
 
-        monkeypatch.setattr(f"kahanmaps.laboratory.analysis.{part}", looked_at)
+        monkeypatch.setattr(module, part, looked_at)
     kahanmaps("analyze weierstrass")
     assert ("integrals" in seen["find_densities"], "measure" in seen["find_densities"]) == (True, False)
     assert ("the flow" in seen["height_survey"], "growth" in seen["height_survey"]) == (True, False)

@@ -8,7 +8,8 @@ import pytest
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.heights import Growth, height_growth
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.invariants.heights import height_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 
 OSCILLATOR = "--vars q,p --rhs p --rhs '2*q^2-q'"  # q'' = -q + 2 q^2; the fourth iterate at eps = 1 is the identity

@@ -14,9 +14,8 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.table import CHECKS
 from kahanmaps.documents.structured_facts import GROWTHS, VERDICTS
 from kahanmaps.experiments.results.records import KEPT
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import OF_DEGREES, OF_HEIGHTS
 from kahanmaps.laboratory.finite.cycle_laws import LAWS
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.maps.normal_form.periods import Kind
 from kahanmaps_cli.main import cli
 from kahanmaps_cli.schema_files import ALIASES, schema, schema_titles
@@ -92,8 +91,8 @@ def _description(part: Any, found: dict[str, Any]) -> str:
     ("part", "words"),
     [
         ("verdict", list(Verdict)),
-        ("height_growth", list(Growth)),
-        ("growth_class", list(GrowthClass)),
+        ("height_growth", OF_HEIGHTS),
+        ("growth_class", OF_DEGREES),
     ],
 )
 def test_the_words_of_a_schema_are_those_of_the_code(part: str, words: list[str]) -> None:

@@ -167,7 +167,7 @@ def test_a_map_over_another_field_says_so(top):
 def test_an_orbit_that_was_not_walked_is_not_walked_for_its_picture(top, monkeypatch):
     orbit = km.Orbit(km.KahanMap(top.system, "1/10"), [1, 2, 3], 10**9)
     monkeypatch.setattr(km.Orbit, "_images", lambda _: pytest.fail("a step was computed"))
-    assert "not walked yet" in text_of(orbit)
+    assert "no point computed yet" in text_of(orbit)
 
 
 def test_an_orbit_shows_its_first_points_the_last_one_and_its_end(top):

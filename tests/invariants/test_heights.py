@@ -27,8 +27,8 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import (
-    Growth,
     HeightGrowth,
     decimal_text,
     height,

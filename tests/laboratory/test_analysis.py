@@ -16,8 +16,8 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory import analysis as module
-from kahanmaps.laboratory import report
+from kahanmaps.laboratory.analyses import commuting, family, growth, integrals, singularities, symmetries
+from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
@@ -26,20 +26,8 @@ from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
 FURTHER = Path(__file__).parent / "further_systems"
-PARTS = (
-    "hamiltonian structure",
-    "the commuting family",
-    "the vector field",
-    "degrees",
-    "integrals",
-    "densities",
-    "the flow",
-    "Poisson tensors",
-    "heights",
-    "symmetries",
-    "commuting systems",
-    "singularities",
-)
+# In dimension 3 singularities come last.
+PARTS = tuple(sorted((part.name for part in ANALYSES), key="singularities".__eq__))
 
 PLANE = """variables = ["x", "y"]
 [parameters]
@@ -235,7 +223,7 @@ def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
     def refuses(*_, **__):
         raise InputError("found 1, expected 2")
 
-    monkeypatch.setattr(module, "linear_symmetries", refuses)
+    monkeypatch.setattr(symmetries, "linear_symmetries", refuses)
     found = analyze(load("nahm_tetrahedral"))
     assert found.skipped == ["symmetries: found 1, expected 2"]
     assert found.symmetries is None
@@ -248,7 +236,7 @@ def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
     def fails(*_, **__):
         raise error
 
-    monkeypatch.setattr(module, "linear_symmetries", fails)
+    monkeypatch.setattr(symmetries, "linear_symmetries", fails)
     with pytest.raises(error):
         analyze(load("nahm_tetrahedral"))
 
@@ -419,7 +407,7 @@ def test_what_is_said_of_integrals(profile, others, expected):
         theorems="Prop. 1",
         **search,
     )
-    lines = report._integral_lines(SimpleNamespace(integrals=found, relations=(), structure=None))
+    lines = integrals.statements(SimpleNamespace(integrals=found, relations=(), structure=None, pencil=None))
     assert [(str(line.status), line.text) for line in lines] == expected
 
 
@@ -451,7 +439,7 @@ def test_what_is_said_of_singularities(runs, expected):
         )
         for eps, verdict, followed, ends in runs
     ]
-    lines = report._singularity_lines(SimpleNamespace(singularities=found, file=load("euler_top")))
+    lines = singularities.statements(SimpleNamespace(singularities=found, file=load("euler_top")))
     assert [(str(line.status), line.text) for line in lines] == expected
 
 
@@ -468,23 +456,24 @@ def test_poisson_tensors_are_told_in_dimensions_three_and_four():
 
 @pytest.mark.parametrize(("most", "first"), [(2, True), (1, False)])
 def test_singularities_come_before_degrees_and_help_them_up_to_a_dimension(most, first, monkeypatch):
-    given, told, real = [], [], module.degree_growth
+    given, told, real = [], [], growth.degree_growth
 
     def recorded(*arguments, **options):
         given.append(options["patterns"])
         return real(*arguments, **options)
 
-    monkeypatch.setattr(module, "degree_growth", recorded)
-    monkeypatch.setattr(module, "WRITTEN_DIMENSION", most)
-    analyze(load("zander_111"), progress=lambda text: told.append(text.partition(":")[0]))
+    monkeypatch.setattr(growth, "degree_growth", recorded)
+    monkeypatch.setattr(growth, "WRITTEN_DIMENSION", most)
+    table = [replace(part, slow_above=most) if part.name == "singularities" else part for part in ANALYSES]
+    analyze(load("zander_111"), parts=table, progress=lambda text: told.append(text.partition(":")[0]))
     parts = [part for part in dict.fromkeys(told) if part in PARTS]
-    assert parts.index("singularities") == (3 if first else len(PARTS) - 1)
+    assert parts.index("singularities") == (5 if first else len(PARTS) - 1)
     assert [patterns is not None for patterns in given] == [first]
 
 
 @pytest.mark.parametrize(("most", "looked_for"), [(1, True), (0, False)])
 def test_constant_structures_are_looked_for_up_to_a_dimension(most, looked_for, monkeypatch):
-    monkeypatch.setattr(module, "MAX_HAMILTONIAN_DIMENSION", most)
+    monkeypatch.setattr(family, "MAX_DIMENSION", most)
     assert (analyze(load("riccati")).hamiltonian is not None) == looked_for
 
 
@@ -501,13 +490,13 @@ def test_linear_families_of_commuting_systems_are_written_out(monkeypatch):
     )
 
     def told():
-        return [line.text for line in dict(report.sections(found))["commuting systems"]]
+        return [line.text for line in dict(found.sections)["commuting systems"]]
 
     assert told() == [
         f"commutes with the Kahan maps of all g = {moved}",
         f"commutes with the Kahan maps of g and -g, g = (2*S*I, -2*S*I + I, S + R) + {moved}",
     ]
-    monkeypatch.setattr(report, "_LONG", 10)
+    monkeypatch.setattr(commuting, "_LONG", 10)
     assert told() == ["commutes with a linear family of 3 parameters, which find-commuting writes out"] * 2
 
 
@@ -516,7 +505,7 @@ def test_as_many_fixed_points_are_told_as_three_quadratic_equations_have(points,
     found = Analysis(System("x' = x^2 - 1; y' = y^2 - 1; z' = z^2 - 1"), None, 1.0, 0, ())
     search = fixed_points(found.file.system)
     found.fixed_points = replace(search, found=(*search.found, search.found[0])[:points])
-    lines = [line.text for line in dict(report.sections(found))["vector field"]]
+    lines = [line.text for line in dict(found.sections)["vector field"]]
     assert sum(line.startswith("fixed point ") for line in lines) == 8
     assert [line for line in lines if "more" in line] == more
 

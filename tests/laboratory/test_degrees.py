@@ -18,9 +18,9 @@ from helpers import quick
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.errors import InputError
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, _Search, degree_growth
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = {
@@ -110,7 +110,7 @@ def test_a_recurrence_with_terms_to_spare_ends_the_search():
     found = degree_growth(load("euler_top").system)
     assert (found.ended, found.growth, found.recurrence.closed_form) == (
         "explained",
-        GrowthClass.QUADRATIC,
+        Growth.QUADRATIC,
         "2*n^2 + 1",
     )
     assert found.recurrence.checked >= 6
@@ -126,7 +126,7 @@ def test_one_plus_the_root_of_two():
 
 def test_without_a_recurrence_there_is_an_estimate_that_says_so():
     found = replace(degree_growth(load("henon_heiles").system, max_terms=6), patterns=None)
-    assert (found.recurrence, found.growth, found.dynamical_degree) == (None, GrowthClass.UNKNOWN, None)
+    assert (found.recurrence, found.growth, found.dynamical_degree) == (None, Growth.UNKNOWN, None)
     assert found.looks_exponential
     assert found.growth_text == "exponential growth by a factor of about 2.31183 (estimated: no recurrence in 7 terms)"
     shorter = replace(degree_growth(load("henon_heiles").system, max_terms=5), patterns=None)
@@ -194,8 +194,8 @@ def test_a_single_eps_may_be_special():
     """q'' = -q + 2 q^2 at eps = 1: the fourth iterate is the identity, but not for generic eps."""
     system = QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"])
     at_one = degree_growth(system, 1)
-    assert (at_one.degrees[4], at_one.growth) == (1, GrowthClass.BOUNDED)
-    assert degree_growth(system).growth is GrowthClass.QUADRATIC
+    assert (at_one.degrees[4], at_one.growth) == (1, Growth.BOUNDED)
+    assert degree_growth(system).growth is Growth.QUADRATIC
 
 
 def test_eps_as_a_rational_number():
@@ -219,9 +219,7 @@ def test_degenerate_maps_are_values(rhs, eps, degrees, ended):
     found = degree_growth(system, eps)
     assert (found.degrees, found.ended) == (degrees, ended)
     assert found.text
-    assert found.growth is {"constant": GrowthClass.ZERO, "singular": GrowthClass.UNKNOWN}.get(
-        ended, GrowthClass.BOUNDED
-    )
+    assert found.growth is {"constant": Growth.ZERO, "singular": Growth.UNKNOWN}.get(ended, Growth.BOUNDED)
 
 
 def test_the_time_and_the_degree_are_limits():
@@ -229,7 +227,7 @@ def test_the_time_and_the_degree_are_limits():
     found = degree_growth(henon_heiles, seconds=0.05)
     assert (found.ended, found.degrees[:2]) == ("time", (1, 3))
     found = degree_growth(load("riccati").system, seconds=0.05, max_terms=10_000)
-    assert (found.ended, found.growth) == ("time", GrowthClass.BOUNDED)
+    assert (found.ended, found.growth) == ("time", Growth.BOUNDED)
     found = degree_growth(henon_heiles, max_degree=50)
     assert (found.ended, found.degrees, found.message) == (
         "degree",

@@ -29,7 +29,7 @@ def test_names_by_hand():
     assert pole.generic == "12*x*eps^2 - 1"
     found = degree_growth(load("euler_top").map)
     assert {h.generic for h in found.patterns.contracted} == conics("-+", "+-")
-    assert not any("at eps" in told for told in found.patterns.told)
+    assert not any("at eps" in told for told in found.patterns.sentences)
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "zhukovski_volterra_2", "henon_heiles", "volterra_periodic_4"])
@@ -57,4 +57,4 @@ def test_of_a_long_composition_those_of_its_maps_are_named():
 
 def test_of_a_composition_multiplied_out_they_are_told_at_one_eps():
     map_ = parse_system('[composition]\nof = [{ system = "weierstrass", power = 2 }]').map
-    assert all("at eps" in told or "infinity" in told for told in degree_growth(map_).patterns.told)
+    assert all("at eps" in told or "infinity" in told for told in degree_growth(map_).patterns.sentences)

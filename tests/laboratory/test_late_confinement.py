@@ -24,11 +24,10 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow
@@ -39,6 +38,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
+    Written,
     _joined,
     _tangents,
     outcome_of,
@@ -128,7 +128,7 @@ def test_seven_degrees_are_explained_by_a_pattern_that_is_longer(exponents):
     # Without what the singularities explain there is an estimate only.
     length = max(found.patterns.lengths)
     measured = replace(found, patterns=replace(found.patterns, series=()))
-    assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (None, None, GrowthClass.UNKNOWN)
+    assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (None, None, Growth.UNKNOWN)
     assert measured.growth_text == (
         f"exponential growth by a factor of about 2 (estimated: after a pattern of {length} steps {length + 2} "
         "iterates are needed (--seconds, --max-degree))"
@@ -147,7 +147,7 @@ def test_degrees_that_the_singularities_do_not_explain_are_no_result():
     found = degree_growth(load("euler_top").system)
     other = replace(found, degrees=(*found.degrees[:8], found.degrees[8] + 1, *found.degrees[9:]))
     assert (found.disagreement, other.disagreement) == (None, 8)
-    assert (other.explained, other.recurrence, other.growth) == (None, None, GrowthClass.UNKNOWN)
+    assert (other.explained, other.recurrence, other.growth) == (None, None, Growth.UNKNOWN)
     assert "do not explain the degree of iterate 8" in other.unconfirmed
 
 
@@ -225,9 +225,9 @@ def test_random_points_have_the_degrees_of_polynomials_for_explicit_maps(name, m
 @pytest.mark.parametrize(
     ("last", "growth", "degrees"),
     [
-        ("(x2*x5 + x3*x4)/x1", GrowthClass.QUADRATIC, (1, 2, 3, 4, 6, 9, 11, 14, 18, 22)),  # Somos-5
-        ("x1 + x3^3 - x4*x2", GrowthClass.EXPONENTIAL, (1, 3, 3, 4, 9, 9, 12, 27, 27, 36)),  # x3^3 every third step
-        ("(x2*x5 + x3^2 + 7)/x1", GrowthClass.UNKNOWN, (1, 2, 3, 4, 6, 9, 13, 18, 26, 38)),
+        ("(x2*x5 + x3*x4)/x1", Growth.QUADRATIC, (1, 2, 3, 4, 6, 9, 11, 14, 18, 22)),  # Somos-5
+        ("x1 + x3^3 - x4*x2", Growth.EXPONENTIAL, (1, 3, 3, 4, 9, 9, 12, 27, 27, 36)),  # x3^3 every third step
+        ("(x2*x5 + x3^2 + 7)/x1", Growth.UNKNOWN, (1, 2, 3, 4, 6, 9, 13, 18, 26, 38)),
     ],
 )
 def test_explicit_maps_of_dimension_five_are_explained_or_say_how_far_they_were_followed(last, growth, degrees):
@@ -235,7 +235,7 @@ def test_explicit_maps_of_dimension_five_are_explained_or_say_how_far_they_were_
     file = parse_system(f'variables = ["x1", "x2", "x3", "x4", "x5"]\n[map]\nimage = [{image}]')
     found = degree_growth(file.map, max_degree=2000)
     assert (found.growth, found.degrees[:10]) == (growth, degrees)
-    assert bool(found.patterns.series) == (not found.patterns.running) == (growth is not GrowthClass.UNKNOWN)
+    assert bool(found.patterns.series) == (not found.patterns.running) == (growth is not Growth.UNKNOWN)
 
 
 def test_two_eps_that_differ_leave_the_patterns_open():
@@ -265,7 +265,7 @@ def test_a_recurrence_needs_terms_beyond_all_patterns():
     assert growth_with(Patterns((9,), None, True), *linear).recurrence.closed_form == "n + 1"
     for known in (Patterns((10,), None, True), Patterns((4, 6), 100, True), Patterns((), None, False, "no time")):
         found = growth_with(known, *linear)
-        assert (found.recurrence, found.growth) == (None, GrowthClass.UNKNOWN)
+        assert (found.recurrence, found.growth) == (None, Growth.UNKNOWN)
         assert found.growth_text.startswith("13 terms fit linear growth, an estimate only: ")
     # 13 terms, no hypersurface that could lower a degree, and yet the degrees are not 2^n
     assert "degrees drop where" in growth_with(Patterns((), 100, False), *linear).unconfirmed
@@ -370,22 +370,22 @@ def beside(kind, growth, lengths=None, heights=(21, 5)):
 
 def test_heights_and_degrees_that_do_not_go_together_are_told():
     exponential, quadratic = Growth.EXPONENTIAL, Growth.QUADRATIC
-    assert beside(exponential, GrowthClass.LINEAR) == "the degrees grow linearly"
-    assert beside(exponential, GrowthClass.QUADRATIC) == "the degrees grow polynomially"
-    assert beside(quadratic, GrowthClass.QUADRATIC) == beside(exponential, GrowthClass.EXPONENTIAL) == ""
-    assert beside(quadratic, GrowthClass.BOUNDED) == beside(quadratic, GrowthClass.ZERO) == "the degrees are bounded"
-    assert beside(exponential, GrowthClass.UNKNOWN) == beside(Growth.UNDECIDED, GrowthClass.EXPONENTIAL) == ""
+    assert beside(exponential, Growth.LINEAR) == "the degrees grow linearly"
+    assert beside(exponential, Growth.QUADRATIC) == "the degrees grow polynomially"
+    assert beside(quadratic, Growth.QUADRATIC) == beside(exponential, Growth.EXPONENTIAL) == ""
+    assert beside(quadratic, Growth.BOUNDED) == beside(quadratic, Growth.ZERO) == "the degrees are bounded"
+    assert beside(exponential, Growth.UNKNOWN) == beside(Growth.UNDECIDED, Growth.EXPONENTIAL) == ""
     for one in ({"heights": None, "degrees": 0}, {"heights": 0, "degrees": None}):
         assert doubt_of_heights(SimpleNamespace(**one)) == ""
 
 
 def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
     # 21 heights are those of 20 steps.
-    kind, growth = Growth.QUADRATIC, GrowthClass.QUADRATIC
+    kind, growth = Growth.QUADRATIC, Growth.QUADRATIC
     late = "the singularities show something new up to step 11 and the orbits have 20 steps"
     assert beside(kind, growth, (4, 10)) == ""
     assert beside(kind, growth, (4, 11)) == late
-    assert beside(kind, GrowthClass.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
+    assert beside(kind, Growth.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
     assert beside(Growth.UNDECIDED, growth, (4, 11)) == ""
     assert beside(kind, growth, (), (2,)) == beside(kind, growth, None, (2,)) == ""
 
@@ -393,7 +393,9 @@ def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
 def lorenz_along(seed, limits):
     """What becomes of x^2 = 2 z^2, which has points in GF(p) for every other prime only."""
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
-    return outcome_of(load("lorenz").map, fmpq(1, 7), x**2 - 2 * z**2, "?", False, None, random.Random(seed), limits)
+    return outcome_of(
+        load("lorenz").map, fmpq(1, 7), Written(x**2 - 2 * z**2, False, None), "?", random.Random(seed), limits
+    )
 
 
 def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():
@@ -425,7 +427,7 @@ def test_only_the_pivot_leaves_no_tangents():
 
 def test_patterns_that_are_open_end_the_search_without_a_recurrence():
     found = degree_growth(load("euler_top").system, patterns=Patterns((), None, False, "the time was over"))
-    assert (found.ended, found.recurrence, found.growth) == ("unconfirmed", None, GrowthClass.UNKNOWN)
+    assert (found.ended, found.recurrence, found.growth) == ("unconfirmed", None, Growth.UNKNOWN)
     assert found.message == "a recurrence of order 3 fits, but the time was over"
     assert found.growth_text == "12 terms fit quadratic growth, an estimate only: the time was over"
 
@@ -521,7 +523,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
 ):
     tried = []
 
-    def walk(equation, point, direction, precision, tangents, functions):
+    def images_of_curve(equation, point, direction, precision, tangents, functions):
         tried.append(precision)
         yield SimpleNamespace(name="first", common=0)
         if precision < 64:
@@ -529,7 +531,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
         yield SimpleNamespace(name="t", common=1)
         yield SimpleNamespace(name="last", common=0)
 
-    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk", walk)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.following.images_of_curve", images_of_curve)
     limits = Range(0, 0, 0, options.get("end", math.inf))
     run, whole = Course((), (), (), limits).steps(steps, most=options.get("most", 4096))
     assert ([step.name for step in run], whole, tried) == found

@@ -13,9 +13,9 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.consistency import contradictions
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.preserve.poisson import pencil as module
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
 
@@ -154,7 +154,7 @@ def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
 def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
     found = analyze(load(name), seconds=30)
     assert found.pencil is not None
-    assert (found.pencil.genus, found.degrees.growth) == (1, GrowthClass.QUADRATIC)
+    assert (found.pencil.genus, found.degrees.growth) == (1, Growth.QUADRATIC)
     assert "the map is a translation" in found.to_json()["invariant_curves"]["motion"]
     assert not contradictions(found)
 
@@ -162,15 +162,15 @@ def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
 @pytest.mark.parametrize(
     ("genus", "growth", "agree"),
     [
-        (0, GrowthClass.BOUNDED, True),
-        (0, GrowthClass.LINEAR, True),
-        (0, GrowthClass.QUADRATIC, False),
-        (1, GrowthClass.LINEAR, False),
-        (1, GrowthClass.QUADRATIC, True),
-        (2, GrowthClass.BOUNDED, True),
-        (2, GrowthClass.LINEAR, False),
-        (2, GrowthClass.QUADRATIC, False),
-        (2, GrowthClass.UNKNOWN, True),
+        (0, Growth.BOUNDED, True),
+        (0, Growth.LINEAR, True),
+        (0, Growth.QUADRATIC, False),
+        (1, Growth.LINEAR, False),
+        (1, Growth.QUADRATIC, True),
+        (2, Growth.BOUNDED, True),
+        (2, Growth.LINEAR, False),
+        (2, Growth.QUADRATIC, False),
+        (2, Growth.UNKNOWN, True),
     ],
 )
 def test_the_genus_allows_one_kind_of_growth(genus, growth, agree):
@@ -188,7 +188,7 @@ def test_a_genus_that_the_degrees_exclude_is_no_finding():
 
 def test_what_the_map_does_on_the_curves_is_said_where_it_follows():
     elliptic, rational, other = (curves(text) for text in ("y^2 - x^3 - x", "x*y", "y^2 - x^5 - x"))
-    assert elliptic.motion(GrowthClass.QUADRATIC) == "on it the map is a translation, for the degrees grow"
-    assert elliptic.motion(GrowthClass.BOUNDED) == rational.motion(GrowthClass.LINEAR) == ""
-    assert "finite order" in other.motion(GrowthClass.UNKNOWN)
-    assert "an iterate" in replace(elliptic, components=2).motion(GrowthClass.QUADRATIC)
+    assert elliptic.motion(Growth.QUADRATIC) == "on it the map is a translation, for the degrees grow"
+    assert elliptic.motion(Growth.BOUNDED) == rational.motion(Growth.LINEAR) == ""
+    assert "finite order" in other.motion(Growth.UNKNOWN)
+    assert "an iterate" in replace(elliptic, components=2).motion(Growth.QUADRATIC)

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.growth.recurrences import GrowthClass, find_recurrence, needed_checks
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.growth.recurrences import find_recurrence, needed_checks
 
 PRIMES = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53]
 
@@ -47,7 +48,7 @@ def test_known_sequences(values, order, growth, closed_form):
 def test_the_growth_rate_is_an_algebraic_number_with_certain_digits():
     # 1 + sqrt 2: 3, 9, 23, 57, 139, 337, 815, 1969 are the degrees of zhukovski_volterra_2
     found = find_recurrence([1, 3, 9, 23, 57, 139, 337, 815, 1969, 4755])
-    assert found.growth is GrowthClass.EXPONENTIAL
+    assert found.growth is Growth.EXPONENTIAL
     assert found.rate.minimal_polynomial == fmpz_poly([-1, -2, 1])
     assert found.rate.digits.startswith("2.41421356237309504880")
     assert found.rate.enclosure.startswith("[2.41421356237309504880168872420969807")
@@ -66,7 +67,7 @@ def test_a_polynomial_factor_of_exponential_growth_is_a_multiplicity():
 
 def test_no_rate_where_no_positive_root_is_the_largest():
     found = find_recurrence([(-2) ** n for n in range(6)])
-    assert (found.growth, found.rate, found.closed_form) == (GrowthClass.EXPONENTIAL, None, None)
+    assert (found.growth, found.rate, found.closed_form) == (Growth.EXPONENTIAL, None, None)
 
 
 def test_first_terms_may_be_exempt():

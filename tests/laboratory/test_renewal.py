@@ -106,7 +106,7 @@ def test_the_singularities_are_asked_where_degrees_are_too_large_for_a_recurrenc
 def test_where_hypersurfaces_are_not_told_apart_degrees_are_measured_only(monkeypatch):
     monkeypatch.setattr(contracted, "components", lambda *_: [])
     found = patterns(load("three_wave").map, None)
-    assert (found.series, found.told, found.running) == ((), [], "")
+    assert (found.series, found.sentences, found.running) == ((), [], "")
     assert found.lengths
     assert degree_growth(load("three_wave").map, seconds=60, patterns=found).basis.startswith("measured")
 

@@ -14,7 +14,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.scan.growth import _goes_on
 from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.members import Scanned
@@ -54,7 +54,7 @@ def three_lines():
 
 def test_the_classification_of_three_lines_is_found(three_lines):
     # zander-2021: the exponents (1, 1, 1), (1, 1, 2), (1, 2, 3), up to permutation and a factor
-    assert slow(three_lines, GrowthClass.QUADRATIC) == {
+    assert slow(three_lines, Growth.QUADRATIC) == {
         "(1, 1)",
         *("(1, 2)", "(2, 1)", "(1/2, 1/2)"),
         *("(2, 3)", "(3, 2)", "(1/2, 3/2)", "(3/2, 1/2)", "(1/3, 2/3)", "(2/3, 1/3)"),
@@ -62,9 +62,9 @@ def test_the_classification_of_three_lines_is_found(three_lines):
 
 
 def test_linear_cases_and_the_degenerate_line_are_found(three_lines):
-    linear = slow(three_lines, GrowthClass.LINEAR)
+    linear = slow(three_lines, Growth.LINEAR)
     assert linear == {"(0, 1)", "(1, 0)", "g1 + 1 = 0", "g2 + 1 = 0", "g1 + g2 = 0"}
-    assert "g1 + g2 + 1 = 0" in slow(three_lines, GrowthClass.BOUNDED)
+    assert "g1 + g2 + 1 = 0" in slow(three_lines, Growth.BOUNDED)
 
 
 def test_special_points_of_a_curve_are_found_on_it(three_lines):
@@ -122,20 +122,20 @@ def test_the_conditions_of_lotka_volterra_in_space_are_found():
     assert conditions["A*B*C + 1 = 0"].degrees == (3, 7, 15)
     # the curves in it on which the map is integrable
     for one in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
-        assert conditions[one].growth.growth is GrowthClass.QUADRATIC
+        assert conditions[one].growth.growth is Growth.QUADRATIC
         assert conditions[one].dimension == 1
     assert not any(found.left)
 
 
 def test_the_condition_of_the_dressing_chain_is_found():
     found = scan(parse_system(DRESSING_CHAIN), ["p", "q", "r"], primes=(11, 13, 17), terms=4)
-    assert slow(found, GrowthClass.QUADRATIC) == {"p + q + r = 0"}
+    assert slow(found, Growth.QUADRATIC) == {"p + q + r = 0"}
 
 
 def test_henon_heiles_keeps_one_case_of_three():
     found = scan(load("henon_heiles"), ["c"], primes=(101, 103, 107))
     assert [one.text for one in found.components] == ["-1"]
-    assert found.components[0].growth.growth is GrowthClass.QUADRATIC
+    assert found.components[0].growth.growth is Growth.QUADRATIC
 
 
 def test_a_scan_needs_no_numba(monkeypatch):
@@ -158,7 +158,7 @@ def test_points_over_quadratic_fields_have_their_minimal_polynomial():
     [system]
     rhs = ["x*(x + 2*y)", "-y*(a^2*x + (a^2 - 1)*y)"]"""
     found = scan(parse_system(text), ["a"], terms=5)
-    quadratic = {one.text: one for one in found.components if one.growth and one.growth.growth is GrowthClass.QUADRATIC}
+    quadratic = {one.text: one for one in found.components if one.growth and one.growth.growth is Growth.QUADRATIC}
     assert set(quadratic) == {"a^2 - 2 = 0", "a^2 - 3 = 0"}  # g = a^2 - 1 is 1 and 2
     assert all(one.is_confirmed and one.values is None for one in quadratic.values())
     assert quadratic["a^2 - 2 = 0"].growth.degrees[:8] == (1, 2, 4, 8, 13, 20, 28, 38)
@@ -179,7 +179,7 @@ def test_a_condition_with_eps_is_found_where_eps_varies_too():
     # the catalogue's repaired_octahedral
     one = next(one for one in found.components if one.text == "24*eps^2 + A + 2 = 0")
     assert one.is_confirmed
-    assert one.growth.growth is GrowthClass.QUADRATIC
+    assert one.growth.growth is Growth.QUADRATIC
     assert one.values["A"] == -2 - 24 * one.values["eps"] ** 2
     without = scan(parse_system(REPAIRED), ["A"], primes=(43, 47, 53), terms=5)
     assert [one.text for one in without.components] == ["-1"]  # the one that holds for every eps
@@ -204,7 +204,7 @@ def test_four_parameters_give_what_has_codimension_2_as_well():
     # at D = 1 these are the curves that are known
     for one in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
         assert (conditions[one].dimension, conditions[one].is_confirmed) == (2, True)
-        assert conditions[one].growth.growth is GrowthClass.QUADRATIC
+        assert conditions[one].growth.growth is Growth.QUADRATIC
     assert "24 random planes of parameter space modulo 19, 23, 29, 31" in found.coverage
     assert "codimension 2" in found.coverage
 
@@ -235,7 +235,7 @@ def test_curves_that_split_over_a_quadratic_field_are_found_as_one_and_others(co
     found = scan(parse_system(text), ["a", "b"], terms=6)
     assert [one.text for one in found.components] == [f"{condition} = 0"]
     assert found.components[0].is_confirmed
-    assert found.components[0].growth.growth is GrowthClass.QUADRATIC
+    assert found.components[0].growth.growth is Growth.QUADRATIC
     assert not any(found.left)
 
 
@@ -405,7 +405,7 @@ def test_points_of_a_plane_over_number_fields_are_found(condition, other, expect
     found = scan(parse_system(text), ["a", "b"], terms=5)
     one = next(one for one in found.components if one.dimension == 0)
     assert (one.text, one.is_confirmed, one.values) == (expected, True, None)
-    assert one.growth.growth is GrowthClass.QUADRATIC
+    assert one.growth.growth is Growth.QUADRATIC
     assert not any(found.left)
 
 

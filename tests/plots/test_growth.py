@@ -11,7 +11,7 @@ from flint import fmpq
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.plots.growth import draw_degrees, draw_heights

@@ -1,8 +1,9 @@
 """Expressions in text to polynomials: how they are read, what is wrong in them, and arithmetic that refuses in time.
 
-Values are built from the bottom up while the text is read; no tree is kept and nothing is run as code. A value is a
-number, or a quotient of two polynomials. FLINT ends the process when memory runs out and does not see Ctrl-C, so
-the size and the cost of every operation are estimated, and if need be refused, before FLINT is called.
+Values are built from the bottom up while the text is read; no tree is kept and nothing is run as code. (Python's own
+`ast` gives up at sums of some thousand terms, and at integers of 4300 digits.) A value is a number, or a quotient of
+two polynomials. FLINT ends the process when memory runs out and does not see Ctrl-C, so the size of every result is
+bounded, and if need be refused, before FLINT is called; `Limits.words` bounds what all of them take together.
 
 Use `kahanmaps.algebra.written.text`.
 """
@@ -13,7 +14,6 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping
-from math import isqrt
 from typing import Any, NamedTuple, TypeVar, cast
 
 from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
@@ -45,7 +45,6 @@ _WRITE = {
 }
 
 _OPERAND = "expected a number, a name or '('"
-_CALL = 2_500  # nanoseconds that one product costs in Python
 _BRACKET = re.compile(r"[()]")
 
 
@@ -261,21 +260,18 @@ class _Arithmetic:
         self.ring = ring
         self.limits = limits
         self.quotients = quotients
-        self.work_left = limits.work
+        self.words_left = limits.words
         self.max_bits = limits.digits * 3322 // 1000 + 1
         self.names: dict[str, _Value] = dict(constants)
-        self.term_cost = 20
         if ring is not None:
             self.one = self.polynomial(fmpq(1))
             for name, variable in zip(ring.names(), ring.gens(), strict=True):
                 self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0), None)
-            # FLINT packs the exponents of a monomial into words, some eight to a word.
-            self.term_cost += 10 * (ring.nvars() // 8)
 
     def number(self, token: Token) -> _Value:
         start = token.start_pos
         value = number_in(self.text, start, start + len(token), self.limits.digits, self.limits)
-        self.spend(_times(value.height_bits(), value.height_bits()), start)
+        self.spend(1, value.height_bits(), start)
         return value
 
     def name(self, token: Token) -> _Value:
@@ -366,7 +362,7 @@ class _Arithmetic:
         if number is not None:
             bits = number.height_bits() * n
             self.check_bits(bits, column)
-            self.spend(2 * _times(bits, bits), column)
+            self.spend(1, bits, column)
             return number**n
         if n == 0:
             return fmpq(1)
@@ -389,7 +385,7 @@ class _Arithmetic:
         if leading == 1:
             return _Quotient(below, above)
         # Leading coefficient 1, so that denominators which differ by a constant are seen to be the same.
-        self.spend(len(above.value) * self.term_cost + 30 * _times(above.bits, above.bits), column)
+        self.spend(len(above.value), above.bits, column)
         monic = _Polynomial(above.value / leading, abs((leading * above.scale).p), above.bits)
         return _Quotient(self.scaled(below, 1 / leading, column), monic)
 
@@ -401,14 +397,11 @@ class _Arithmetic:
     # Arithmetic of numbers and polynomials: estimate, refuse or compute.
 
     def add_numbers(self, left: fmpq, right: fmpq, column: int) -> fmpq:
-        bits = left.height_bits(), right.height_bits()
-        # A sum of fractions takes gcds, and a gcd costs some fifteen products.
-        self.spend(max(bits) // 64 if left.q == right.q == 1 else 15 * _times(*bits), column)
+        self.spend(1, max(left.height_bits(), right.height_bits()), column)
         return self.checked(left + right, column)
 
     def times_numbers(self, left: fmpq, right: fmpq, column: int) -> fmpq:
-        bits = left.height_bits(), right.height_bits()
-        self.spend(_times(*bits) * (1 if left.q == right.q == 1 else 30), column)
+        self.spend(1, left.height_bits() + right.height_bits(), column)
         return self.checked(left * right, column)
 
     def polynomial(self, value: _Value) -> _Polynomial:
@@ -421,14 +414,12 @@ class _Arithmetic:
         scale = left.scale
         bits = max(left.bits, right.bits) + 1
         if left.scale != right.scale:
-            self.spend(15 * _times(left.scale.bit_length(), right.scale.bit_length()), column)
             scale = left.scale.lcm(right.scale)
             size = _bits(scale)
             bits = 2 + max(side.bits + size - side.scale.bit_length() for side in (left, right))
             self.check_bits(size, column)
         self.check_bits(bits, column)
-        cost = _times(bits, bits)
-        self.spend((len(left.value) + len(right.value)) * (self.term_cost + 2 * cost) + 15 * cost, column)
+        self.spend(len(left.value) + len(right.value), bits, column)
         return self.counted(left.value + right.value, scale, bits, column)
 
     def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
@@ -438,11 +429,11 @@ class _Arithmetic:
         pairs = len(left.value) * len(right.value)
         bits = left.bits + right.bits + (max(1, min(len(left.value), len(right.value))) - 1).bit_length()
         self.check_bits(max(bits, _bits(left.scale) + _bits(right.scale)), column)
-        cost = _CALL + pairs * (40 + self.term_cost + _times(left.bits, right.bits)) + 30 * _times(bits, bits)
-        if cost > self.limits.work:
+        bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
+        if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
             found = f"found a product of polynomials with {len(left.value)} and {len(right.value)} terms"
             raise self.refusal(f"{found}, which is too large to expand", column)
-        self.spend(cost, column)
+        self.spend(pairs, bits_of_pair, column)
         return self.counted(left.value * right.value, left.scale * right.scale, bits, column)
 
     def scaled(self, value: _Polynomial, number: fmpq, column: int) -> _Polynomial:
@@ -450,8 +441,7 @@ class _Arithmetic:
             return value
         bits = value.bits + _bits(number.p)
         self.check_bits(max(bits, _bits(value.scale) + _bits(number.q)), column)
-        cost = 30 * _times(number.height_bits(), max(value.bits, value.scale.bit_length()))
-        self.spend(len(value.value) * (self.term_cost + bits // 64) + cost, column)
+        self.spend(len(value.value), bits, column)
         return _Polynomial(value.value * number, value.scale * number.q, bits)
 
     def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
@@ -460,7 +450,7 @@ class _Arithmetic:
         if len(value.value) == 1:
             bits = value.bits * n
             self.check_bits(max(bits, _bits(value.scale) * n), column)
-            self.spend(_CALL + 2 * _times(bits, bits), column)
+            self.spend(1, bits, column)
             return _Polynomial(value.value**n, value.scale**n, bits)
         result = value
         for digit in f"{n:b}"[1:]:
@@ -490,9 +480,10 @@ class _Arithmetic:
         if degree > self.limits.degree:
             raise self.refusal(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
 
-    def spend(self, cost: int, column: int) -> None:
-        self.work_left -= cost
-        if self.work_left < 0:
+    def spend(self, terms: int, bits: int, column: int) -> None:
+        """Count the machine words of so many terms with coefficients of so many bits."""
+        self.words_left -= terms * (bits // 64 + 1)
+        if self.words_left < 0:
             raise self.refusal("found an expression that takes too much work to expand: simplify or split it", column)
 
     def refusal(self, message: str, column: int) -> ExpressionError:
@@ -535,12 +526,6 @@ def _constant(value: _Value) -> fmpq | None:
 def _bits(integer: fmpz) -> int:
     """The least b >= 0 with |integer| <= 2**b: 0 for 1 and -1, so that a product by them does not grow."""
     return int((abs(integer) - 1).bit_length()) if integer else 0
-
-
-def _times(left: int, right: int) -> int:
-    """What the product of integers of so many bits costs, in nanoseconds (measured, on the high side)."""
-    small, large = sorted((left // 64 + 1, right // 64 + 1))
-    return 3 * large * isqrt(small)
 
 
 def _show(number: fmpq) -> str:

@@ -17,8 +17,8 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, quoted
 class Limits:
     """How large a text, and what it stands for, may be. Meant to be out of the way of honest use.
 
-    The limits hold for results and for every value on the way to them. Digits and work are estimated before anything
-    is computed, on the high side.
+    The limits hold for results and for every value on the way to them. Digits are bounded before anything is computed,
+    on the high side.
     """
 
     number_digits: int = 1_000_000  # of one number read by parse_number or parse_point
@@ -29,7 +29,7 @@ class Limits:
     exponent: int = 1_000  # in size
     digits: int = 100_000  # of a coefficient written over the common denominator of its polynomial
     terms: int = 20_000  # of a polynomial
-    work: int = 300_000_000  # estimated nanoseconds of arithmetic, by a fixed formula: the same on every machine
+    words: int = 5_000_000  # of 64 bits, of all values on the way; pairs of terms that are multiplied count too
 
 
 LIMITS = Limits()

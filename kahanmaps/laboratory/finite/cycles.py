@@ -10,7 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
@@ -23,6 +23,9 @@ from kahanmaps.laboratory.symmetry.reversors import require_reversor
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.residues.projective import ProjectiveMap
 
 MAX_POINTS = 2_000_000  # up to which the whole graph is made, up to dimension 6
 DEFAULT_SAMPLES = 500
@@ -116,7 +119,7 @@ def cycle_census(
     >>> census.points, census.lost, census.falling, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
-    from kahanmaps.maps.residues.projective import ProjectiveMap, graph_of, hasse_weil, random_points, walk_until_back
+    from kahanmaps.maps.residues.projective import ProjectiveMap
 
     exact_eps, map_ = rational(eps), as_map(given)
     if prime != 2:
@@ -130,35 +133,54 @@ def cycle_census(
     if steps is not None and steps < 1:
         raise InputError(f"found {steps} steps, expected at least 1")
     chart = ProjectiveMap(map_, exact_eps, prime)
-    known = (prime, exact_eps, chart.dim, chart.count)
-    form = (chart.factor, chart.degree, chart.is_undefined)
     if samples is None and chart.count <= MAX_POINTS >> max(0, chart.dim - 6):
         progress(f"p = {prime}: the images of {chart.count} points")
-        image = chart.table()
-        graph = graph_of(image)
-        labels, lengths = graph.lengths
-        affine = graph.is_seen(labels, chart.count - prime**chart.dim)
-        symmetric, fixed = None, None
-        if reversor is not None:
-            R = chart.permutation(GF(prime).convert_matrix(reversor))
-            here = affine & (graph.label[R[labels]] == labels)
-            symmetric = _counted(lengths[here])
-            numbers = range(chart.count)
-            fixed = (int((R == numbers).sum()), int((image[R] == numbers).sum()))
-        rest = chart.count - graph.lost - graph.falling - int(lengths.sum())
-        counts = _counted(lengths)
-        far = _counted(lengths[~affine])
-        seen = (*known, True, chart.count, graph.lost, graph.falling, rest, 0, 0, False)
-        return Census(*seen, counts, far, symmetric, fixed, *form)
-    wanted = DEFAULT_SAMPLES if samples is None else samples
-    starts = random_points(chart, wanted, seed_for(seed, map_.subject, exact_eps, prime))
-    limit = 8 * hasse_weil(prime) if steps is None else steps
+        return _of_all_points(chart, exact_eps, None if reversor is None else GF(prime).convert_matrix(reversor))
+    starts = seed_for(seed, map_.subject, exact_eps, prime)
+    return _of_samples(chart, exact_eps, samples or DEFAULT_SAMPLES, starts, steps, seconds, progress)
+
+
+def _of_all_points(chart: ProjectiveMap, eps: fmpq, reversor: Any) -> Census:
+    """By the whole graph; `reversor` is a matrix modulo p."""
+    from kahanmaps.maps.residues.projective import graph_of
+
+    image = chart.table()
+    graph = graph_of(image)
+    labels, lengths = graph.lengths
+    affine = graph.is_seen(labels, chart.count - chart.prime**chart.dim)
+    symmetric, fixed = None, None
+    if reversor is not None:
+        R = chart.permutation(reversor)
+        here = affine & (graph.label[R[labels]] == labels)
+        symmetric = _counted(lengths[here])
+        numbers = range(chart.count)
+        fixed = (int((R == numbers).sum()), int((image[R] == numbers).sum()))
+    rest = chart.count - graph.lost - graph.falling - int(lengths.sum())
+    seen = (chart.count, graph.lost, graph.falling, rest, 0, 0, False)
+    counts, far = _counted(lengths), _counted(lengths[~affine])
+    return _census(chart, eps, True, *seen, counts, far, symmetric, fixed)
+
+
+def _of_samples(
+    chart: ProjectiveMap,
+    eps: fmpq,
+    samples: int,
+    seed: int,
+    steps: int | None,
+    seconds: float,
+    progress: Callable[[str], None],
+) -> Census:
+    """By random points, each followed until it is back."""
+    from kahanmaps.maps.residues.projective import hasse_weil, random_points, walk_until_back
+
+    starts = random_points(chart, samples, seed)
+    limit = 8 * hasse_weil(chart.prime) if steps is None else steps
     end = time.monotonic() + seconds
     taken = limit
 
     def keep_on(step: int) -> bool:
         nonlocal taken
-        progress(f"p = {prime}: step {step} of at most {limit}")
+        progress(f"p = {chart.prime}: step {step} of at most {limit}")
         if time.monotonic() > end:
             taken = step - 1
             return False
@@ -168,8 +190,13 @@ def cycle_census(
     counts = _counted(back[back > 0])
     lost, falling = int((gone == 0).sum()), int((gone > 0).sum())
     left = starts.shape[1] - lost - falling - sum(counts.values())
-    seen = (*known, False, starts.shape[1], lost, falling, 0, left, taken, taken < limit)
-    return Census(*seen, counts, {}, None, None, *form)
+    seen = (starts.shape[1], lost, falling, 0, left, taken, taken < limit)
+    return _census(chart, eps, False, *seen, counts, {}, None, None)
+
+
+def _census(chart: ProjectiveMap, eps: fmpq, *seen: Any) -> Census:
+    form: dict[str, Any] = {"factor": chart.factor, "degree": chart.degree, "is_undefined": chart.is_undefined}
+    return Census(chart.prime, eps, chart.dim, chart.count, *seen, **form)
 
 
 def default_eps(prime: int, count: int = 2) -> list[fmpq]:

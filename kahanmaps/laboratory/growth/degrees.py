@@ -33,9 +33,10 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
-from kahanmaps.laboratory.growth.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
+from kahanmaps.laboratory.growth.recurrences import GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
 from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.singular.generic import with_eps
@@ -123,11 +124,11 @@ class DegreeGrowth(Printed):
         return self.explained or (None if self.unconfirmed else self.fitted)
 
     @property
-    def growth(self) -> GrowthClass:
-        """How the degrees grow if the recurrence goes on; `GrowthClass.UNKNOWN` without one."""
+    def growth(self) -> Growth:
+        """How the degrees grow if the recurrence goes on; `Growth.UNKNOWN` without one."""
         if self.ended == Ended.CONSTANT:
-            return GrowthClass.ZERO
-        return GrowthClass.UNKNOWN if self.recurrence is None else self.recurrence.growth
+            return Growth.ZERO
+        return Growth.UNKNOWN if self.recurrence is None else self.recurrence.growth
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
@@ -158,14 +159,14 @@ class DegreeGrowth(Printed):
     @property
     def kind_text(self) -> str:
         """The kind of growth with its power or rate, or what can be said without a confirmed recurrence: one phrase."""
-        if self.growth is GrowthClass.ZERO:
+        if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
         if (found := self.recurrence) is not None:
-            if found.growth is GrowthClass.EXPONENTIAL:
+            if found.growth is Growth.EXPONENTIAL:
                 return "exponential growth" + (
                     f", dynamical degree {found.rate.text}" if found.rate is not None else ""
                 )
-            power = f" of degree {found.power}" if found.growth is GrowthClass.POLYNOMIAL else ""
+            power = f" of degree {found.power}" if found.growth is Growth.POLYNOMIAL else ""
             return f"{found.growth} growth{power}, dynamical degree 1"
         terms = counted(len(self.degrees), "term")
         if self.looks_exponential:
@@ -213,7 +214,7 @@ class DegreeGrowth(Printed):
             if self.explained is not None:
                 lines.append(("generating function", self.patterns.series_text))
             lines.append(("singularities", self.patterns.text))
-            lines += [("contracted", told) for told in self.patterns.told]
+            lines += [("contracted", text) for text in self.patterns.sentences]
             lines += [("note", told) for told in (self.patterns.word_text,) if told]
         if self.enclosure is not None:
             lines.append(("proved", self.enclosure.text))
@@ -323,7 +324,7 @@ class _Search:
             self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
         )
         found = replace(found, patterns=self._named())
-        if not enclosed or (found.growth is not GrowthClass.EXPONENTIAL and not found.looks_exponential):
+        if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
             return found
         left = max(1.0, self._deadline - time.monotonic())
         return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))
@@ -407,7 +408,7 @@ class _Search:
                     lines[k] = self._line()
 
     def _degree(self, line: Line, n: int) -> int:
-        """The degree of iterate n on a line, which is walked there; -1 where that cannot be done on this line."""
+        """The degree of iterate n on a line, which is followed there; -1 where that cannot be done on this line."""
         try:
             while line.steps < n:
                 line.step(self._guess(line.steps + 1))

@@ -23,7 +23,8 @@ from kahanmaps.algebra.written.text import format_point
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
-from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.invariants.heights import HeightGrowth, height_growth
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -12,7 +12,6 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from itertools import count
 from typing import Any
@@ -23,22 +22,11 @@ from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ct
 from kahanmaps.algebra.written.plain import attributes, plain
 from kahanmaps.algebra.written.text import format_univariate
 from kahanmaps.errors import InputError
+from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
 _BITS = 256  # of the balls for roots
 _MOST_CLASSES = 12  # residue classes in a closed form
-
-
-class GrowthClass(StrEnum):
-    """How a sequence with a linear recurrence grows; UNKNOWN where there is no recurrence."""
-
-    ZERO = "zero"  # from some term on
-    BOUNDED = "bounded"
-    LINEAR = "linear"
-    QUADRATIC = "quadratic"
-    POLYNOMIAL = "polynomial"
-    EXPONENTIAL = "exponential"
-    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
@@ -129,14 +117,14 @@ class Recurrence:
         return self.rate.multiplicity - 1
 
     @property
-    def growth(self) -> GrowthClass:
+    def growth(self) -> Growth:
         """The kind of growth."""
         if not self.factors:
-            return GrowthClass.ZERO
+            return Growth.ZERO
         if not self.is_polynomial:
-            return GrowthClass.EXPONENTIAL
-        classes = (GrowthClass.BOUNDED, GrowthClass.LINEAR, GrowthClass.QUADRATIC)
-        return classes[self.power] if self.power < 3 else GrowthClass.POLYNOMIAL
+            return Growth.EXPONENTIAL
+        classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
+        return classes[self.power] if self.power < 3 else Growth.POLYNOMIAL
 
     @cached_property
     def rate(self) -> GrowthRate | None:

@@ -10,10 +10,10 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.invariants.growth import OF_DEGREES, Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.members import Scanned
 from kahanmaps.laboratory.scan.result import STEPS, Component
 from kahanmaps.laboratory.scan.sweep import Degrees, TimeOver
@@ -23,8 +23,7 @@ Progress = Callable[[str], None]
 _SECONDS, _ATTEMPTS = 10.0, 2
 _TERMS, _LARGE = 26, 1000  # where no rational member is known: so many degrees, as far as they are not above this
 _SOME = 100  # the degree up to which they are compared, at least
-_MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
-_ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
+_MEASURED_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
 def with_growth(
@@ -59,7 +58,7 @@ def with_growth(
     kinds = {one.degrees: one.growth.growth for one in reversed(found) if one.growth is not None}
 
     def order(one: Component) -> tuple[int, Degrees, str]:
-        return _ORDER.index(kinds.get(one.degrees, GrowthClass.UNKNOWN)), one.degrees[::-1], one.text
+        return OF_DEGREES.index(kinds.get(one.degrees, Growth.UNKNOWN)), one.degrees[::-1], one.text
 
     return sorted(found, key=order), missed
 
@@ -70,7 +69,7 @@ def _growth(values: dict[str, fmpq], family: Scanned, left: float) -> DegreeGrow
     given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
     for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
         found = degree_growth(member.map, step, seed=family.seed + attempt, **given)
-        if found.growth is not GrowthClass.UNKNOWN:
+        if found.growth is not Growth.UNKNOWN:
             break
     return found
 
@@ -111,7 +110,7 @@ def with_verdicts(
     points: set[Degrees] = set()
     missed = 0
     for one in components:
-        asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
+        asked = one.values is not None and one.growth is not None and one.growth.growth is not Growth.EXPONENTIAL
         if asked and one.values is not None and one.degrees not in points:
             member, step = family.member(one.values)
             try:

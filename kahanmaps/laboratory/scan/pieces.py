@@ -83,29 +83,6 @@ def pieces(
                 if inside.sum() >= needed:
                     yield tuple(map(tuple, rows)), inside
 
-    def forms(here: Any, needed: float) -> Iterator[tuple[Form, Any]]:
-        """Irreducible hypersurfaces with so many of the points `here`, and which of these are in them.
-
-        What a few more points than coefficients are on is the product of all, what fewer are on perhaps one of them.
-        """
-        for degree in range(2, _MOST_DEGREE + 1):
-            size = len(exponents_up_to(here.shape[1], degree))
-            enough = int(_SPARE * size) + 2
-            table = _monomials(here, degree, prime)
-            for attempt in range(_TRIES if degree == 2 else _FEW if degree <= MAX_DEGREE else 1):
-                check()
-                if len(here) < max(enough, needed):
-                    break
-                chosen = rng.sample(range(len(here)), size - 1 if attempt else enough)
-                basis = null_space(table[chosen].tolist(), size, prime)
-                if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(enough, needed):
-                    continue
-                for factor, power in _factors(basis[0], degree, here.shape[1], prime):
-                    inside = _monomials(here, power, prime) @ factor % prime == 0
-                    if inside.sum() >= needed:
-                        yield factor, inside
-                        here, table = here[~inside], table[~inside]
-
     for dimension in range(count - 1, max(smallest, 1) - 1, -1):
         # Of the dimension that is looked for: affine ones, then others in affine ones of one dimension more.
         needed = max(_SHARE * seen / prime ** (count - dimension), dimension + 3)
@@ -113,14 +90,14 @@ def pieces(
             found.flats.setdefault(dimension, []).append(rows)
             rest = rest[~inside]
         if dimension == count - 1:
-            for form, inside in forms(rest, needed):
+            for form, inside in _hypersurfaces(rest, needed, prime, rng, check):
                 found.forms.setdefault((), []).append(form)
                 rest = rest[~inside]
             continue
         for rows, inside in flats(dimension + 1, needed):
             free = [k for k in range(count) if k not in pivots(rows)]
             places, kept = np.flatnonzero(inside), np.ones(len(rest), dtype=bool)
-            for form, some in forms(rest[inside][:, free], needed):
+            for form, some in _hypersurfaces(rest[inside][:, free], needed, prime, rng, check):
                 found.forms.setdefault(rows, []).append(form)
                 kept[places[some]] = False
                 places = places[~some]
@@ -131,6 +108,32 @@ def pieces(
         rest = rest[:0]
     found.left = len(rest)
     return found
+
+
+def _hypersurfaces(
+    here: Any, needed: float, prime: int, rng: random.Random, check: Callable[[], None]
+) -> Iterator[tuple[Form, Any]]:
+    """Irreducible hypersurfaces with so many of the points `here`, and which of these are in them.
+
+    What a few more points than coefficients are on is the product of all, what fewer are on perhaps one of them.
+    """
+    for degree in range(2, _MOST_DEGREE + 1):
+        size = len(exponents_up_to(here.shape[1], degree))
+        enough = int(_SPARE * size) + 2
+        table = _monomials(here, degree, prime)
+        for attempt in range(_TRIES if degree == 2 else _FEW if degree <= MAX_DEGREE else 1):
+            check()
+            if len(here) < max(enough, needed):
+                break
+            chosen = rng.sample(range(len(here)), size - 1 if attempt else enough)
+            basis = null_space(table[chosen].tolist(), size, prime)
+            if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(enough, needed):
+                continue
+            for factor, power in _factors(basis[0], degree, here.shape[1], prime):
+                inside = _monomials(here, power, prime) @ factor % prime == 0
+                if inside.sum() >= needed:
+                    yield factor, inside
+                    here, table = here[~inside], table[~inside]
 
 
 def degree_reached(points: float, count: int) -> int:

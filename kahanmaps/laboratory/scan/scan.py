@@ -118,14 +118,75 @@ def scan(
     >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
     ['2', '1']
     """
+    family = _family(file, over, eps, seed, by)
+    if by not in WORDS:
+        raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"found {jobs} jobs, expected at least 1")
+    _require_primes(primes)
+    names, map_, exact = family.names, family.map, family.eps
+    rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
+    terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
+    jobs = jobs or processors()
+    # the same on every machine, and not all in one go, where it is kept
+    most = inf if kept is not None else _PART * seconds * jobs / cost
+    run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs, "by": by}, seconds, kept, progress)
+    plan = _plan(len(names), primes, most)
+    if kept is not None:
+        document = dict(file.document)
+        kept.open({"document": document, "over": names, "eps": str(exact), "by": by, "terms": terms, "seed": seed})
+        if kept.parts > 1:
+            run.take(plan[kept.part - 1 :: kept.parts])
+            ended = run.ended("part")
+            return run.result((), (), ended, [*run.omitted, "the other parts and conditions"], is_part=True)
+    run.take(plan)
+    known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
+
+    def is_lacking(what: Callable[[Sweep, Sequence[Component]], bool]) -> bool:
+        return not (missed or run.omitted) and any(map(what, run.sweeps, repeat(known)))
+
+    if is_lacking(_lacks_hypersurface) and (lines := run.more_lines(most)):
+        run.sweeps[:] = [one for one in run.sweeps if not one.on_lines]
+        run.take(lines)
+        known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
+    if is_lacking(_lacks_points) and (further := run.more_primes(primes, most)):
+        run.take(further)
+        known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
+    run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
+    for k, one in enumerate(known):
+        try:
+            run.tell(f"scan: confirms component {k + 1} of {len(known)}")
+            known[k] = _confirmed(one, family, known, rng, run.until(_UNTIL[2]))
+        except TimeOver:
+            run.omit(1, f"the confirmation of {counted(len(known) - k, 'component')}")
+            break
+    check = run.until(1 if analysis is None else _UNTIL[3])
+    known, missed = with_growth(known, family, run.began + seconds, check, run.tell)
+    run.omit(missed, f"the growth on {missed} components")
+    if analysis is not None:
+        known, missed = with_verdicts(known, family, analysis, run.began + seconds, run.until(1), run.tell)
+        run.omit(missed, f"{missed} verdicts")
+    return run.result(known, tuple(symmetries(run.sweeps, known, names)), run.ended("complete"), run.omitted)
+
+
+def _require_primes(primes: Sequence[int] | None) -> None:
+    composite = [p for p in primes or () if not fmpz(p).is_prime()]
+    if composite:
+        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
+    if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
+        given = ", ".join(map(str, primes))
+        raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
+
+
+def _family(file: SystemFile, over: Sequence[str], eps: Any, seed: int, by: str) -> Scanned:
+    """The family of maps, eps the last of its parameters where it is one."""
     names = tuple(dict.fromkeys(over))
     if not names:
         raise InputError("found no parameter to scan over, expected at least one")
     if len(names) > MAX_PARAMETERS:
         raise InputError(f"found {len(names)} parameters to scan over, expected at most {MAX_PARAMETERS}")
-    if "eps" in names:
-        names = (*(name for name in names if name != "eps"), "eps")
-    map_ = map_with_symbols(file, [name for name in names if name != "eps"])
+    symbols = [name for name in names if name != "eps"]
+    map_ = map_with_symbols(file, symbols)
     exact = None if eps is None else rational(eps)
     if exact is not None and "eps" in names:
         raise InputError("found eps both as a number and as a parameter to scan over, expected one of the two")
@@ -133,122 +194,130 @@ def scan(
         raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-    if by not in WORDS:
-        raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
-    if jobs is not None and jobs < 1:
-        raise InputError(f"found {jobs} jobs, expected at least 1")
-    composite = [p for p in primes or () if not fmpz(p).is_prime()]
-    if composite:
-        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
-    if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
-        given = ", ".join(map(str, primes))
-        raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
-    rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
-    terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
-    family = Scanned(file, names, map_, exact, seed, by)
-    began = time.monotonic()  # not before: loops are compiled there, once on a machine, and that may take all the time
-    jobs = jobs or processors()
-    most = _PART * seconds * jobs / cost
-    if kept is not None:
-        most = inf  # the same on every machine, and not all in one go
-    plan = _plan(len(names), primes, most)
-    if kept is not None:
-        document = dict(file.document)
-        kept.open({"document": document, "over": names, "eps": str(exact), "by": by, "terms": terms, "seed": seed})
-    total = sum(_size(len(names), *one) for one in plan)
-    sweeps: list[Sweep] = []
-    omitted: list[str] = []
+    return Scanned(file, (*symbols, *(["eps"] if "eps" in names else [])), map_, exact, seed, by)
 
-    doing, interrupted = "scan", False
 
-    def tell(sentence: str) -> None:
-        nonlocal doing, interrupted
-        doing = sentence
+class _Sweeping:
+    """The sweeps of one scan as they are made, the time for it, and what was left out."""
+
+    def __init__(
+        self,
+        family: Scanned,
+        start: str,
+        measured: dict[str, Any],
+        seconds: float,
+        kept: Kept | None,
+        progress: Progress,
+    ) -> None:
+        self.family, self.count, self.sweeps, self.omitted = family, len(family.names), list[Sweep](), list[str]()
+        self._start, self._measured, self._seconds, self._kept, self._progress = (
+            start,
+            measured,
+            seconds,
+            kept,
+            progress,
+        )
+        # Not before: loops are compiled with the first members, once on a machine, and that may take all the time.
+        self.began = time.monotonic()
+        self._doing, self._interrupted, self._total = "scan", False, 0
+
+    def tell(self, sentence: str) -> None:
+        """Say what is done now."""
+        self._doing = sentence
         try:
-            progress(sentence)
+            self._progress(sentence)
         except TimeOver:
-            interrupted = True
+            self._interrupted = True
             raise
 
-    def until(part: float) -> Callable[[], None]:
+    def until(self, part: float) -> Callable[[], None]:
+        """What raises TimeOver when a part of the time is over."""
+
         def check() -> None:
-            tell(doing)
-            if time.monotonic() > began + part * seconds:
+            self.tell(self._doing)
+            if time.monotonic() > self.began + part * self._seconds:
                 raise TimeOver
 
         return check
 
-    def told(done: int, _: int) -> None:
-        done += sum(one.seen for one in sweeps)
-        left = (time.monotonic() - began) * max(0, total - done) / done
-        tell(f"scan: {done} of {total} members, {left:.0f} s left")
+    def omit(self, missed: int, what: str) -> None:
+        """Say what was left out, if anything was missed."""
+        self.omitted += [what] if missed else []
 
-    limits: dict[str, Any] = {"jobs": jobs, "by": by, "check": until(_UNTIL[0]), "progress": told}
+    def ended(self, otherwise: str) -> str:
+        """Why the scan ended."""
+        return "interrupted" if self._interrupted else "time" if self.omitted else otherwise
 
-    def take(plan: list[Choice]) -> None:
-        for k, (p, lines, width) in enumerate(plan):
+    def take(self, plan: list[Choice]) -> None:
+        """Sweep modulo these primes; what differs in the generic degrees from the largest ones is dropped."""
+        self._total += self._size(plan)
+        for k, choice in enumerate(plan):
             try:
-                one = None if kept is None else kept.get((p, lines, width))
-                if one is None:
-                    limits.update(on=None if lines is None else (lines, width), seed=f"{start} {p} {lines} {width}")
-                    one = sweep(map_, len(names), p, exact, terms, room, **limits)
-                    if kept is not None:
-                        kept.add(one, lines)
-                sweeps.append(one)
+                self.sweeps.append(self._sweep(choice))
             except BadPrime:
                 continue
             except TimeOver:
-                omitted.append(f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
+                self.omit(1, f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
                 break
-        generic = max((one.generic for one in sweeps), default=())
-        sweeps[:] = [one for one in sweeps if one.generic == generic]
+        generic = max((one.generic for one in self.sweeps), default=())
+        self.sweeps[:] = [one for one in self.sweeps if one.generic == generic]
 
-    if kept is not None and kept.parts > 1:
-        take(plan[kept.part - 1 :: kept.parts])
-        ended = "interrupted" if interrupted else "time" if omitted else "part"
-        omitted.append("the other parts and conditions")
-        generic = sweeps[0].generic if sweeps else ()
-        left = tuple(_left(one, ()) for one in sweeps)
-        part = Scan(file, names, exact, seed, generic, (), tuple(sweeps), left, (), ended, tuple(omitted), by, True)
-        return part if by == "degrees" else part.with_dimensions(map_.dim)
-    take(plan)
-    known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
-    again: list[Choice] = [(one.prime, _MORE * round(one.seen / one.prime), 1) for one in sweeps if one.on_lines]
-    more = sum(_size(len(names), *one) for one in again)
-    if not (missed or omitted) and more <= most and any(map(_lacks_hypersurface, sweeps, repeat(known))):
-        total += more
-        sweeps[:] = [one for one in sweeps if not one.on_lines]
-        take(again)
-        known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
-    further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(len(names), ()) if primes is None]
-    sizes = accumulate((_size(len(names), *one) for one in further), initial=total)
-    further = [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
-    if further and not (missed or omitted) and any(map(_lacks_points, sweeps, repeat(known))):
-        total += sum(_size(len(names), *one) for one in further)
-        take(further)
-        known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
-    omitted += [f"all conditions for {counted(missed, 'sequence')} of degrees"] if missed else []
-    for k, one in enumerate(known):
-        try:
-            tell(f"scan: confirms component {k + 1} of {len(known)}")
-            known[k] = _confirmed(one, family, known, rng, until(_UNTIL[2]))
-        except TimeOver:
-            omitted.append(f"the confirmation of {counted(len(known) - k, 'component')}")
-            break
-    check = until(1 if analysis is None else _UNTIL[3])
-    known, missed = with_growth(known, family, began + seconds, check, tell)
-    omitted += [f"the growth on {missed} components"] if missed else []
-    if analysis is not None:
-        known, missed = with_verdicts(known, family, analysis, began + seconds, until(1), tell)
-        omitted += [f"{missed} verdicts"] if missed else []
-    left = tuple(_left(one, known) for one in sweeps)
-    symmetric = tuple(symmetries(sweeps, known, names))
-    ended = "interrupted" if interrupted else "time" if omitted else "complete"
-    generic = sweeps[0].generic if sweeps else ()
-    found = Scan(
-        file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended, tuple(omitted), by
-    )
-    return found if by == "degrees" else found.with_dimensions(map_.dim)
+    def _sweep(self, choice: Choice) -> Sweep:
+        p, lines, width = choice
+        known = None if self._kept is None else self._kept.get(choice)
+        if known is not None:
+            return known
+        one = sweep(
+            self.family.map,
+            self.count,
+            p,
+            self.family.eps,
+            on=None if lines is None else (lines, width),
+            seed=f"{self._start} {p} {lines} {width}",
+            check=self.until(_UNTIL[0]),
+            progress=self._told,
+            **self._measured,
+        )
+        if self._kept is not None:
+            self._kept.add(one, lines)
+        return one
+
+    def _told(self, done: int, _: int) -> None:
+        done += sum(one.seen for one in self.sweeps)
+        left = (time.monotonic() - self.began) * max(0, self._total - done) / done
+        self.tell(f"scan: {done} of {self._total} members, {left:.0f} s left")
+
+    def _size(self, plan: Sequence[Choice]) -> int:
+        """The number of members."""
+        return sum(_size(self.count, *one) for one in plan)
+
+    def more_lines(self, most: float) -> list[Choice]:
+        """More random lines instead of those there were, where they are not more than `most` members."""
+        again: list[Choice] = [
+            (one.prime, _MORE * round(one.seen / one.prime), 1) for one in self.sweeps if one.on_lines
+        ]
+        return again if self._size(again) <= most else []
+
+    def more_primes(self, primes: Sequence[int] | None, most: float) -> list[Choice]:
+        """Further primes, unless some are given, while there are not more than `most` members in all."""
+        further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(self.count, ()) if primes is None]
+        sizes = accumulate((_size(self.count, *one) for one in further), initial=self._total)
+        return [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
+
+    def result(
+        self,
+        known: Sequence[Component],
+        symmetric: tuple[Any, ...],
+        ended: str,
+        omitted: list[str],
+        is_part: bool = False,
+    ) -> Scan:
+        """The scan with these components."""
+        family, sweeps = self.family, tuple(self.sweeps)
+        left = tuple(_left(one, known) for one in sweeps)
+        asked = (family.file, family.names, family.eps, family.seed, sweeps[0].generic if sweeps else ())
+        found = Scan(*asked, tuple(known), sweeps, left, symmetric, ended, tuple(omitted), family.by, is_part)
+        return found if family.by == "degrees" else found.with_dimensions(family.map.dim)
 
 
 def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:

@@ -111,7 +111,7 @@ _BITS = 31  # of primes: with larger ones python-flint does not order the factor
 Key = tuple[Any, ...]
 
 
-class Untold(ArithmeticError):
+class OrdersUnknown(ArithmeticError):
     """Why the orders along the hypersurfaces are not known."""
 
 
@@ -180,11 +180,11 @@ class _Curve:
     def key(self) -> Key:
         """What tells hypersurfaces apart: whether it is contracted, which forms vanish there, and the first orders.
 
-        Raises Untold where there is no first step.
+        Raises OrdersUnknown where there is no first step.
         """
         run = self.course(self).steps(_FIRST)[0]
         if not run:
-            raise Untold("the time was over, or a curve touches a hypersurface in too high an order")
+            raise OrdersUnknown("the time was over, or a curve touches a hypersurface in too high an order")
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
 
@@ -214,19 +214,19 @@ class _Curve:
         return components(self.equation, self.forms.placed, curve, self.across)
 
     def through(self, one: Component, curve: Sequence[nmod_poly]) -> _Curve:
-        """The same with a point of a component on the surface through a curve. Raises Untold where there is none."""
+        """The same with a point of a component on the surface through a curve. Raises OrdersUnknown without any."""
         for t in range(1, _TRIES):
             for u in one.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
                 return replace(self, point=point)
-        raise Untold("a hypersurface without points modulo a prime")
+        raise OrdersUnknown("a hypersurface without points modulo a prime")
 
     @cached_property
     def census(self) -> list[tuple[Component, _Curve]]:
         """All components on a plane, each with a curve through a point of it; empty where one has no point."""
         try:
             return [(one, self.through(one, self.line)) for one in self.components(self.line)]
-        except Untold:
+        except OrdersUnknown:
             return []
 
 
@@ -252,7 +252,7 @@ class _Resolved:
         return self.curve.functions
 
     def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
-        """Those of the steps but the last. Raises Untold."""
+        """Those of the steps but the last. Raises OrdersUnknown."""
         found = []
         for t, (mu, level) in enumerate(zip(self.curve.divided(run), self.curve.levels(run)[1:], strict=False)):
             column = fmpq_mat(len(level), 1, list(level))
@@ -260,12 +260,12 @@ class _Resolved:
                 self.told[t] = self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column
             nu = self.told[t]
             if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
-                raise Untold("the orders of hypersurfaces do not follow from those of forms")
+                raise OrdersUnknown("the orders of hypersurfaces do not follow from those of forms")
             found.append((mu, *(int(entry) for entry in nu.entries())))
         return tuple(found)
 
     def _on_surface(self, level: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
-        """The orders along a curve by the factors of forms on a surface through it. Raises Untold."""
+        """The orders along a curve by the factors of forms on a surface through it. Raises OrdersUnknown."""
         nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
         if largest == 0:
             return nu
@@ -280,14 +280,14 @@ class _Resolved:
             if all(one.order is not None and one.order < terms for one in found):
                 break
             if terms > largest:
-                raise Untold("the image of a curve lies on a critical hypersurface")
+                raise OrdersUnknown("the image of a curve lies on a critical hypersurface")
             terms *= 2
         for one in found:
             if one.order:
                 places = self.places.get(one.kind, set())
                 key = next(iter(places)) if len(places) == 1 else self.curve.through(one, cut).key
                 if key not in self.keys:
-                    raise Untold("a hypersurface that was not met before")
+                    raise OrdersUnknown("a hypersurface that was not met before")
                 nu[self.keys.index(key), 0] += one.order
         return nu
 
@@ -297,7 +297,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
 
     Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
     point. Nothing but points modulo random primes is followed. Where the forms do not suffice to tell the hypersurfaces
-    apart, their degrees are 0 and their orders those of the forms. Raises Untold.
+    apart, their degrees are 0 and their orders those of the forms. Raises OrdersUnknown.
     """
     here = map_.at(eps)
     forms = _forms(here.equations[0], here.inverse.equations[0], map_.digits)
@@ -319,10 +319,10 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
                 return degree, _resolved(kinds, forms, degree, zeros)
-            except Untold:
+            except OrdersUnknown:
                 continue  # a hypersurface without points modulo the primes so far
     if limits.is_over or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
-        raise Untold("the contracted hypersurfaces could not be told apart at random points")
+        raise OrdersUnknown("the contracted hypersurfaces could not be told apart at random points")
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
     }
@@ -330,7 +330,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
 
 
 def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
-    """The contracted hypersurfaces with their degrees and orders. Raises Untold."""
+    """The contracted hypersurfaces with their degrees and orders. Raises OrdersUnknown."""
     keys = list(kinds)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
     total = [int(form.total_degree()) * (degree if k in forms.at_images else 1) for k, form in enumerate(forms.all)]
@@ -348,12 +348,12 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
             sizes = fmpq_mat(len(keys), 1)
             for one, curve in census:
                 if curve.key not in kinds:
-                    raise Untold("a hypersurface that was not met before")
+                    raise OrdersUnknown("a hypersurface that was not met before")
                 places.setdefault(one.kind, set()).add(curve.key)
                 sizes[keys.index(curve.key), 0] += one.degree
                 followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
     if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
-        raise Untold("not all hypersurfaces were met")
+        raise OrdersUnknown("not all hypersurfaces were met")
     # Orders on hypersurfaces that are not contracted have no part in what follows.
     chosen = [k for k, key in enumerate(keys) if key[0]]
     return _followed(followed, [int(size) for size in sizes.entries()], chosen)
@@ -362,14 +362,14 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
 def _followed(
     curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
-    """The contracted hypersurfaces with the orders in these columns, at points modulo two primes. Raises Untold."""
+    """The contracted hypersurfaces with the orders in these columns, modulo two primes. Raises OrdersUnknown."""
     found = []
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, along) for curve, along in pairs}
             orders = [curve.course(along).orders(_FIRST) for curve, along in list(by_prime.values())[:2]]
             if len(orders) < 2 or orders[0].known != orders[1].known:
-                raise Untold("two points tell different things")
+                raise OrdersUnknown("two points tell different things")
             found.append(_hypersurface(key, size, tuple(by_prime)[:2], orders[0].of(columns)))
     return found
 
@@ -407,10 +407,10 @@ def _on_line(
     at_images = [evaluate(form, map_.field, image) for form in forms.images]
     excess = [_exponent(value, common) for value in at_points]
     if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
-        raise Untold("the minors of the equation have a common factor of another kind")
+        raise OrdersUnknown("the minors of the equation have a common factor of another kind")
     product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
     if product.is_zero():
-        raise Untold("the map or its inverse has no value anywhere")
+        raise OrdersUnknown("the map or its inverse has no value anywhere")
     radical = product // product.gcd(product.derivative())
     every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
     points = [tuple((x + int(s) * v) % p for x, v in zip(a, b, strict=True)) for s, _ in radical.roots()]

@@ -17,8 +17,8 @@ from kahanmaps.laboratory.singular.jets import (
     Step,
     equations_of,
     image_of,
+    images_of_curve,
     orders_of,
-    walk,
 )
 from kahanmaps.laboratory.singular.orders import NOTHING, AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
@@ -78,7 +78,7 @@ class Course:
         while True:
             run: list[Step] = []
             try:
-                for step in islice(walk(*start, precision, tangents, functions), count):
+                for step in islice(images_of_curve(*start, precision, tangents, functions), count):
                     run.append(step)
                     if time.monotonic() > end:
                         return run, len(run) == count

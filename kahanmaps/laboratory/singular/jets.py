@@ -89,7 +89,7 @@ class Step:
     curve: tuple[nmod_poly, ...] = field(default=(), repr=False, compare=False)
 
 
-def walk(
+def images_of_curve(
     equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],

@@ -50,7 +50,7 @@ class Orders:
         return len(self.rows)
 
     @property
-    def told(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """In words: at which steps powers are divided out, which lowers degrees, and which hypersurfaces are met."""
         rows = self.rows[: self.settled_at]
         costs = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
@@ -109,7 +109,7 @@ class AlongCurves(Protocol):
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """What `walk` takes."""
+        """What `images_of_curve` takes."""
 
     def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
         """For each of the steps, or the first of them, what is divided out and the orders of hypersurfaces."""

@@ -89,7 +89,7 @@ class Hypersurface:
     stage: int | None = None
     generic: str = ""
 
-    def told(self, at: str) -> str:
+    def sentence(self, at: str) -> str:
         """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
         text, most = (self.generic, 2 * _LONGEST) if self.generic else (self.polynomial, _LONGEST)
         cut = text if len(text) <= most else f"{text[:most]} ..."
@@ -105,7 +105,7 @@ class Hypersurface:
             outcome = f"followed for {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
         parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", outcome]
-        return "; ".join([", ".join(parts), *self.orders.told])
+        return "; ".join([", ".join(parts), *self.orders.sentences])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: what is known of it beside its first steps."""
@@ -124,74 +124,92 @@ class Followed:
     stage: int
 
 
-_UNKNOWN = Hypersurface()
+@dataclass(frozen=True)
+class Written:
+    """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown)."""
+
+    form: Any
+    is_pole: bool
+    multiplicity: int | None
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """The forms whose orders are told along curves: those that are contracted, and those in a common factor of minors.
+
+    Where the maps of a composition are followed one by one, `stage` is the number of the one that contracts, from 0,
+    and steps are single maps of a word of `period`.
+    """
+
+    critical: Sequence[Followed] = ()
+    excess: Sequence[Followed] = ()
+    stage: int | None = None
+    period: int = 1
+
+    def equations(self, map_: BirationalMap, eps: fmpq, field: PrimeField) -> Sequence[Equation]:
+        """Those of the map modulo a prime, from the stage on."""
+        equations: Sequence[Equation] = map_.at(eps, field).equations
+        if self.stage is None:
+            return equations
+        letters = Letters([*equations[self.stage : self.period], *equations[: self.stage]])
+        letters.places = tuple(one.stage - self.stage for one in (*self.critical, *self.excess))
+        return letters
+
+    def along(self, form: Any, field: PrimeField) -> Tracked:
+        """What is tracked along a curve through the hypersurface of a form."""
+        forms, stage = [*self.critical, *self.excess], self.stage or 0
+        return Tracked(
+            tuple(form_order(one.form, field) for one in forms),
+            tuple(one.excess for one in forms),
+            tuple(int(one.form == form and one.stage == stage) for one in forms),
+            len(self.critical),
+        )
+
+
+_UNKNOWN, NONE_TRACKED = Hypersurface(), Tracking()
 
 
 def outcome_of(
     map_: BirationalMap,
     eps: fmpq,
-    factor: Any,
+    one: Written,
     text: str,
-    is_pole: bool,
-    multiplicity: int | None,
     rng: random.Random,
     limits: Range,
-    critical: Sequence[Followed] = (),
-    excess: Sequence[Followed] = (),
-    place: tuple[int, int] | None = None,
+    tracking: Tracking = NONE_TRACKED,
 ) -> Hypersurface:
     """The hypersurface on which a form over Q vanishes, with what becomes of it, at one exact eps (half the time step).
 
-    `factor` is irreducible, in the variables (X : Z), and `text` stands for it; two points modulo two random primes are
-    followed. The orders of the `critical` forms are told along it. With a `place`, that is the number of a map
-    and the length of a word, this map contracts it, and steps are single maps.
-    Source: grammaticos-ramani-papageorgiou-1991.
+    The form is irreducible, in the variables (X : Z), and `text` stands for it; two points modulo two random primes are
+    followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
-    outcomes: list[Hypersurface] = []
-    primes: list[int] = []
-    forms = [*critical, *excess]
-    stage, period = place or (0, 1)
-
-    def told(outcome: Hypersurface, note: str = "") -> Hypersurface:
-        degree, at = int(factor.total_degree()), None if place is None else stage
-        known = replace(outcome, polynomial=text, degree=degree, is_pole=is_pole, multiplicity=multiplicity)
-        return replace(known, primes=tuple(primes), note=note, stage=at)
-
+    outcomes: dict[int, Hypersurface] = {}  # by the primes
+    found, note = _UNKNOWN, NO_TIME
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.is_over:
             break
         field = random_prime_field(rng)
         try:
-            equations: Sequence[Equation] = map_.at(eps, field).equations
-            if place is not None:
-                equations = Letters([*equations[stage:period], *equations[:stage]])
-                equations.places = tuple(one.stage - stage for one in forms)
-            start = _point_on(factor, field, rng)
-            tracked = Tracked(
-                tuple(form_order(one.form, field) for one in forms),
-                tuple(one.excess for one in forms),
-                tuple(int(one.form == factor and one.stage == stage) for one in forms),
-                len(critical),
-            )
-        except BadPrime:
-            continue
-        if start is None or field.prime in primes:
-            continue
-        try:
-            outcomes.append(_outcome_at(equations, *start, rng, limits, tracked=tracked))
-            primes.append(field.prime)
-        except NotGeneric:
+            equations = tracking.equations(map_, eps, field)
+            start = _point_on(one.form, field, rng)
+            tracked = tracking.along(one.form, field)
+            if start is not None and field.prime not in outcomes:
+                outcomes[field.prime] = _outcome_at(equations, *start, rng, limits, tracked=tracked)
+        except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            return told(_UNKNOWN, NO_TIME if limits.is_over else "the series lost all their terms")
-    if len(outcomes) < _POINTS:
-        return told(_UNKNOWN, NO_TIME)
-    one, other = (
-        (outcome.status, outcome.contracted_at, outcome.confined_at, outcome.orders.known) for outcome in outcomes
-    )
-    if one != other:
-        return told(Hypersurface(steps=outcomes[0].steps), "two points tell different things")
-    return told(outcomes[0])
+            note = NO_TIME if limits.is_over else "the series lost all their terms"
+            break
+    if len(outcomes) == _POINTS:
+        found, note = _agreed(*outcomes.values())
+    known = replace(found, polynomial=text, degree=int(one.form.total_degree()), is_pole=one.is_pole, note=note)
+    return replace(known, multiplicity=one.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
+
+
+def _agreed(one: Hypersurface, other: Hypersurface) -> tuple[Hypersurface, str]:
+    """What two points tell, with a note where they do not tell the same."""
+    first, second = ((each.status, each.contracted_at, each.confined_at, each.orders.known) for each in (one, other))
+    return (one, "") if first == second else (Hypersurface(steps=one.steps), "two points tell different things")
 
 
 def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
@@ -274,7 +292,7 @@ def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
     )
 
 
-def _told(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
+def _by_ranks(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
     """Status, the step that contracts and the step that ends it."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:
@@ -296,7 +314,7 @@ def _outcome_at(
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     course = Course(equations, point, direction, limits, tracked)
     run, is_whole = course.steps(limits.shown, tangents, _MOST_WITH_TANGENTS)
-    status, down, up = _told([step.rank for step in run], full)
+    status, down, up = _by_ranks([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
@@ -309,7 +327,7 @@ def _outcome_at(
         orders = course.orders_until_return(up)
     if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
         run = list(course.all_steps(orders.settled_at + 2, tangents))
-        status, down, up = _told([step.rank for step in run], full)
+        status, down, up = _by_ranks([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         orders = replace(NO_ORDERS, followed=orders.followed)

@@ -29,16 +29,18 @@ from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
-from kahanmaps.laboratory.singular.contracted import Untold, contracted
+from kahanmaps.laboratory.singular.contracted import OrdersUnknown, contracted
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
     FIRST_STEPS,
+    NONE_TRACKED,
     NOT_CONFINED,
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
+    Tracking,
     outcome_of,
     outcomes_at_random,
     unwritten,
@@ -181,18 +183,7 @@ def singularities(
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
     map_, exact_eps = as_map(system), rational(eps)
-    if map_.refusal:
-        raise InputError(map_.refusal)
-    if map_.dim > MAX_DIMENSION:
-        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
-    most = _most_digits(map_.dim, seconds)
-    if (digits := _digits(map_, exact_eps)) > most:
-        raise InputError(
-            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
-            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
-        )
-    if steps is not None and not 1 <= steps <= MAX_STEPS:
-        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    _require_short(map_, exact_eps, steps, seconds)
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     over = map_.at(exact_eps)
     try:
@@ -214,26 +205,37 @@ def singularities(
         run = _map_by_map(map_, exact_eps, degree, seed, limits, progress)
         if run is not None:
             return run
+    tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
     rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
-    followed = followed_forms(map_form, every) if critical_degree else ((), ())
-    found, stopped = [], False
+    found: list[Hypersurface] = []
     for one in every:
         if limits.is_over:
-            stopped = True
-            break
+            return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), True, False, True)
         text = name_of(one.form, map_)
         progress(f"following {text[:40]}")
-        found.append(outcome_of(map_, exact_eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, *followed))
-    if critical_degree is None and not stopped:
+        found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
+    if critical_degree is None:
         progress("following critical points")
-        if over.is_bilinear:
-            found += unwritten(map_, exact_eps, rng, limits)
-        else:
-            found.append(
-                Hypersurface(note="the hypersurfaces that this map contracts are too large to be written down")
-            )
-        stopped = limits.is_over
+        too_large = "the hypersurfaces that this map contracts are too large to be written down"
+        found += unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
+    stopped = critical_degree is None and limits.is_over
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
+
+
+def _require_short(map_: BirationalMap, eps: fmpq, steps: int | None, seconds: float) -> None:
+    """Raise InputError for what is too large, or cannot be asked."""
+    if map_.refusal:
+        raise InputError(map_.refusal)
+    if map_.dim > MAX_DIMENSION:
+        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+    most = _most_digits(map_.dim, seconds)
+    if (digits := _digits(map_, eps)) > most:
+        raise InputError(
+            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
+            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
+        )
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
 
 
 def _map_by_map(
@@ -315,14 +317,14 @@ class Patterns:
         return " / ".join(f"({_ascending(part)})" for part in self.series)
 
     @property
-    def told(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """A sentence for each contracted hypersurface, where degrees follow: when it comes back and what it costs."""
         at = f" at eps = {self.at}" if self.at else ""
-        return [f"C{k}: {h.told(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
+        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
 
     @property
     def word_text(self) -> str:
-        """What steps are in what is told, where these are not those of the map; else empty."""
+        """What steps are in these sentences, where these are not those of the map; else empty."""
         return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
 
     @property
@@ -346,7 +348,7 @@ class Patterns:
         found = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
-        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.told, self.contracted, strict=False)]
+        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.contracted, strict=False)]
         maps = self.word.length if self.word_text and self.word else None
         known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
         return {**found, **known, "maps_a_step": maps}
@@ -422,7 +424,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     try:
         degree, hypersurfaces = contracted(map_, eps, rng, limits)
         return _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
-    except Untold as error:
+    except OrdersUnknown as error:
         return _refused(eps, True, limits.is_over) or _unknown(str(error))
 
 

@@ -20,7 +20,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.singular.following import Range
-from kahanmaps.laboratory.singular.outcomes import Followed, Hypersurface, outcome_of
+from kahanmaps.laboratory.singular.outcomes import Followed, Hypersurface, Tracking, Written, outcome_of
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
@@ -44,15 +44,6 @@ class Word:
     def text(self) -> str:
         """What a step is, and what is counted instead."""
         return f"a step is {counted(self.length, 'map')}, which are followed one by one: steps are those of single maps"
-
-
-@dataclass(frozen=True)
-class Written:
-    """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown)."""
-
-    form: Any
-    is_pole: bool
-    multiplicity: int | None
 
 
 def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
@@ -111,12 +102,7 @@ def followed_map_by_map(
                 continue
             text = name_of(one.form, map_)
             progress(f"following {text[:40]}")
-            found.append(
-                outcome_of(
-                    map_, eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, critical, excess,
-                    (stage, period),
-                )
-            )  # fmt: skip
+            found.append(outcome_of(map_, eps, one, text, rng, limits, Tracking(critical, excess, stage, period)))
     return Word(tuple(letter.degree for letter in letters), len(equations) // period), found
 
 

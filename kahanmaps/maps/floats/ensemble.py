@@ -105,8 +105,8 @@ class Stepping:
         planar: Callable[[PlanarRows], Engine]
         generic: Callable[[GenericEquation], Engine]
         if self.compiled:
-            from kahanmaps.maps.floats.numba_kernel import GenericNumba as generic
-            from kahanmaps.maps.floats.numba_kernel import PlanarNumba as planar
+            from kahanmaps.maps.floats.numba_kernel import generic_numba as generic
+            from kahanmaps.maps.floats.numba_kernel import planar_numba as planar
         else:
             from kahanmaps.maps.floats.numpy_kernel import GenericNumpy as generic
             from kahanmaps.maps.floats.numpy_kernel import PlanarNumpy as planar
@@ -130,7 +130,7 @@ class Stepping:
 
         The distances of the block integrals from the start are looked at every `sampled` steps.
         """
-        kept = NOTHING if record is None else Kept(every, record)
+        kept = NOTHING if record is None else Kept(every, record, first // every)
         self._engine.advance(lanes, first, steps, kept, 0 if self.rows is None else sampled)
 
     def points(self, record: FloatArray) -> FloatArray:

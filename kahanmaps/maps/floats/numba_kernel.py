@@ -1,10 +1,13 @@
 """Compiled kernels; needs numba, and is imported only by those who have asked for it or have it (ensemble.py).
 
+There is one loop, over lanes and steps. It takes many lanes together through steps that are only watched for anything
+unusual; lanes that met it are taken again from where they were, one by one and with all tests, for a Python call for
+each of them would cost a thousand times as much. Two kinds of steps are put into it:
+
 In normal form blocks know nothing of each other: all blocks of one kind are taken together, those of 256 lanes in
 vector registers and the innermost cache, and those of a single orbit such that the steps of one hide the time that a
 chain of operations takes in another. The generic elimination runs over 128 lanes, exchanging rows in those that want
-it. Steps are only watched for anything unusual, and lanes that met it are taken again from a saved state, one by one
-and with all tests: a Python call for each of them would cost a thousand times as much.
+it; of few lanes it takes one after the other.
 
 Operations and their order are those of steps.py, which are compiled here. Without fastmath nothing is contracted or
 reordered. Kernels release the interpreter lock and are started by Python threads on ranges of lanes. So no threading
@@ -14,6 +17,7 @@ layer of numba is needed; the one that is always there aborts the program if two
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,56 +29,132 @@ from kahanmaps.maps.floats import steps as float_steps
 from kahanmaps.maps.floats.advance import Engine, Kept
 from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.floats.steps import GenericEquation, Lanes, PlanarRows
+from kahanmaps.maps.floats.steps import (
+    LARGEST,
+    MUCH,
+    NEAR,
+    NEAR_SQUARED,
+    OVERFLOW,
+    RUNNING,
+    SINGULAR,
+    GenericEquation,
+    Lanes,
+    PlanarRows,
+)
 from kahanmaps.maps.kept_code import compiled
 
 _WIDTH = 256
-_PIECE = 1024
+_PIECE, _LEAST = 1024, 16  # steps between looks at what was unusual; fewer after there was something
 _FEW = 16  # blocks of a kind
 _LANES = 128
 _ALL = 1 << 62
 _ALONE = 8  # lanes, up to which the elimination takes them one by one
 
-NEAR = float_steps.NEAR
-NEAR_SQUARED = float_steps.NEAR_SQUARED
-MUCH = float_steps.MUCH
-LARGEST = float_steps.LARGEST
-RUNNING = float_steps.RUNNING
-OVERFLOW = float_steps.OVERFLOW
-SINGULAR = float_steps.SINGULAR
+_inner = numba.njit(error_model="numpy", nogil=True)
+
+
+class Room(NamedTuple):
+    """What the loop works in: how many lanes are taken together, in rows as long for fewer where they are `fixed`.
+
+    A lane that is `alone` is taken with all tests at once. `x` and `image` hold the rows of states before and after
+    `piece` steps, one behind the other, `z` and `M` the state and the matrix of one lane. `fine` is 0 in lanes where
+    something is unusual; `work` is for steps of many.
+    """
+
+    lanes: int
+    fixed: bool
+    alone: bool
+    piece: int
+    x: FloatArray
+    image: FloatArray
+    z: FloatArray
+    M: FloatArray
+    fine: FloatArray
+    work: Any
+
+
+def _loop(many: Any, one: Any, sample: Any) -> Any:
+    """The loop for a kind of steps, given by three compiled functions.
+
+    `many(x, image, width, count, numbers, fine, work)` takes lanes through steps, says whether all were usual, and
+    else has `fine` tell in which lanes. `one(z, first, end, numbers, M)` takes a lane through steps with all tests, as
+    far as they exist, and returns the index reached, the status, how often it was near-singular and where first.
+    `sample(x, width, at, numbers, lanes)` looks at the integrals.
+    """
+
+    @_inner
+    def advance(
+        lanes: Lanes, lo: int, hi: int, numbers: Any, first: int, steps: int, sampled: int, kept: Kept, room: Room
+    ) -> None:
+        x, image, fine, work, status = room.x, room.image, room.fine, room.work, lanes.status
+        z, M, alone = room.z, room.M, room.alone
+        rows, last, table, every = lanes.z.shape[0], first + steps, kept.table, kept.every
+        most, least = room.piece, room.piece if alone else min(room.piece, _LEAST)
+        for at in range(lo, hi, room.lanes):
+            width = min(room.lanes, hi - at)
+            wide = room.lanes if room.fixed else width
+            for j in range(rows):
+                for i in range(wide):
+                    x[j * wide + i] = lanes.z[j, at + i] if i < width else lanes.z[j, at]  # lanes that nobody looks at
+            index, row, piece = first, 0, least
+            to_keep, to_sample = _multiple(first, every), _multiple(first, sampled)
+            while index < last:
+                end = min(last, index + piece, to_keep, to_sample)
+                piece = min(2 * piece, most)
+                if alone or not many(x, image, wide, end - index, numbers, fine, work):
+                    piece = least
+                    for i in range(width):
+                        if fine[i] != 0.0:
+                            continue
+                        lane = at + i
+                        for j in range(rows):
+                            z[j] = x[j * wide + i]
+                        if status[lane] == RUNNING:
+                            stopped, failed, near, where = one(z, index, end, numbers, M)
+                            if failed != RUNNING:
+                                status[lane], lanes.failed_at[lane] = failed, stopped
+                            if near:
+                                lanes.near_at[lane] = where if lanes.near[lane] == 0 else lanes.near_at[lane]
+                                lanes.near[lane] += near
+                        for j in range(rows):
+                            image[j * wide + i] = z[j] if status[lane] == RUNNING else 0.0
+                index, x, image = end, image, x
+                if index == to_keep:
+                    for j in range(rows):
+                        for i in range(width):
+                            table[row, j, at + i] = x[j * wide + i]
+                    row, to_keep = row + 1, to_keep + every
+                if index == to_sample:
+                    sample(x, width, at, numbers, lanes)
+                    to_sample += sampled
+            for j in range(rows):
+                for i in range(width):
+                    lanes.z[j, at + i] = x[j * wide + i] if status[at + i] == RUNNING else 0.0
+
+    return advance
+
+
+@_inner
+def _multiple(index: int, every: int) -> int:
+    """The next multiple (0: none)."""
+    return index - index % every + every if every else _ALL
+
+
+# Steps in normal form.
 
 
 class Numbers(NamedTuple):
-    """Of a normal form what a step needs: its runs, and by block a, b, c, d and the factor of the integral."""
+    """Of a normal form what a step needs: its runs, and by block a, b, c, d and the factor of the integral.
+
+    There are `rows` rows in a state, and `most` blocks in a run.
+    """
 
     runs: Any
     coefficients: FloatArray
     kappa: FloatArray
+    rows: int
+    most: int
 
-
-class PlanarRoom(NamedTuple):
-    """What a kernel in normal form works in: the states of some lanes, those before a piece, and which lanes are fine.
-
-    There is a 1 for each block of a run (0: unusual).
-    """
-
-    buffer: FloatArray
-    saved: FloatArray
-    usual: FloatArray
-
-
-class GenericRoom(NamedTuple):
-    """What the elimination works in: points and images, (M | r), and a number a lane three times."""
-
-    x: FloatArray
-    right: FloatArray
-    M: FloatArray
-    scale: FloatArray
-    inverse: FloatArray
-    fine: FloatArray
-
-
-_inner = numba.njit(error_model="numpy", nogil=True)
 
 real_lines = _inner(float_steps.real_lines)
 real_cubes = _inner(float_steps.real_cubes)
@@ -198,53 +278,67 @@ def _sweep(state: Any, width: int, run: Any, coefficients: Any, count: int, usua
 
 
 @_inner
-def _careful(state: Any, width: int, i: int, numbers: Numbers, first: int, count: int, lanes: Lanes, lane: int) -> None:
-    """Steps of one lane with all tests; an orbit ends as the first of its blocks does (advance.Planar.one)."""
-    runs = numbers.runs
-    for index in range(first, first + count):
+def _planar_many(x: Any, image: Any, width: int, count: int, numbers: Numbers, fine: Any, work: None) -> bool:
+    """Steps of all blocks, watched: `fine` has `width` lanes for each block of a run."""
+    runs, rows, size, good = numbers.runs, numbers.rows * width, numbers.most * width, True
+    for i in range(rows):
+        image[i] = x[i]
+    for i in range(size):
+        fine[i] = 1.0
+    for r in range(len(runs)):
+        _sweep(image, width, runs[r], numbers.coefficients, count, fine)
+    for i in range(size):
+        good &= fine[i] != 0.0
+    # Where w overflows and the numerators do not, the image is 0, and stays there; see numpy_kernel.py.
+    for i in range(rows):
+        good &= (abs(image[i]) <= LARGEST) & ((image[i] != 0.0) | (x[i] == 0.0))
+    if not good:
+        for i in range(width, size):
+            fine[i % width] *= fine[i]
+        for i in range(rows):
+            if not ((abs(image[i]) <= LARGEST) & ((image[i] != 0.0) | (x[i] == 0.0))):
+                fine[i % width] = 0.0
+    return good
+
+
+@_inner
+def _planar_one(z: Any, first: int, end: int, numbers: Numbers, M: Any) -> Any:
+    """Steps of one lane with all tests; an orbit ends as the first of its blocks does."""
+    runs, coefficients = numbers.runs, numbers.coefficients
+    total, where = 0, -1
+    for index in range(first, end):
         status, near = RUNNING, 0
         for r in range(len(runs)):
-            real, far, k = runs[r, 1] == 2, runs[r, 3] * width, _eight(numbers.coefficients, runs[r, 4])
-            for b in range(runs[r, 3]):
-                at = (runs[r, 2] + b) * width + i
+            kind, real, far, k = runs[r, 0], runs[r, 1] == 2, runs[r, 3], _eight(coefficients, runs[r, 4])
+            for at in range(runs[r, 2], runs[r, 2] + far):
                 if real:
-                    state[at], state[at + far], w, g = real_general(state[at], state[at + far], k)
-                    unusual = not abs(w) > NEAR + NEAR * abs(g)
+                    z[at], z[at + far], w, g = real_general(z[at], z[at + far], k)
+                    usual = abs(w) > NEAR + NEAR * abs(g)
                 else:
-                    U, V, W, T = state[at], state[at + far], state[at + 2 * far], state[at + 3 * far]
-                    U, V, W, T, w, g = complex_general(U, V, W, T, k)
-                    state[at], state[at + far], state[at + 2 * far], state[at + 3 * far] = U, V, W, T
-                    unusual = not w > NEAR_SQUARED + NEAR_SQUARED * g
+                    U, V, W, T = z[at], z[at + far], z[at + 2 * far], z[at + 3 * far]
+                    if kind == LINES:
+                        U, V, W, T, w, g = complex_lines(U, V, W, T, k)
+                    else:
+                        U, V, W, T, w, g = complex_general(U, V, W, T, k)
+                    z[at], z[at + far], z[at + 2 * far], z[at + 3 * far] = U, V, W, T
+                    usual = w > NEAR_SQUARED + NEAR_SQUARED * g
                 if status == RUNNING:
                     if w == 0.0:
                         status = SINGULAR
                     elif not np.isfinite(w):
                         status = OVERFLOW
-                    elif unusual:
+                    elif not usual:
                         near += 1
         if status == RUNNING:
-            for j in range(len(lanes.z)):
-                if not np.isfinite(state[j * width + i]):
+            for j in range(len(z)):
+                if not np.isfinite(z[j]):
                     status = OVERFLOW
         if status != RUNNING:
-            for j in range(len(lanes.z)):
-                state[j * width + i] = 0.0
-        if status != RUNNING or near:
-            _note(lanes, lane, index, status, near)
-        if status != RUNNING:
-            return
-
-
-@numba.njit(error_model="numpy", nogil=True, inline="always")  # Lanes are long to hand over
-def _note(lanes: Lanes, lane: int, index: int, status: int, near: int) -> None:
-    """What a step from the index was."""
-    if status != RUNNING:
-        lanes.status[lane] = status
-        lanes.failed_at[lane] = index + 1
-    elif near:
-        if lanes.near[lane] == 0:
-            lanes.near_at[lane] = index
-        lanes.near[lane] += near
+            return index + 1, status, total, where
+        if near and total == 0:
+            where = index
+        total += near
+    return end, RUNNING, total, where
 
 
 @_inner
@@ -273,171 +367,87 @@ def _sample(state: Any, width: int, at: int, numbers: Numbers, lanes: Lanes) -> 
                     top[i] = x if (x > top[i]) & (alive[i] == RUNNING) else top[i]
 
 
-@_inner
-def _keep(state: Any, stride: int, at: int, width: int, row: int, table: Any) -> None:
-    """Write the states of the lanes from `at` on to a row of the table."""
-    for j in range(table.shape[1]):
-        for i in range(width):
-            table[row, j, at + i] = state[j * stride + i]
+# Steps by elimination.
+
+
+class Matrices(NamedTuple):
+    """What the elimination of many lanes works in: (M | r), and a number a lane twice."""
+
+    M: FloatArray
+    scale: FloatArray
+    inverse: FloatArray
 
 
 @_inner
-def _multiple(index: int, every: int) -> int:
-    """The next multiple (0: none)."""
-    return index - index % every + every if every else 1 << 62
+def _generic_one(x: Any, first: int, end: int, equation: GenericEquation, M: Any) -> Any:
+    """Steps of one lane with all tests; x has room for the products, M for the rows of (M | r) and their sizes."""
+    constants, starts, columns = equation.constants, equation.first, equation.columns
+    factors, products, n, count, where = equation.factors, equation.products, len(equation.constants), 0, -1
+    for index in range(first, end):
+        near, scale = 0, 1.0
+        for t in range(len(products)):
+            x[n + t] = x[products[t, 0]] * x[products[t, 1]]
+        for i in range(n):
+            size = 1.0
+            for j in range(n + 1):
+                total = constants[i, j]
+                for t in range(starts[i * (n + 1) + j], starts[i * (n + 1) + j + 1]):
+                    total += factors[t] * x[columns[t]]
+                M[i, j] = total
+                if j < n and abs(total) > size:
+                    size = abs(total)
+            M[i, n + 1] = size
+            if size > scale:
+                scale = size
+        if not scale <= LARGEST:
+            return index + 1, OVERFLOW, count, where
+        for p in range(n):
+            for i in range(p + 1, n):
+                if abs(M[i, p]) > MUCH * abs(M[p, p]):
+                    for j in range(p, n + 2):
+                        M[p, j], M[i, j] = M[i, j], M[p, j]
+            if M[p, p] == 0.0:
+                return index + 1, SINGULAR, count, where
+            if not abs(M[p, p]) <= LARGEST:
+                return index + 1, OVERFLOW, count, where
+            if abs(M[p, p]) <= NEAR * M[p, n + 1]:
+                near = 1
+            inverse = 1.0 / M[p, p]
+            for i in range(p + 1, n):
+                factor = M[i, p] * inverse
+                for j in range(p + 1, n + 1):
+                    M[i, j] -= factor * M[p, j]
+        for j in range(n - 1, -1, -1):
+            x[j] = value = M[j, n] / M[j, j]
+            if not np.isfinite(value):
+                return index + 1, OVERFLOW, count, where
+            for i in range(j):
+                M[i, n] -= M[i, j] * value
+        if near and count == 0:
+            where = index
+        count += near
+    return end, RUNNING, count, where
 
 
 @_inner
-def _usual(state: Any, before: Any, size: int, usual: Any, blocks: int) -> bool:
-    """Whether nothing unusual was met in any lane."""
-    good = True
-    for i in range(blocks):
-        good &= usual[i] != 0.0
-    # Where w overflows and the numerators do not, the image is 0, and stays there; see advance.sound.
-    for i in range(size):
-        good &= (abs(state[i]) <= LARGEST) & ((state[i] != 0.0) | (before[i] == 0.0))
-    return good
-
-
-@_inner
-def _again(
-    state: Any, before: Any, usual: Any, width: int, at: int, numbers: Numbers, first: int, count: int, lanes: Lanes
-) -> None:
-    """Take the lanes that met anything unusual again: `before` has their states before these steps."""
-    rows, blocks = len(lanes.z), len(usual) // _WIDTH
-    for i in range(width):
-        good = True
-        for b in range(blocks):
-            good &= usual[b * width + i] != 0.0
-        for j in range(rows):
-            value, old = state[j * width + i], before[j * width + i]
-            good &= (abs(value) <= LARGEST) & ((value != 0.0) | (old == 0.0))
-        if not good:
-            for j in range(rows):
-                state[j * width + i] = before[j * width + i]
-            _careful(state, width, i, numbers, first, count, lanes, at + i)
-
-
-def _planar_kernel(stamp: int) -> Any:
-    def planar_advance(
-        lanes: Lanes,
-        lo: int,
-        hi: int,
-        numbers: Numbers,
-        first: int,
-        steps: int,
-        sampled: int,
-        kept: Kept,
-        room: PlanarRoom,
-    ) -> int:
-        rows, last, runs = lanes.z.shape[0], first + steps, numbers.runs
-        state, before, usual = room.buffer, room.saved, room.usual
-        for at in range(lo, hi, _WIDTH):
-            width = min(_WIDTH, hi - at)
-            most = len(usual) // _WIDTH * width
-            for j in range(rows):
-                for i in range(width):
-                    state[j * width + i] = lanes.z[j, at + i]
-            index, row = first, 0
-            to_keep, to_sample = _multiple(first, kept.every), _multiple(first, sampled)
-            while index < last:
-                end = min(last, index + _PIECE, to_keep, to_sample)
-                for i in range(rows * width):
-                    before[i] = state[i]
-                for i in range(most):
-                    usual[i] = 1.0
-                for r in range(len(runs)):
-                    _sweep(state, width, runs[r], numbers.coefficients, end - index, usual)
-                if not _usual(state, before, rows * width, usual, most):
-                    _again(state, before, usual, width, at, numbers, index, end - index, lanes)
-                index = end
-                if index == to_keep:
-                    _keep(state, width, at, width, row, kept.table)
-                    row, to_keep = row + 1, to_keep + kept.every
-                if index == to_sample:
-                    _sample(state, width, at, numbers, lanes)
-                    to_sample += sampled
-            for j in range(rows):
-                for i in range(width):
-                    lanes.z[j, at + i] = state[j * width + i]
-        return stamp
-
-    return planar_advance
-
-
-@_inner
-def _alone(x: Any, equation: GenericEquation, M: Any, right: Any, sizes: Any) -> Any:
-    """float_steps.PythonGeneric.step: the image of x into `right`; its status, and whether it was near-singular."""
-    constants, first, columns = equation.constants, equation.first, equation.columns
-    factors, products = equation.factors, equation.products
-    n = len(constants)
-    near = 0
-    scale = 1.0
-    for t in range(len(products)):
-        x[n + t] = x[products[t, 0]] * x[products[t, 1]]
-    for i in range(n):
-        sizes[i] = 1.0
-        for j in range(n + 1):
-            total = constants[i, j]
-            for t in range(first[i * (n + 1) + j], first[i * (n + 1) + j + 1]):
-                total += factors[t] * x[columns[t]]
-            if j == n:
-                right[i] = total
-                continue
-            M[i, j] = total
-            if abs(total) > sizes[i]:
-                sizes[i] = abs(total)
-        if sizes[i] > scale:
-            scale = sizes[i]
-    if not scale <= LARGEST:
-        return OVERFLOW, near
-    for p in range(n):
-        for i in range(p + 1, n):
-            if abs(M[i, p]) > MUCH * abs(M[p, p]):
-                for j in range(p, n):
-                    M[p, j], M[i, j] = M[i, j], M[p, j]
-                right[p], right[i] = right[i], right[p]
-                sizes[p], sizes[i] = sizes[i], sizes[p]
-        if M[p, p] == 0.0:
-            return SINGULAR, near
-        if not abs(M[p, p]) <= LARGEST:
-            return OVERFLOW, near
-        if abs(M[p, p]) <= NEAR * sizes[p]:
-            near = 1
-        inverse = 1.0 / M[p, p]
-        for i in range(p + 1, n):
-            factor = M[i, p] * inverse
-            for j in range(p + 1, n):
-                M[i, j] -= factor * M[p, j]
-            right[i] -= factor * right[p]
-    for j in range(n - 1, -1, -1):
-        right[j] /= M[j, j]
-        for i in range(j):
-            right[i] -= M[i, j] * right[j]
-    for j in range(n):
-        if not np.isfinite(right[j]):
-            return OVERFLOW, near
-    return RUNNING, near
-
-
-@_inner
-def _together(x: Any, right: Any, equation: GenericEquation, room: GenericRoom) -> bool:
-    """One step of all lanes: images into `right`; `fine` is 0 where something is unusual.
+def _generic_many(
+    x: Any, image: Any, width: int, count: int, equation: GenericEquation, fine: Any, work: Matrices
+) -> bool:
+    """One step of _LANES lanes, watched.
 
     M has n rows of n + 1 entries, the last one the right-hand side. Loops over the lanes do several operations, which
     saves loads and stores, but not too many: a loop over more than a handful of arrays is not vectorised, because the
     compiler would have to test too many pairs of them for overlap. For the same reason the number of lanes is a
     constant.
     """
-    n = len(equation.constants)
-    _fill(x, equation, room.M, room.scale)
+    n, M, good = len(equation.constants), work.M, True
+    _fill(x.reshape(-1, _LANES), equation, M, work.scale)
     for l in range(_LANES):
-        room.fine[l] = 1.0
+        fine[l] = 1.0
     for p in range(n):
-        _eliminate(room.M, p, n, room.scale, room.inverse, room.fine)
-    M, fine, good = room.M, room.fine, True
+        _eliminate(M, p, n, work.scale, work.inverse, fine)
     for j in range(n - 1, -1, -1):
-        value, target, pivot = M[j * (n + 1) + n], right[j], M[j * (n + 1) + j]
+        value, target, pivot = M[j * (n + 1) + n], image[j * _LANES : (j + 1) * _LANES], M[j * (n + 1) + j]
         for l in range(_LANES):
             target[l] = value[l] / pivot[l]
             fine[l] = fine[l] if abs(target[l]) <= LARGEST else 0.0
@@ -531,40 +541,27 @@ def _eliminate(M: Any, p: int, n: int, scale: Any, inverse: Any, fine: Any) -> N
             j += 1
 
 
+@_inner
+def _no_integrals(x: Any, width: int, at: int, numbers: GenericEquation, lanes: Lanes) -> None:
+    """There are none."""
+
+
+# What is kept on disk is a function without parts that are compiled functions: they have another name in each process.
+_advance_planar = _loop(_planar_many, _planar_one, _sample)
+_advance_generic = _loop(_generic_many, _generic_one, _no_integrals)
+
+
+def _planar_kernel(stamp: int) -> Any:
+    def planar_advance(*given: Any) -> int:
+        _advance_planar(*given)
+        return stamp
+
+    return planar_advance
+
+
 def _generic_kernel(stamp: int) -> Any:
-    def generic_advance(
-        lanes: Lanes, lo: int, hi: int, equation: GenericEquation, first: int, steps: int, kept: Kept, room: GenericRoom
-    ) -> int:
-        x, right, fine, status = room.x, room.right, room.fine, lanes.status
-        n, wide = lanes.z.shape[0], len(room.fine)
-        alone, M, image, sizes = np.zeros(len(x)), np.zeros((n, n)), np.zeros(n), np.ones(n)
-        for at in range(lo, hi, wide):
-            width = min(wide, hi - at)
-            for j in range(n):
-                for i in range(wide):
-                    x[j, i] = lanes.z[j, at + i] if i < width else lanes.z[j, at]  # lanes that nobody looks at
-            row, to_keep = 0, _multiple(first, kept.every)
-            for index in range(first, first + steps):
-                fine[0] = 0.0
-                if wide == 1 or not _together(x, right, equation, room):
-                    for i in range(width):
-                        if fine[i] != 0.0:
-                            continue
-                        if status[at + i] == RUNNING:
-                            for j in range(n):
-                                alone[j] = x[j, i]
-                            failed, near = _alone(alone, equation, M, image, sizes)
-                            if failed != RUNNING or near:
-                                _note(lanes, at + i, index, failed, near)
-                        for j in range(n):
-                            right[j, i] = image[j] if status[at + i] == RUNNING else 0.0
-                x, right = right, x
-                if index + 1 == to_keep:
-                    _keep(x.ravel(), wide, at, width, row, kept.table)
-                    row, to_keep = row + 1, to_keep + kept.every
-            for i in range(width):
-                for j in range(n):
-                    lanes.z[j, at + i] = x[j, i] if status[at + i] == RUNNING else 0.0
+    def generic_advance(*given: Any) -> int:
+        _advance_generic(*given)
         return stamp
 
     return generic_advance
@@ -577,43 +574,48 @@ planar_advance = _kernel(_planar_kernel(_STAMP))
 generic_advance = _kernel(_generic_kernel(_STAMP))
 
 
-class PlanarNumba(Engine):
+class Numba(Engine):
+    """Advances lanes by a compiled loop, in a room that is made for a number of lanes."""
+
+    group = _ALL
+
+    def __init__(self, advance: Any, numbers: Any, room: Callable[[int], Room]) -> None:
+        self._advance, self._numbers, self._room = advance, numbers, room
+
+    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
+        self._advance(lanes, lo, hi, self._numbers, first, steps, sampled, kept, self._room(hi - lo))
+
+
+def planar_numba(rows: PlanarRows) -> Engine:
     """Advances lanes in normal form."""
+    runs = np.array(rows.runs, dtype=np.int64)
+    most, count = int(runs[:, 3].max()), rows.blocks.rows
 
-    group = _ALL
+    def room(_: int) -> Room:
+        x, image, fine = (_aligned(number * _WIDTH) for number in (count, count, most))
+        return Room(_WIDTH, False, False, _PIECE, x, image, np.zeros(count), np.zeros((0, 0)), fine, None)
 
-    def __init__(self, rows: PlanarRows) -> None:
-        runs = np.array(rows.runs, dtype=np.int64)
-        self._numbers = Numbers(runs, rows.blocks.coefficients, rows.blocks.kappa)
-        self._most = int(runs[:, 3].max())
-
-    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
-        rows = len(lanes.z)
-        room = PlanarRoom(*(_aligned(count, _WIDTH).ravel() for count in (rows, rows, self._most)))
-        planar_advance(lanes, lo, hi, self._numbers, first, steps, sampled, kept, room)
+    return Numba(planar_advance, Numbers(runs, rows.blocks.coefficients, rows.blocks.kappa, count, most), room)
 
 
-class GenericNumba(Engine):
+def generic_numba(equation: GenericEquation) -> Engine:
     """Advances lanes of any map."""
+    n, size = equation.rows, equation.rows + len(equation.products)
 
-    group = _ALL
+    def room(lanes: int) -> Room:
+        wide, piece = (1, _PIECE) if lanes <= _ALONE else (_LANES, 1)
+        x, image, M, scale, inverse, fine = (_aligned(rows * wide) for rows in (size, size, n * (n + 1), 1, 1, 1))
+        work = Matrices(M.reshape(-1, wide), scale, inverse)
+        return Room(wide, True, wide == 1, piece, x, image, np.zeros(size), np.zeros((n, n + 2)), fine, work)
 
-    def __init__(self, equation: GenericEquation) -> None:
-        self.equation = equation
-
-    def run(self, lanes: Lanes, lo: int, hi: int, first: int, steps: int, kept: Kept, sampled: int) -> None:
-        n, more = self.equation.rows, len(self.equation.products)
-        wide = 1 if hi - lo <= _ALONE else _LANES
-        x, right, M = (_aligned(rows, wide) for rows in (n + more, n + more, n * (n + 1)))
-        room = GenericRoom(x, right, M, *(_aligned(1, wide)[0] for _ in range(3)))
-        generic_advance(lanes, lo, hi, self.equation, first, steps, kept, room)
+    return Numba(generic_advance, equation, room)
 
 
-def _aligned(rows: int, width: int) -> FloatArray:
-    """Zeros (rows, width) from the beginning of a cache line on: vectors across two of them cost a third of the speed.
+def _aligned(size: int) -> FloatArray:
+    """Zeros from the beginning of a cache line on: vectors across two of them cost a third of the speed.
 
     Kernels are given such arrays, for those that they make themselves may begin anywhere.
     """
-    memory = np.zeros(rows * width + 8)
+    memory = np.zeros(size + 8)
     skipped = -(memory.ctypes.data // 8) % 8
-    return memory[skipped : skipped + rows * width].reshape(rows, width)
+    return memory[skipped : skipped + size]

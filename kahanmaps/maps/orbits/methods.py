@@ -16,7 +16,7 @@ from kahanmaps.family.structure import NoStructure, Structure
 
 METHODS = ("generic", "normal-form", "doubling")
 # From here on doublings are faster than steps: over Q, and modulo p, where steps do not pass poles silently.
-JUMP_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
+DOUBLING_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def choose_method(
         return Method(wish, structure.text)
     if arithmetic == "float":
         return Method("normal-form", structure.text)
-    if at is not None and max(at, default=0) >= JUMP_FROM[arithmetic]:
+    if at is not None and max(at, default=0) >= DOUBLING_FROM[arithmetic]:
         dense = arithmetic == "exact" and len(at) * 10 > max(at)
         if not dense:
             return Method("doubling", f"{structure.text}; each iterate by doublings")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 from flint import fmpq
 
@@ -29,7 +29,7 @@ from kahanmaps.maps.orbits.iteration import (
     require_short,
     require_steps,
 )
-from kahanmaps.maps.orbits.methods import JUMP_FROM, choose_method, why_no_reduction
+from kahanmaps.maps.orbits.methods import DOUBLING_FROM, choose_method, why_no_reduction
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.whole_files import write_whole
@@ -62,7 +62,7 @@ def orbit(
     kernel: str | None = None,
     accuracy: int = 15,
     progress: Callable[[str], None] | None = None,
-) -> Walk:
+) -> Trajectory:
     """The orbit of a start, or some of its iterates: iterate over it once, then look at `end`.
 
     Args:
@@ -99,14 +99,9 @@ def orbit(
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
     require_steps(steps)
     arithmetic = Arithmetic.of(arithmetic)
-    if isinstance(start, str):
-        start = parse_point(start)
-    if not hasattr(start, "__len__"):
-        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
-    if arithmetic.kind == "float":
-        start = [_exactly(x) if isinstance(x, float) else x for x in start]
+    start = _numbers(start, arithmetic)
     if isinstance(given, MapOver):
-        return _walk_at_one_eps(given, start, eps, steps, arithmetic, backward, max_digits)
+        return _orbit_at_one_eps(given, start, eps, steps, arithmetic, backward, max_digits)
     map_ = as_map(given)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
@@ -124,41 +119,57 @@ def orbit(
             f"and there is no other way here: {chosen.reason}"
         )
     used = structure if chosen.name != "generic" and isinstance(structure, Structure) else None
-    interval = every if at is None else max(1, math.gcd(*at))
-
-    def made(numbers: Arithmetic) -> Any:
-        if numbers.kind == "float":
-            from kahanmaps.maps.floats.fast import FloatOrbit
-
-            form = None if used is None else used.form
-            return FloatOrbit(
-                map_.rounded, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval
-            )
-        over, budget = map_.at(exact_eps, numbers.field), max_digits or DEFAULT_MAX_DIGITS
-        if chosen.name == "doubling" and used is not None:
-            return Iterates(over, start, at or [], structure=used, backward=backward, max_digits=budget)
-        normal = used if chosen.name == "normal-form" else None
-        return Orbit(over, start, far, backward=backward, max_digits=budget, structure=normal)
-
+    asked = _Asked(map_, start, exact_eps, far, at, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     remark = ""
     if arithmetic == Arithmetic("ball"):
         try:
-            bits = bits_for(lambda bits: made(Arithmetic("ball", bits)), accuracy, progress)
+            bits = bits_for(lambda bits: asked.by(chosen.name, used, Arithmetic("ball", bits)), accuracy, progress)
         except NotAccurate as error:
             bits, remark = _BITS_AT_LEAST, str(error)
         arithmetic = Arithmetic("ball", bits)
     wanted = None if at is None else set(at)
-    return Walk(made(arithmetic), arithmetic, chosen.name, chosen.text, wanted, every, remark, map_.variables)
+    points = asked.by(chosen.name, used, arithmetic)
+    return Trajectory(points, arithmetic, chosen.name, chosen.text, wanted, every, remark, map_.variables)
 
 
-class Walk:
+class _Asked(NamedTuple):
+    """Which points of which orbit are wanted."""
+
+    map: BirationalMap
+    start: Sequence[Any]
+    eps: fmpq
+    steps: int
+    at: Sequence[int] | None
+    every: int
+    backward: bool
+    max_digits: int
+    kernel: str | None
+
+    def by(self, method: str, structure: Structure | None, numbers: Arithmetic) -> Any:
+        """The iterator over them by a method, in an arithmetic."""
+        if numbers.kind == "float":
+            from kahanmaps.maps.floats.fast import FloatOrbit
+
+            every = self.every if self.at is None else max(1, math.gcd(*self.at))
+            form = None if structure is None else structure.form
+            given = (self.map.rounded, self.eps, self.start, self.steps)
+            return FloatOrbit(*given, backward=self.backward, form=form, kernel=self.kernel, every=every)
+        over = self.map.at(self.eps, numbers.field)
+        limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
+        if method == "doubling" and structure is not None:
+            return Iterates(over, self.start, self.at or [], structure=structure, **limits)
+        normal = structure if method == "normal-form" else None
+        return Orbit(over, self.start, self.steps, structure=normal, **limits)
+
+
+class Trajectory:
     """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it.
 
     Iterate over it, and nothing is kept; or ask for its length, for points by their number, for a table or an array,
-    and all points are walked and kept.
+    and all points are computed and kept.
 
-    >>> walk = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
-    >>> len(walk), walk[-1].x, walk.rows()[0]
+    >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
+    >>> len(found), found[-1].x, found.rows()[0]
     (4, (1/2,), {'step': 0, 'x': '1/5'})
     """
 
@@ -181,7 +192,7 @@ class Walk:
         self.variables = tuple(variables)
 
     def __repr__(self) -> str:
-        return f"Walk({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
+        return f"Trajectory({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
@@ -193,7 +204,7 @@ class Walk:
 
     @property
     def end(self) -> OrbitEnd:
-        """How it ended; where not all points have come yet, they are walked and kept."""
+        """How it ended; where not all points have come yet, they are computed and kept."""
         if self.orbit.end is None:
             _ = self.points
         end: OrbitEnd = self.orbit.end
@@ -202,7 +213,7 @@ class Walk:
     @cached_property
     def points(self) -> list[OrbitPoint]:
         """All points."""
-        return list(self._walked())
+        return list(self._computed())
 
     def __len__(self) -> int:
         return len(self.points)
@@ -246,9 +257,9 @@ class Walk:
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # `list` asks for the length between here and the first point
-        yield from self.points if "points" in self.__dict__ else self._walked()
+        yield from self.points if "points" in self.__dict__ else self._computed()
 
-    def _walked(self) -> Iterator[OrbitPoint]:
+    def _computed(self) -> Iterator[OrbitPoint]:
         if self.arithmetic.kind != "float":
             yield from self.orbit
             return
@@ -258,13 +269,25 @@ class Walk:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
 
 
+def _numbers(start: Any, arithmetic: Arithmetic) -> Sequence[Any]:
+    """The entries of a start: of text its numbers, and of floats, for float orbits, exactly these."""
+    if isinstance(start, str):
+        start = parse_point(start)
+    if not hasattr(start, "__len__"):
+        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
+    if arithmetic.kind == "float":
+        start = [_exactly(x) if isinstance(x, float) else x for x in start]
+    numbers: Sequence[Any] = start
+    return numbers
+
+
 def _exactly(value: float) -> fmpq:
     if not math.isfinite(value):
         raise InputError(f"found {value} in the start, expected finite numbers")
     return fmpq(*value.as_integer_ratio())
 
 
-def _walk_at_one_eps(
+def _orbit_at_one_eps(
     phi: MapOver,
     start: Sequence[Any],
     eps: Any,
@@ -272,13 +295,13 @@ def _walk_at_one_eps(
     arithmetic: Arithmetic,
     backward: bool,
     max_digits: int | None,
-) -> Walk:
+) -> Trajectory:
     """The orbit of a map that has its eps and its field."""
     if eps is not None or steps is None or arithmetic.kind != "exact":
         raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
     kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
-    walked = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
-    return Walk(walked, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
+    points = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
+    return Trajectory(points, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
 
 
 def _structure(
@@ -322,7 +345,7 @@ def _why_not_to_look(
     member: FamilyMember | None,
 ) -> str:
     """Empty, or why looking for a structure would cost more than it can save."""
-    few = JUMP_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
+    few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
     numbers = [eps, *(rational(entry) for entry in start)]
     if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
         few = max(few, 24)

@@ -31,14 +31,14 @@ from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.singular.jets import modulo
 
 MAX_DEGREE = 12
 _TRIES = 3
 _BITS = 31  # of primes: FLINT's Python cannot sort several factors with larger coefficients
 # Of the degrees of a planar map of infinite order that keeps all curves of a pencil, by genus: diller-favre-2001.
-GROWTH_ON = {0: GrowthClass.LINEAR, 1: GrowthClass.QUADRATIC}
+GROWTH_ON = {0: Growth.LINEAR, 1: Growth.QUADRATIC}
 _Local = dict[tuple[int, int], Any]  # a power series in x, y at a point, its coefficients by exponents
 
 
@@ -84,21 +84,21 @@ class Pencil:
             f"base points: {points}"
         )
 
-    def motion(self, growth: GrowthClass) -> str:
+    def motion(self, growth: Growth) -> str:
         """What the map is on these curves, given how its degrees grow; empty where nothing follows.
 
         An automorphism of a curve of genus 1 is a translation or has finite order.
         """
         if self.genus > 1:
             return "the map has finite order, for on such a curve there are finitely many automorphisms"
-        if self.genus == 1 and growth is GrowthClass.QUADRATIC:
+        if self.genus == 1 and growth is Growth.QUADRATIC:
             who = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
             return f"{who} is a translation, for the degrees grow"
         return ""
 
-    def against(self, growth: GrowthClass) -> str:
+    def against(self, growth: Growth) -> str:
         """Why the degrees cannot grow so; empty where they can."""
-        grows = growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
+        grows = growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
         possible = not grows or growth is GROWTH_ON.get(self.genus)
         return "" if possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
 

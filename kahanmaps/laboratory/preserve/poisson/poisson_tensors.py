@@ -229,14 +229,11 @@ def find_poisson(
     dim, asked = file.dim, degree
     pairs = dim * (dim - 1) // 2
     if denominator is not None:
-        context = ring(laboratory.map.names)
-        gens = (*context.gens()[:dim], context.gens()[-1])
-        parts = (part.compose(*gens, ctx=context) for part in (denominator.numerator, denominator.denominator))
-        denominator = RationalFunction(*parts)
+        denominator = _in_names_of(laboratory, denominator)
     while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
     found: list[FoundTensor] = []
-    pencil, reason = None, laboratory.defect
+    reason = laboratory.defect
     cut = f"degrees above {degree} were not tried" if degree < asked else ""
     if pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
@@ -255,21 +252,32 @@ def find_poisson(
         for k, tensor in enumerate(forms, 1):
             progress(f"verifying tensor {k} of {len(forms)}")
             one = _judged(laboratory, tensor, integrals or (), deadline)
-            if one is None:
-                reason = "a tensor that was found modulo primes did not pass as an identity"
-            else:
-                found.append(one)
+            found += [one] if one is not None else []
+        if len(found) < len(forms):
+            reason = "a tensor that was found modulo primes did not pass as an identity"
         # Poisson tensors first, those of a high rank before others.
         found.sort(key=lambda one: (not one.jacobi.holds, -one.rank))
         found = [replace(one, name=f"P{k}" if len(found) > 1 else "P") for k, one in enumerate(found, 1)]
-        if 1 < len(found) <= _LARGEST_PENCIL and all(one.jacobi.holds for one in found):
-            identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
-            pencil = _verdict(laboratory, identity, deadline)[0]
     if cut:
         cut = f"{cut}: such tensors have too many coefficients"
         reason = f"{reason}; {cut}" if reason and not found else cut
-    known = tuple(integrals or ())
+    pencil, known = _verdict_on_pencil(laboratory, found, deadline), tuple(integrals or ())
     return PoissonSearch(*laboratory.asked, tuple(found), known, degree, denominator, pencil, reason)
+
+
+def _in_names_of(laboratory: Laboratory, function: RationalFunction) -> RationalFunction:
+    """A function of the variables and eps as one of the symbols too."""
+    context = ring(laboratory.map.names)
+    gens = (*context.gens()[: laboratory.map.dim], context.gens()[-1])
+    return RationalFunction(*(part.compose(*gens, ctx=context) for part in (function.numerator, function.denominator)))
+
+
+def _verdict_on_pencil(laboratory: Laboratory, found: Sequence[FoundTensor], deadline: float) -> Verdict | None:
+    """Whether all combinations are Poisson tensors; None where these are too many, or not all of them are."""
+    if not 1 < len(found) <= _LARGEST_PENCIL or not all(one.jacobi.holds for one in found):
+        return None
+    identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
+    return _verdict(laboratory, identity, deadline)[0]
 
 
 def _integrals(laboratory: Laboratory, symbols: Sequence[str], deadline: float, seed: int) -> tuple[FoundIntegral, ...]:

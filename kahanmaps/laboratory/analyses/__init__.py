@@ -1,0 +1,1 @@
+"""The analyses of a report, a file each; `table.py` lists them."""

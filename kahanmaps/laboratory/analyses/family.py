@@ -1,0 +1,103 @@
+"""The system itself: Hamiltonian with a constant J, of the commuting family, or one over a larger algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq_mat
+
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.written.text import format_number, format_polynomial
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.tensor import TensorStructure, tensor_structure
+from kahanmaps.laboratory.analyses.part import Run
+from kahanmaps.laboratory.findings import Findings
+from kahanmaps.laboratory.known import Known, Statement
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
+    MAX_DIMENSION,
+    ConstantStructures,
+    constant_structures,
+)
+
+
+def hamiltonian(run: Run, **_: Any) -> ConstantStructures | None:
+    """A constant J with f = J grad H, in few dimensions."""
+    return constant_structures(run.field, seed=run.seed) if run.dim <= MAX_DIMENSION else None
+
+
+def family(run: Run, **_: Any) -> Structure | NoStructure:
+    """The normal form of a member of the commuting family, in coordinates with the centre as origin."""
+    known = run.found.hamiltonian
+    if known is None or known.hamiltonian is None:
+        return structure_of(run.field)
+    moved = known.hamiltonian if known.hamiltonian.centre is None else known.hamiltonian.about(known.hamiltonian.centre)
+    return structure_of(moved.system, moved)
+
+
+def algebra(run: Run, **_: Any) -> TensorStructure | None:
+    """The algebra larger than Q over which it is a system; of a member of the family its normal form says more."""
+    return None if isinstance(run.found.structure, Structure) else tensor_structure(run.field)
+
+
+def family_json(found: Findings) -> dict[str, Any]:
+    """What a member of the family is one by, and what follows: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
+    member = None
+    if isinstance(found.structure, Structure):
+        form = found.structure.form
+        member = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
+        member |= {**attributes(found.structure, "A", "T"), **attributes(found, "centre")}
+    return {"family": (found.structure.text or None) if found.structure is not None else None, "member": member}
+
+
+def algebra_json(found: Findings) -> dict[str, Any]:
+    """C and its minimal polynomial."""
+    known = found.tensor
+    return {"algebra": None if known is None else attributes(known, "text", "C", "rank", chi="chi_text")}
+
+
+def statements(found: Findings) -> list[Statement]:
+    """H, invariant hyperplanes, the commuting family and the normal form."""
+    lines = []
+    structures = found.hamiltonian
+    if structures is not None and structures.hamiltonian is not None:
+        H = format_polynomial(structures.hamiltonian.H)
+        kind = "the standard J" if structures.hamiltonian.is_standard else "a constant skew J"
+        lines.append(Statement(Known.PROVED, f"Hamiltonian with {kind}, H = {H}"))
+    elif structures is not None and structures.proved:
+        lines.append(Statement(Known.PROVED, f"not Hamiltonian with a constant J: {structures.reason}"))
+    darboux = affine_darboux(found.file.system) if found.file.is_quadratic else None
+    if darboux is not None and darboux.functions:
+        planes = [f"{format_polynomial(one.function)} = 0" for one in darboux.functions]
+        kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
+        are = f"the {kind} {planes[0]} is" if len(planes) == 1 else f"the {kind}s {_enumerated(planes)} are"
+        lines.append(Statement(Known.PROVED, f"{are} invariant, for flow and map"))
+    if found.structure is not None and found.structure.text:
+        text = f"belongs to the commuting family: {found.structure.text}{_coordinates(found, found.structure.T)}"
+        lines.append(Statement(Known.PROVED, text))
+    if found.tensor is not None:
+        text = "the map is that over K, and inherits what it has (docs/beyond.md)"
+        lines.append(Statement(Known.PROVED, f"{found.tensor.text}: {text}"))
+    if isinstance(found.structure, Structure):
+        form = found.structure.form
+        lines.append(
+            Statement(
+                Known.PROVED,
+                f"normal form: the planar map of h(X, Y) = {form.h_text} over Q[t]/({form.chi_text}), "
+                "a block for each root t",
+            )
+        )
+    return lines
+
+
+def _enumerated(texts: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))
+
+
+def _coordinates(found: Findings, T: fmpq_mat | None) -> str:
+    """In which coordinates the system is a member of the family, x = centre + T y; empty where these are its own."""
+    centre = f"({', '.join(map(format_number, found.centre))})" if found.centre and any(found.centre) else ""
+    if T is None and not centre:
+        return ""
+    return f", in coordinates y with x = {' + '.join(filter(None, [centre, 'y' if T is None else 'T y']))}"

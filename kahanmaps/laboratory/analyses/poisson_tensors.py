@@ -1,0 +1,32 @@
+"""Poisson tensors that the map preserves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kahanmaps.family.structure import Structure
+from kahanmaps.laboratory.analyses.part import Run
+from kahanmaps.laboratory.findings import Findings
+from kahanmaps.laboratory.known import Known, Statement
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
+
+_DEGREES = {3: 3, 4: 2}  # of the tensors by dimension; in the plane they are densities
+
+
+def poisson(run: Run, **budget: Any) -> PoissonSearch | None:
+    """Those of low degree, in dimensions 3 and 4."""
+    if run.dim not in _DEGREES:
+        return None
+    return find_poisson(run.bare, _DEGREES[run.dim], integrals=run.integrals, **run.asked, **budget)
+
+
+def statements(found: Findings) -> list[Statement]:
+    """The tensor of a member of the family, and those found."""
+    search, lines = found.poisson, []
+    if isinstance(found.structure, Structure) and found.structure.form.m > 1:
+        text = f"with {found.structure.form.m} integrals in involution, as a member of the commuting family"
+        lines.append(Statement(Known.PROVED, f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, {text}"))
+    if search is None:
+        return lines
+    lines += [Statement(Known(one.verdict), f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors]
+    return [*lines, *([Statement(Known.NOTE, search.note)] if search.note else [])]
