@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from kahanmaps.paper.registry import claims
 from kahanmaps.paper.verify import verify_universal
 from kahanmaps_cli.runs.verify_table import markdown
@@ -11,6 +13,8 @@ from kahanmaps_cli.runs.verify_table import markdown
 AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_table_of_the_audit_is_what_verify_prints():
     assert AUDIT.split("<!-- table -->\n")[1].strip() == markdown(verify_universal(3)).strip()
 

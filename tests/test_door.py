@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from decimal import Decimal
 from fractions import Fraction
@@ -287,55 +286,3 @@ def test_a_table_of_pandas_is_made_of_the_rows(monkeypatch, tmp_path):
         found.to_pandas()
     walk.to_csv(tmp_path / "o.csv")
     assert (tmp_path / "o.csv").read_text().splitlines()[:2] == ["step,x1,x2,x3", "0,1,2,3"]
-
-
-SCRIPT = """
-from fractions import Fraction
-from pathlib import Path
-
-import numpy as np
-
-import kahanmaps as km
-
-top = km.load("euler_top", a1=2)
-fish = km.System({"q": "p", "p": "a*q^2 - q"}, a=Fraction(1, 2))
-growth: km.DegreeGrowth = km.degrees("euler_top", max_terms=4)
-print(growth.growth_text, km.degrees(top, eps="1/10").rows(), km.degrees(Path("mine.toml"), time_step="1/5"))
-found: km.IntegralSearch = km.find_integrals("x' = y; y' = 6*x^2 - 2", seconds=5)
-print([one.text for one in found.integrals], km.find_density(fish).densities[0].text)
-report: km.Report = km.check_commute("euler_top", top, eps="1/10")
-print(report.verdict is km.Verdict.PROVED, km.check_measure("euler_top", eps="1/10").holds)
-walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5)
-print(len(walk), walk[-1].text, [point.step for point in walk[1:3]], [point.x for point in walk])
-phi = km.map("euler_top", "1/10")
-print(phi([1, 2, 3]), (phi**-2 @ phi)([1, 2, 3]), top.at("1/10").inverse, top("1/10"))
-print(km.cycles("weierstrass", 101, eps="1/10").lengths, km.lyapunov("lorenz", [1, 2, 3], "1/100", 100).mean)
-print(km.orbit(phi @ phi, np.array([1, 2, 3]), steps=2), km.orbit(fish, [1, 0], "1/10", 5, arithmetic=km.GF(7)))
-print(km.check_integrals(fish, "p^2", eps="1/10").holds, km.check_measure(fish, "p").rows())
-print(km.check_poisson(fish, [["0", "1"], ["-1", "0"]]).to_json(), km.heights(fish, "1/5", starts=[1, 2]).to_json())
-member = km.draw_with_eigenvalues([2, -3], seed=1)
-print(km.check_commute(member.associate([1, 1]), member.associate([1, -1])).verdict, km.degrees(member).degrees)
-print(km.heights(top.map, "1/10", seconds=1).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence)
-"""
-WRONG = {
-    "km.degrees(3)": "call-overload",
-    'km.degrees("euler_top", max_tems=4)': "call-overload",
-    'km.degrees("euler_top").growth_txt': "attr-defined",
-    'km.check_commute("euler_top", 3)': "arg-type",
-}
-
-
-def test_a_script_passes_a_strict_type_checker_and_a_wrong_one_does_not(tmp_path, pytestconfig):
-    script = tmp_path / "script.py"
-    script.write_text("\n".join([SCRIPT, *WRONG]))
-    # What it knows of the library is kept from run to run, as far as that has not changed.
-    kept = pytestconfig.cache.mkdir("mypy") if hasattr(pytestconfig, "cache") else tmp_path / "cache"
-    options = ["--strict", "--config-file=", "--cache-dir", str(kept)]
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", *options, str(script)], capture_output=True, text=True, check=False, cwd=tmp_path
-    )
-    lines = [line for line in done.stdout.splitlines() if ": error:" in line]
-    assert len(lines) == len(WRONG), done.stdout + done.stderr
-    for number, (line, kind) in enumerate(zip(lines, WRONG.values(), strict=True), len(SCRIPT.splitlines()) + 2):
-        assert line.startswith(f"script.py:{number}: error:")
-        assert line.endswith(f"[{kind}]")

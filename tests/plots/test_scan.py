@@ -18,7 +18,7 @@ rhs = ["x*(a*x + y)", "y*(x + b*y)"]"""
 
 @pytest.fixture(scope="module")
 def found():
-    return scan(parse_system(PLANE), ["a", "b"], terms=4, primes=[23, 29, 31])
+    return scan(parse_system(PLANE), ["a", "b"], terms=4, primes=[17, 19, 23])
 
 
 def of_growth(found, kind):
@@ -62,13 +62,13 @@ def test_conditions_are_written_beside_what_they_describe(found):
 
 
 def test_the_plane_modulo_a_prime_has_every_slow_member(found):
-    [axes] = draw_scan(found, modulo=29).axes
-    sweep = next(one for one in found.sweeps if one.prime == 29)
+    [axes] = draw_scan(found, modulo=19).axes
+    sweep = next(one for one in found.sweeps if one.prime == 19)
     drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
     assert sorted(drawn) == sorted(sweep.slow)
     a, b = {text.get_text(): text.xy for text in axes.texts}["2*a*b - a - b = 0"]
-    assert (2 * a * b - a - b) % 29 == 0
-    with pytest.raises(InputError, match="expected one modulo which all members were tried: 23, 29, 31"):
+    assert (2 * a * b - a - b) % 19 == 0
+    with pytest.raises(InputError, match="expected one modulo which all members were tried: 17, 19, 23"):
         draw_scan(found, modulo=37)
 
 
