@@ -9,13 +9,11 @@ import math
 import pytest
 from bound_helpers import F, covers, covers_polynomial, numerator, polynomials, true_size
 from flint import fmpq, fmpq_mat, fmpz
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.bounds import ONE, BoundField, Size, bound_of, log2
 from kahanmaps.errors import InputError
-
-few = settings(max_examples=60)
 
 
 def bounded(K, element):
@@ -36,7 +34,6 @@ def test_the_logarithm_of_an_integer_is_rounded_up_a_little(value):
 # Numbers
 
 
-@few
 @given(polynomials(), polynomials(), polynomials())
 def test_sums_differences_and_products_of_polynomials_are_bounded(p, q, r):
     K = BoundField()
@@ -48,7 +45,6 @@ def test_sums_differences_and_products_of_polynomials_are_bounded(p, q, r):
     assert covers_polynomial(((a + b) * c - a * a * a).above, numerator((p + q) * r - p * p * p))
 
 
-@few
 @given(st.lists(polynomials(), min_size=6, max_size=6))
 def test_rational_functions_are_bounded(drawn):
     a, b, c, d, e, f = drawn
@@ -101,7 +97,6 @@ def in_K(K, rows):
     return K.matrix(len(rows), len(rows[0]), [bounded(K, entry) for row in rows for entry in row])
 
 
-@few
 @given(polynomial_matrices(2, 3), polynomial_matrices(3, 2))
 def test_products_of_matrices_are_bounded(left, right):
     K = BoundField()
@@ -110,14 +105,12 @@ def test_products_of_matrices_are_bounded(left, right):
         assert covers_polynomial(bound.entry.above, numerator(entry))
 
 
-@settings(max_examples=30)
 @given(st.integers(1, 3).flatmap(lambda n: polynomial_matrices(n, n)))
 def test_determinants_are_bounded(rows):
     K = BoundField()
     assert covers_polynomial(in_K(K, rows).det().above, numerator(in_F(rows).det()))
 
 
-@settings(max_examples=30)
 @given(st.integers(1, 3).flatmap(lambda n: st.tuples(polynomial_matrices(n, n), polynomial_matrices(n, 1))))
 def test_solutions_are_bounded_by_cramers_rule(drawn):
     rows, right = drawn

@@ -10,7 +10,7 @@ from itertools import islice
 import pytest
 from flint import fmpq, fmpq_poly
 from helpers import random_point
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.etale import EtaleAlgebra
@@ -37,6 +37,7 @@ CHI = ["t^2 - 10", "t^2 + 41", "t^2 - 1/3*t + 1/7", "t^3 - t - 1", "t^3 - 7*t + 
 CHI += ["(t^2 - 2)*(t^2 + t + 1)"]
 
 over_fields = pytest.mark.parametrize("name", FIELDS)
+few = settings(max_examples=settings().max_examples // 2)  # of many steps each
 
 
 def block_over(algebra: EtaleAlgebra, cubic, start) -> AlgebraBlock:
@@ -60,6 +61,7 @@ def member_of(text: str, seed: int = 5):
 
 
 @over_fields
+@few
 @given(seed=st.integers(0, 10**6))
 def test_the_points_are_those_of_steps_in_the_field(name, seed):
     block = random_block(name, seed)
@@ -90,6 +92,7 @@ def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_gener
 
 
 @pytest.mark.parametrize("chi", CHI)
+@few
 @given(seed=st.integers(0, 10**6), eps=st.sampled_from(["1/10", "-7/3", "20957/262577", "1000000000"]))
 def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
     structure, system = member_of(chi)
