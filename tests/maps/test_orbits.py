@@ -93,9 +93,6 @@ def test_the_text_of_a_rational_point_is_in_lowest_terms_and_of_any_length():
     assert last.text == [QQ.format(entry) for entry in last.x]
 
 
-# Completed.
-
-
 # Singular: x' = x^2 with eps = 1/2 is x~ = x/(1 - x), and 1/5, 1/4, 1/3, 1/2, 1 has no successor.
 
 

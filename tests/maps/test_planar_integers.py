@@ -29,9 +29,6 @@ def walked(block: IntegerBlock, steps: int) -> list[tuple[int, int, int]]:
     return [reduced(triple) for triple in islice(block.triples(), steps + 1)]
 
 
-# Scaling.
-
-
 @over_starts
 def test_the_level_is_that_of_every_point(cubic, start):
     block = integer_block(cubic, start)
@@ -66,7 +63,7 @@ def test_an_orbit_goes_on_from_any_point_of_it_and_the_one_before():
     assert [reduced(P) for P in islice(GENERAL.triples_from(second, first), 7)] == [*map(reduced, (second, *rest))]
 
 
-# The rule.
+# That the tests can fail.
 
 
 def test_a_wrong_point_before_is_noticed():
