@@ -29,6 +29,23 @@ def walked(block: IntegerBlock, steps: int) -> list[tuple[int, int, int]]:
     return [reduced(triple) for triple in islice(block.triples(), steps + 1)]
 
 
+@given(cubic=points(4, rationals(6)), point=points(2, rationals(10**30)), eps=rationals(10**9).filter(bool))
+def test_the_start_and_the_cubic_are_integers_without_a_common_factor(cubic, point, eps):
+    block = IntegerBlock(cubic, eps, *point)
+    U, V, W = block.start
+    assert (fmpq(U, W), fmpq(V, W)) == tuple(block.scale * entry for entry in point)
+    assert gcd(*map(int, block.start)) == 1
+    h = block.block
+    assert gcd(*map(int, (h.a, h.b, h.c, h.d))) == (0 if block.block.is_zero else 1)
+
+
+@pytest.mark.parametrize(("cubic", "start"), [STARTS["h = 0"], STARTS["the origin"]], ids=["h = 0", "the origin"])
+def test_a_constant_orbit_never_ends(cubic, start):
+    block = integer_block(cubic, start)
+    assert block.is_constant
+    assert set(walked(block, 20)) == {reduced(start)}
+
+
 @over_starts
 def test_the_level_is_that_of_every_point(cubic, start):
     block = integer_block(cubic, start)
