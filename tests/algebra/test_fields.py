@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import CC, GF, QQ, RR, rational
+from kahanmaps.algebra.fields import CC, GF, QQ, RR, PrimeField, rational
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.matrices import nullspace, rank
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
@@ -193,6 +193,15 @@ def test_a_modulus_that_is_no_python_integer_is_refused_even_after_its_equal_was
 def test_a_modulus_too_long_to_be_proved_prime_quickly_is_refused():
     with pytest.raises(InputError, match="expected at most 512"):
         GF(2**521 - 1)
+
+
+def test_fields_of_the_same_prime_are_equal_and_hash_alike():
+    assert (PrimeField(7), hash(PrimeField(7))) == (GF(7), hash(GF(7)))
+
+
+@pytest.mark.parametrize("other", [GF(5), QQ, RR(7), 7], ids=repr)
+def test_fields_of_different_kind_or_prime_are_different(other):
+    assert GF(7) != other
 
 
 # Balls.

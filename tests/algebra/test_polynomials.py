@@ -84,6 +84,12 @@ def test_the_common_denominator_is_the_least():
     assert common_denominator(x / 4 - y / 6 + 2) == 12
 
 
+@given(p=polynomials())
+def test_a_polynomial_is_its_factor_times_its_primitive_part(p):
+    factor, primitive = primitive_part(p)
+    assert factor * primitive == p
+
+
 def test_zero_is_its_own_primitive_part():
     zero = ring(["x"]).constant(0)
     assert primitive_part(zero) == (1, zero)

@@ -106,6 +106,13 @@ def test_a_number_of_too_many_digits_is_refused():
             parse_number(text)
 
 
+def test_numbers_pass_the_4300_digits_at_which_python_stops():
+    digits = "123456789" * 2000
+    assert format_number(parse_number(digits)) == digits
+    assert parse_number(f"{digits}1/{digits}") == fmpq(fmpz(digits) * 10 + 1, fmpz(digits))
+    assert format_number(parse_polynomial(f"{digits}*x", NAMES).leading_coefficient()) == digits
+
+
 @given(rationals)
 def test_a_printed_number_parses_back(value: fmpq):
     assert parse_number(format_number(value)) == value
@@ -338,6 +345,12 @@ def test_bad_names_are_refused(names: list[str], message: str):
         parse_polynomial("1", names)
 
 
+def test_a_variable_is_not_also_a_constant():
+    check_names(["x", "y"])
+    with pytest.raises(InputError, match="found the name 'x' twice"):
+        parse_polynomial("x", ["x"], {"x": THIRD})
+
+
 # Limits
 
 POWERS = "(" + " + ".join(f"x^{i}*y^{j}*z^{k}" for i in range(8) for j in range(8) for k in range(8)) + ")"
@@ -372,6 +385,14 @@ def test_a_hostile_text_is_refused(name: str):
     error = refusal(text)
     assert error.text == text
     assert len(str(error)) < 400
+
+
+def test_a_power_in_many_variables_is_refused():
+    names = [f"x{i}" for i in range(1, 17)]
+    with pytest.raises(ExpressionError, match="3876 and 3876 terms, which is too large to expand"):
+        parse_polynomial(f"({'+'.join(names)})^64", names)
+    with pytest.raises(ExpressionError, match="54264 terms, expected at most 20000"):
+        parse_polynomial(f"({'+'.join(names)})^6", names)
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,11 @@ def generic(m: int, seed: int) -> fmpq_mat:
     return A
 
 
+@over_members
+def test_every_element_of_the_basis_fulfils_the_condition(member):
+    assert all(fulfils_the_condition(member.A, H) for H in cubic_space(member.A).basis)
+
+
 # The space.
 
 

@@ -213,6 +213,11 @@ def test_the_new_coordinates_are_called_y_unless_the_system_has_such():
     assert found_in(CubicHamiltonian(parse_polynomial("y^3 + z^3", ["y", "z"]), J)).member.variables == ("yy1", "yy2")
 
 
+def test_the_text_says_where_coordinates_are_new():
+    found = found_in(CubicHamiltonian(parse_polynomial("a^3 + b^3", ["a", "b"]), fmpq_mat([[0, 2], [-2, 0]])))
+    assert found.text.endswith("chi = (t - 1), in coordinates y with x = T y and standard J")
+
+
 # Repeated roots, and cubics of fewer variables.
 
 

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.fast import FloatOrbit, float_function, to_float
+from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.maps.floats.fast import FloatOrbit, float_function, to_float, to_floats
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -58,6 +58,11 @@ def test_a_number_beyond_the_range_of_doubles_is_refused(number):
         to_float(number)
 
 
+def test_a_machine_number_is_not_taken_for_an_exact_one():
+    with pytest.raises(InexactNumber):
+        to_floats([0.1])
+
+
 # One step.
 
 
@@ -65,6 +70,11 @@ def test_a_number_beyond_the_range_of_doubles_is_refused(number):
 def test_an_eps_that_rounds_to_zero_is_refused(eps):
     with pytest.raises(InputError, match="eps is 0 in machine numbers"):
         FloatOrbit(RICCATI, eps, [1], 1)
+
+
+def test_a_coefficient_beyond_the_range_of_doubles_is_refused():
+    with pytest.raises(InputError, match="use exact arithmetic"):
+        FloatOrbit(RICCATI.scaled(fmpq(10**400)), "1/10", [1], 1)
 
 
 # Orbits.

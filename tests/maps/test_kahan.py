@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import pytest
 from check_helpers import kahan_step
-from flint import arb, fmpq, fmpz
+from flint import arb, fmpq, fmpq_mat, fmpz
 from helpers import (
     EULER_TOP,
     FIELDS,
@@ -25,6 +25,7 @@ from helpers import (
     rationals,
     some,
     step_or_none,
+    systems,
     systems_with_points,
 )
 from hypothesis import assume, example, given
@@ -32,7 +33,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.matrices import det
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -240,3 +241,13 @@ def test_a_prime_at_which_eps_vanishes_is_refused_as_the_prime(eps):
 def test_a_point_of_another_dimension_is_refused_with_the_variables(point):
     with pytest.raises(InputError, match=f"{len(point)} coordinates, expected 2: x, y"):
         KahanMap(LOTKA_VOLTERRA, 1).step(point)
+
+
+@given(system=systems())
+def test_the_field_of_the_map_is_the_field_of_the_system(system):
+    phi = KahanMap(system, 1)
+    x = phi.point([1] * system.dim)
+    assert phi.vector_field(x) == tuple(evaluate(f, QQ, x) for f in system.rhs)
+    assert phi.vector_field_jacobian(x) == fmpq_mat(
+        system.dim, system.dim, [f.derivative(j)(*x) for f in system.rhs for j in range(system.dim)]
+    )

@@ -117,6 +117,15 @@ def test_the_planes_are_used_where_chi_splits_and_else_the_elimination():
     )
 
 
+def test_modulo_2_there_is_one_kernel():
+    system = LORENZ.scaled(3)
+    starts = [[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+    ensemble = ModularEnsemble(system, 3, starts, 2)
+    ensemble.advance(4)
+    assert ensemble.kernel == "numpy"
+    assert_exact(ensemble, system, 3, starts, 4)
+
+
 def test_threads_share_the_orbits_among_them_numba():
     system, form = SPLIT.chosen.system, FORMS["1,-2"]
     x = np.random.default_rng(1).integers(0, 97, (101, 4))
