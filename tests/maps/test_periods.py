@@ -23,6 +23,7 @@ from kahanmaps.maps.normal_form.division import PeriodicLevels, division_polynom
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.periods import (
     Kind,
+    _reductions,
     orbit_period,
     period_of,
     period_over_rationals,
@@ -277,6 +278,16 @@ def test_random_rational_orbits_are_proved_not_to_be_periodic():
         found = period_over_rationals(form, "1/10", ["1/2", "-1/3", 0, 1])
         assert (found.status, found.period) == ("aperiodic", None)
         assert "orders" in found.text
+
+
+@pytest.mark.parametrize(("gamma", "first"), [(fmpq(7, 3), 101), (fmpq(5, 101), 103), (fmpq(1, 101 * 103), 107)])
+def test_a_number_is_reduced_at_primes_above_100_that_do_not_divide_its_denominator(gamma, first):
+    for (prime, residue, context), expected in zip(_reductions(gamma), (first, 109, 113), strict=False):
+        assert prime >= first
+        assert (int(residue) * int(gamma.q) - int(gamma.p)) % prime == 0
+        assert context is None
+        if expected == first:
+            assert prime == first
 
 
 # Levels with a period: division polynomials.
