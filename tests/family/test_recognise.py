@@ -5,6 +5,7 @@ A is forgotten an A with the same splitting is found again, and its normal form 
 structure nothing is found; and an A that leaves repeated roots is said not to be generic.
 """
 
+import itertools
 import random
 from dataclasses import replace
 
@@ -27,6 +28,8 @@ from kahanmaps.family.cubics import belongs, default_variables, third_derivative
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.recognise import (
+    _DRAWS,
+    _candidates,
     _variants,
     darboux_coordinates,
     reason_against,
@@ -109,6 +112,11 @@ def test_the_normal_form_of_what_is_found_steps_like_the_system(member):
 def test_where_chi_splits_the_roots_are_the_first_integers():
     found = found_in(forgotten(draw_with_eigenvalues(["1/2", -7, 100], 3)))
     assert found.text == "H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2) (t - 3)"
+
+
+def test_a_is_as_simple_as_it_can_be():
+    found = found_in(cubic("x1^3 + x3^3 + x2^2*x4", 4))
+    assert found.A == fmpq_mat(4, 4, [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1])
 
 
 @given(
@@ -308,3 +316,12 @@ def test_an_element_is_made_simpler_by_an_integer_shift_and_divisor(before, afte
     assert second[1] == fmpq_poly(after)
     for matrix, polynomial in (first, second):
         assert evaluate_at_matrix(polynomial, matrix) == 0 * E
+
+
+def test_small_combinations_are_tried_before_larger_ones():
+    basis = [fmpq_mat(2, 2, [1, 0, 0, 0]), fmpq_mat(2, 2, [0, 0, 0, 1])]
+    tried = list(itertools.islice(_candidates(basis), 2 + 2 * _DRAWS))
+    assert tried[:2] == basis
+    largest = [max(abs(int(entry.p)) for entry in X.entries()) for X in tried[2:]]
+    assert (max(largest[:_DRAWS]), max(largest[_DRAWS:])) == (1, 2)
+    assert largest[:_DRAWS].count(1) > _DRAWS // 2

@@ -19,6 +19,7 @@ from kahanmaps.family.skew_hamiltonian import (
     defects,
     diagnosis,
     factors_of_chi,
+    is_generic,
     random_skew_hamiltonian,
     random_symplectic,
     require_skew_hamiltonian,
@@ -113,6 +114,11 @@ ORDERS = [  # chi as a product in some order, the order of its factors
 @pytest.mark.parametrize(("polynomial", "expected"), ORDERS, ids=lambda value: str(value))
 def test_factors_come_in_the_order_of_the_signs(polynomial, expected):
     assert [str(factor) for factor in factors_of_chi(draw_with_chi(polynomial, 1).A)] == expected
+
+
+@pytest.mark.parametrize(("values", "expected"), [((1, 2, 3), True), ((1, 2, 1), False), ((0,), True)], ids=str)
+def test_a_matrix_is_generic_when_chi_has_no_repeated_root(values, expected):
+    assert is_generic(diagonal(*values)) is expected
 
 
 # What chi means for A.
