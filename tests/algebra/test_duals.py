@@ -124,6 +124,16 @@ def test_division_by_an_element_of_value_zero_is_refused_although_its_slope_is_n
         field.one / field.dual(0, 1)
 
 
+@over_all_bases
+@some
+@given(data=st.data(), n=st.integers(1, 3))
+def test_the_determinant_is_the_one_expanded_entry_by_entry(base, data, n):
+    field = DualField(base)
+    with field.working():
+        matrix = data.draw(dual_matrices(field, n, n))
+        assert field.equal(matrix.det(), expanded(matrix.tolist()))
+
+
 # Matrices.
 
 
