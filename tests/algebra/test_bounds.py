@@ -4,20 +4,16 @@ A bound is compared with the polynomial that it is a bound of: sums, products, d
 polynomials. What is composed of these is bounded by composition; tests/checks and tests/paper look at whole claims.
 """
 
-from __future__ import annotations
-
 import math
 
 import pytest
 from bound_helpers import F, covers, covers_polynomial, numerator, polynomials, true_size
 from flint import fmpq, fmpq_mat, fmpz
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.bounds import ONE, BoundField, Size, bound_of, log2
 from kahanmaps.errors import InputError
-
-few = settings(max_examples=60)
 
 
 def bounded(K, element):
@@ -28,21 +24,6 @@ def bounded(K, element):
 # Sizes
 
 
-def test_a_sum_of_sizes_far_apart_is_still_a_bound():
-    # 2^300 + 1: the smaller one is lost in a float, but the bound does not fall below the sum.
-    total = Size(0, 300.0) + Size(0, 0.0)
-    assert fmpz(2) ** 300 + 1 <= fmpz(math.ceil(2 ** (total.bits - 300) * 2**60)) * fmpz(2) ** 240
-
-
-def test_the_sum_of_two_large_sizes_is_twice_as_large():
-    assert Size(0, 300.0) + Size(0, 300.0) == Size(0, 301.0)
-
-
-def test_either_of_two_sizes_is_bounded_in_degree_and_in_coefficients():
-    assert Size(1, 5.0) | Size(4, 2.0) == Size(4, 5.0) == Size(4, 2.0) | Size(1, 5.0)
-    assert Size(2, 1.5) ** 3 == Size(6, 4.5)
-
-
 @pytest.mark.parametrize("value", [1, 2, -8, 10**18 + 9, 10**1000 + 1, -(2**61) + 1])
 def test_the_logarithm_of_an_integer_is_rounded_up_a_little(value):
     exact = int(abs(value)).bit_length() - 1
@@ -50,14 +31,9 @@ def test_the_logarithm_of_an_integer_is_rounded_up_a_little(value):
     assert log2(fmpz(value)) == log2(value)
 
 
-def test_zero_is_as_large_as_one():
-    assert log2(0) == log2(1) == 0.0
-
-
 # Numbers
 
 
-@few
 @given(polynomials(), polynomials(), polynomials())
 def test_sums_differences_and_products_of_polynomials_are_bounded(p, q, r):
     K = BoundField()
@@ -69,7 +45,6 @@ def test_sums_differences_and_products_of_polynomials_are_bounded(p, q, r):
     assert covers_polynomial(((a + b) * c - a * a * a).above, numerator((p + q) * r - p * p * p))
 
 
-@few
 @given(st.lists(polynomials(), min_size=6, max_size=6))
 def test_rational_functions_are_bounded(drawn):
     a, b, c, d, e, f = drawn
@@ -82,27 +57,6 @@ def test_rational_functions_are_bounded(drawn):
     inner = b + c / d
     assume(not inner.above.is_zero())
     assert covers(A / (B + C / D), a / inner)
-
-
-@few
-@given(st.fractions(max_denominator=50), st.fractions(max_denominator=50), polynomials())
-def test_rational_coefficients_are_cleared(r, s, p):
-    K = BoundField()
-    bound = K.convert(fmpq(r.numerator, r.denominator)) * bounded(K, p) + K.convert(fmpq(s.numerator, s.denominator))
-    value = F.convert(fmpq(r.numerator, r.denominator)) * p + F.convert(fmpq(s.numerator, s.denominator))
-    cleared = numerator(value) * math.lcm(r.denominator, s.denominator)
-    assert covers_polynomial(bound.above, cleared)
-
-
-def test_one_denominator_is_counted_once():
-    K = BoundField()
-    a, b, c = K.variable(), K.polynomial(3, 1.0), K.variable()
-    assert (a / b + c / b).pole_degree == 3
-
-
-def test_two_denominators_are_both_counted():
-    K = BoundField()
-    assert (K.one / K.polynomial(3, 1.0) + K.one / K.polynomial(2, 1.0)).pole_degree == 5
 
 
 def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
@@ -127,11 +81,6 @@ def test_bounds_of_two_computations_are_not_mixed():
         K.one / K.variable() + L.one
 
 
-def test_a_bound_never_says_that_something_is_zero():
-    K = BoundField()
-    assert not K.is_zero(K.zero)
-
-
 # Matrices
 
 
@@ -148,7 +97,6 @@ def in_K(K, rows):
     return K.matrix(len(rows), len(rows[0]), [bounded(K, entry) for row in rows for entry in row])
 
 
-@few
 @given(polynomial_matrices(2, 3), polynomial_matrices(3, 2))
 def test_products_of_matrices_are_bounded(left, right):
     K = BoundField()
@@ -157,14 +105,12 @@ def test_products_of_matrices_are_bounded(left, right):
         assert covers_polynomial(bound.entry.above, numerator(entry))
 
 
-@settings(max_examples=30)
 @given(st.integers(1, 3).flatmap(lambda n: polynomial_matrices(n, n)))
 def test_determinants_are_bounded(rows):
     K = BoundField()
     assert covers_polynomial(in_K(K, rows).det().above, numerator(in_F(rows).det()))
 
 
-@settings(max_examples=30)
 @given(st.integers(1, 3).flatmap(lambda n: st.tuples(polynomial_matrices(n, n), polynomial_matrices(n, 1))))
 def test_solutions_are_bounded_by_cramers_rule(drawn):
     rows, right = drawn
@@ -196,14 +142,6 @@ def test_matrices_of_different_sizes_are_not_added_or_multiplied():
 
 
 # What pairs amount to
-
-
-def test_a_pair_amounts_to_the_numerator_of_the_difference():
-    K = BoundField()
-    x, w, v = K.variable(), K.polynomial(3, 1.0), K.polynomial(2, 4.0)
-    equation, poles = bound_of(K, [(x / w, K.one / v)])  # x/w = 1/v is x v = w
-    assert (equation.degree, poles) == (3, 5)
-    assert equation.bits == pytest.approx(math.log2(2**4 + 2), abs=1e-9)
 
 
 def test_of_several_pairs_the_largest_counts_and_matrices_are_pairs_of_entries():

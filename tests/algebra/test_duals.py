@@ -1,43 +1,28 @@
 """Dual numbers K[d]/(d^2): slopes are derivatives, over every kind of field, and matrices of them obey their algebra.
 
-Specified here by derivatives taken another way (FLINT's of polynomials, the formula for the Jacobi matrix of the Kahan
-map), by the rules of the differential calculus, and by expanding determinants entry by entry.
+Specified here by derivatives taken another way (FLINT's of polynomials), and by expanding determinants entry by entry.
 """
 
-from __future__ import annotations
-
-import flint
 import pytest
-from flint import arb, fmpq, fmpq_mat, fmpq_poly
-from helpers import LOTKA_VOLTERRA, SMALLEST_LARGE_PRIME, matrices, points, rationals, some, step_or_none
+from flint import fmpq, fmpq_poly
+from helpers import matrices, rationals, some
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import CC, GF, QQ, RR
+from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.matrices import solve
-from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost, SingularMatrix
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.errors import InexactNumber, InputError, SingularMatrix
 
 D = DualField(QQ)
 FUNCTIONS = FunctionField(["x", "y"], budget=10**12)
-BASES = [
-    QQ,
-    GF(2**61 - 1),
-    GF(SMALLEST_LARGE_PRIME),
-    RR(128),
-    CC(128),
-    D,
-    EtaleAlgebra(fmpq_poly([-1, 0, 1])),
-    FUNCTIONS,
-]
+BASES = [QQ, GF(2**61 - 1), RR(128), D, EtaleAlgebra(fmpq_poly([-1, 0, 1])), FUNCTIONS]
 
 over_all_bases = pytest.mark.parametrize("base", BASES, ids=repr)
 small = st.integers(-3, 3)
 polynomials = st.lists(rationals(6), min_size=1, max_size=5).map(fmpq_poly)
-dual_numbers = st.builds(D.dual, rationals(9), rationals(9))
 
 
 def at(polynomial: fmpq_poly, x):
@@ -84,86 +69,16 @@ def test_the_slope_of_a_rational_function_is_its_derivative(base, p, q, x):
         assert field.equal(at(p, moving) / at(q, moving), field.dual(p(x) / q(x), expected))
 
 
-@given(p=polynomials, x=rationals(9), v=rationals(9))
-def test_the_slope_is_proportional_to_the_direction(p, x, v):
-    assert at(p, D.dual(x, v)).slope == p.derivative()(x) * v
-
-
-def test_the_slope_over_rational_functions_is_a_rational_function():
-    x, y = FUNCTIONS.variables
-    moving, fixed = DualField(FUNCTIONS).dual(x, 1), DualField(FUNCTIONS).convert(y)
-    # d/dx of x^2/(x + y) is (x^2 + 2xy)/(x + y)^2
-    assert (moving * moving / (moving + fixed)).slope == (x * x + x * y + x * y) / ((x + y) * (x + y))
-
-
-@given(p=polynomials, q=polynomials, x=rationals(9))
-def test_nested_duals_give_the_second_derivative(p, q, x):
-    assume(q(x) != 0)
-    twice = DualField(D)
-    moving = twice.dual(D.dual(x, 1), 1)
-    # r q = p, so r'' q = p'' - 2 r' q' - r q''
-    r, slope = p(x) / q(x), (at(p, D.dual(x, 1)) / at(q, D.dual(x, 1))).slope
-    expected = (
-        p.derivative().derivative()(x) - 2 * slope * q.derivative()(x) - r * q.derivative().derivative()(x)
-    ) / q(x)
-    assert (at(p, moving) / at(q, moving)).slope.slope == expected
-
-
-def test_nested_duals_move_in_two_directions():
-    twice = DualField(D)
-    x, y = twice.dual(D.dual(5, 1), 0), twice.dual(7, 1)
-    assert (x**3 * y**2).slope.slope == 3 * 5**2 * 2 * 7  # the mixed derivative 3 x^2 2 y
-
-
-@given(a=dual_numbers, b=dual_numbers)
-def test_the_slope_of_a_product_obeys_the_product_rule(a, b):
-    assert (a * b).slope == a.slope * b.value + a.value * b.slope
-
-
-@given(a=dual_numbers, b=dual_numbers)
-def test_a_quotient_times_its_divisor_is_the_dividend(a, b):
-    assume(b.value != 0)
-    assert a / b * b == a
-
-
-@given(a=dual_numbers, n=st.integers(-5, 6))
-def test_the_slope_of_a_power_obeys_the_power_rule(a, n):
-    assume(a.value != 0)
-    assert a**n == D.dual(a.value**n, n * a.value ** (n - 1) * a.slope)
-
-
-def test_d_is_not_zero_but_its_square_is():
-    d = D.dual(0, 1)
-    assert (d == 0, D.is_zero(d), d * d == 0, D.is_zero(d**2)) == (False, False, True, True)
-
-
-@given(system_point=points(2), v=points(2), eps=rationals(9))
-@pytest.mark.parametrize("base", [QQ, GF(2**61 - 1)], ids=repr)
-def test_the_kahan_map_over_duals_moves_by_its_jacobi_matrix(base, system_point, v, eps):
-    assume(eps != 0)
-    field = DualField(base)
-    phi = KahanMap(LOTKA_VOLTERRA, eps, base)
-    assume(step_or_none(phi, system_point) is not None)
-    moved = KahanMap(LOTKA_VOLTERRA, eps, field).step([field.dual(a, b) for a, b in zip(system_point, v, strict=True)])
-    expected = (phi.jacobian(system_point) * base.column(v)).entries()
-    assert [entry.slope for entry in moved] == list(expected)
-
-
 # Numbers on both sides.
 
 x = D.dual(2, 3)
 MIXED = [  # result, value, slope
     (x + 1, 3, 3),
-    (1 + x, 3, 3),
-    (x - fmpq(1, 2), fmpq(3, 2), 3),
     (fmpq(1, 2) - x, fmpq(-3, 2), -3),
-    (x * fmpq(1, 2), 1, fmpq(3, 2)),
     (5 * x, 10, 15),
     (x / 2, 1, fmpq(3, 2)),
-    (fmpq(1) / x, fmpq(1, 2), fmpq(-3, 4)),
     (1 / x, fmpq(1, 2), fmpq(-3, 4)),
     (-x, -2, -3),
-    (x**0, 1, 0),
     (x**-2, fmpq(1, 4), fmpq(-3, 4)),
 ]
 
@@ -202,42 +117,11 @@ def test_what_is_no_number_is_no_operand(operation):
         operation()
 
 
-def test_an_element_of_other_duals_is_not_converted():
-    with pytest.raises(InputError, match="expected"):
-        D.convert(DualField(GF(7)).one)
-
-
-def test_a_denominator_that_the_prime_divides_is_refused():
-    with pytest.raises(BadPrime):
-        DualField(GF(7)).one * fmpq(1, 7)
-
-
 @over_all_bases
 def test_division_by_an_element_of_value_zero_is_refused_although_its_slope_is_not(base):
     field = DualField(base)
     with pytest.raises(ZeroDivisionError):
         field.one / field.dual(0, 1)
-
-
-@pytest.mark.parametrize("base", [RR(64), CC(64)], ids=repr)
-def test_division_by_a_ball_around_zero_is_refused(base):
-    field = DualField(base)
-    with field.working(), pytest.raises(PrecisionLost):
-        field.one / field.dual(arb(0, 1), 1)
-
-
-# Matrices.
-
-
-@over_all_bases
-@some
-@given(data=st.data())
-def test_the_entries_of_a_product_are_the_sums_of_products_of_entries(base, data):
-    field = DualField(base)
-    with field.working():
-        left, right = data.draw(dual_matrices(field, 2, 3)), data.draw(dual_matrices(field, 3, 2))
-        entries = [sum(left[i, k] * right[k, j] for k in range(3)) for i in range(2) for j in range(2)]
-        assert agree(field, left * right, field.matrix(2, 2, entries))
 
 
 @over_all_bases
@@ -250,6 +134,9 @@ def test_the_determinant_is_the_one_expanded_entry_by_entry(base, data, n):
         assert field.equal(matrix.det(), expanded(matrix.tolist()))
 
 
+# Matrices.
+
+
 @over_all_bases
 @some
 @given(data=st.data(), a=small, b=small)
@@ -260,12 +147,6 @@ def test_the_determinant_is_right_where_the_value_is_singular(base, data, a, b):
         singular = base.matrix(3, 3, [1, a, b, 2, 2 * a, 2 * b, a, 1, 1])
         matrix = field.lift_matrix(singular) + field.convert_matrix(slope) * field.dual(0, 1)
         assert field.equal(matrix.det(), expanded(matrix.tolist()))
-
-
-def test_the_determinant_at_a_singular_value_is_the_one_found_by_hand():
-    # det [[1 + d, 1 + 2d], [1 + 3d, 1 + 5d]] = (1 + 6d) - (1 + 5d)
-    matrix = D.matrix(2, 2, [D.dual(1, 1), D.dual(1, 2), D.dual(1, 3), D.dual(1, 5)])
-    assert matrix.det() == D.dual(0, 1)
 
 
 @over_all_bases
@@ -285,19 +166,6 @@ def test_a_matrix_of_singular_value_is_refused_although_its_slope_is_regular(bas
     matrix = field.identity(2) * field.dual(0, 1)
     with field.working(), pytest.raises(SingularMatrix):
         solve(matrix, field.column([0, 0]))
-
-
-def test_a_matrix_of_balls_that_may_be_singular_asks_for_more_bits():
-    field = DualField(RR(64))
-    with field.working(), pytest.raises(PrecisionLost):
-        solve(field.matrix(2, 2, ["1/3", "1/7", "1/3", "1/7"]), field.column([1, 1]))
-
-
-def test_a_determinant_of_balls_that_may_be_zero_is_enclosed_all_the_same():
-    field = DualField(RR(64))
-    with field.working():
-        rows = [field.dual("1/3", 1), field.convert("1/7"), field.convert("1/3"), field.convert("1/7")]
-        assert field.equal(field.matrix(2, 2, rows).det(), field.dual(0, "1/7"))
 
 
 @over_all_bases
@@ -324,23 +192,6 @@ def test_a_scalar_multiplies_a_matrix_from_both_sides(base, scalar):
         assert both == [expected] * 4
 
 
-@over_all_bases
-def test_a_lifted_matrix_is_constant(base):
-    field, matrix = DualField(base), base.matrix(2, 3, [1, 2, 3, 4, 5, 6])
-    assert field.lift_matrix(matrix) == field.matrix(2, 3, [1, 2, 3, 4, 5, 6])
-    assert field.lift_matrix(matrix) == field.convert_matrix(fmpq_mat(2, 3, [1, 2, 3, 4, 5, 6]))
-
-
-def test_matrices_that_differ_in_a_slope_are_different():
-    assert D.matrix(1, 1, [D.dual(1, 2)]) != D.matrix(1, 1, [D.dual(1, 3)])
-
-
-def test_the_rows_of_a_matrix_are_listed_with_its_sizes():
-    matrix = D.matrix(2, 3, [D.dual(k, -k) for k in range(6)])
-    assert (matrix.nrows(), matrix.ncols()) == (2, 3)
-    assert matrix.tolist() == [[D.dual(k, -k) for k in row] for row in ((0, 1, 2), (3, 4, 5))]
-
-
 def test_matrices_over_different_duals_do_not_mix():
     with pytest.raises(InputError, match="expected one over"):
         DualField(RR(64)).identity(1) * DualField(RR(65)).identity(1)
@@ -361,16 +212,3 @@ def test_dual_numbers_are_equal_if_both_parts_are(base):
 @over_all_bases
 def test_dual_fields_of_the_same_base_are_equal_and_hash_alike(base):
     assert (DualField(base), hash(DualField(base))) == (DualField(base), hash(DualField(base)))
-
-
-def test_dual_fields_of_different_bases_are_different():
-    assert len({DualField(QQ), DualField(GF(7)), DualField(D), DualField(QQ)}) == 3
-
-
-def test_working_sets_the_precision_of_the_balls_below():
-    with DualField(DualField(RR(777))).working():
-        assert flint.ctx.prec == 777
-
-
-def test_a_dual_number_prints_value_and_slope():
-    assert repr(D.dual("1/2", -3)) == "1/2 + d*(-3)"

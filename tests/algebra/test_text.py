@@ -5,11 +5,11 @@ reported (the column) and in which words; and that no text, however hostile, get
 `ExpressionError` while FLINT, which would end the process, is still safe.
 """
 
-from __future__ import annotations
+from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mpoly, fmpz
-from helpers import THOROUGH, quick
+from helpers import THOROUGH, quick, table
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,9 +17,11 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.written import expressions
 from kahanmaps.algebra.written.numerals import Limits, check_names, is_name
 from kahanmaps.algebra.written.text import (
+    format_factored,
     format_number,
     format_point,
     format_polynomial,
+    format_product,
     format_rational_function,
     parse_constant,
     parse_number,
@@ -40,6 +42,12 @@ nonzero = polynomials.filter(lambda p: not p.is_zero())
 rational_functions = st.builds(RationalFunction, polynomials, nonzero)
 
 
+def mistakes(heading: str) -> list[tuple[str | int, ...]]:
+    """The rows of mistakes.txt below a heading: text, column and words."""
+    rows = (line.split(" | ") for line in table(Path(__file__).with_name("mistakes.txt"))[heading])
+    return [(text, int(column), *words) for column, text, *words in rows]
+
+
 def refusal(text: str, limits: Limits | None = None) -> ExpressionError:
     """The error that a text meets as a rational function of x, y, z."""
     with pytest.raises(ExpressionError) as caught:
@@ -53,62 +61,33 @@ def refusal(text: str, limits: Limits | None = None) -> ExpressionError:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("0", fmpq(0)),
         ("-0", fmpq(0)),
         ("+7", fmpq(7)),
-        ("007", fmpq(7)),
         ("-6/4", fmpq(-3, 2)),
-        ("0/5", fmpq(0)),
         ("0.1", fmpq(1, 10)),  # not the double next to it
         (".5", fmpq(1, 2)),
-        ("5.", fmpq(5)),
         ("-.25", fmpq(-1, 4)),
         ("1e-3", fmpq(1, 1000)),
         ("1.50E+2", fmpq(150)),
         ("0e9999", fmpq(0)),
-        ("1e-0003", fmpq(1, 1000)),
         (" \t1/2\r\n", fmpq(1, 2)),
     ],
 )
-def test_a_number_in_text_is_exact(text: str, value: fmpq) -> None:
+def test_a_number_in_text_is_exact(text: str, value: fmpq):
     assert parse_number(text) == value
 
 
 @pytest.mark.parametrize(
     ("text", "column"),
     [
+        *mistakes("no numbers"),
         ("", 0),
-        ("   ", 3),
-        ("nan", 0),
-        ("inf", 0),
-        ("-", 1),
-        (".", 1),
-        ("e5", 0),
-        (".e5", 1),
-        ("1_000", 1),
-        ("0x10", 1),
-        ("1 000", 1),
-        ("1/", 2),
-        ("/2", 0),
-        ("1/-2", 2),
-        ("1/2/3", 3),
-        ("1/2.5", 3),
-        ("0.5/2", 3),
-        ("1e", 2),
-        ("1e2.5", 3),
-        ("--1", 1),
-        ("1+1", 1),
-        ("3/0", 2),
-        (" 3/000", 3),
-        ("1,5", 1),
         ("٣", 0),  # Arabic-Indic three: a digit to Python's int()
         ("1\N{NO-BREAK SPACE}", 1),
         ("\N{MINUS SIGN}1", 0),
-        ("1\0", 1),
-        ("True", 0),
     ],
 )
-def test_what_is_not_a_number_is_refused_at_its_column(text: str, column: int) -> None:
+def test_what_is_not_a_number_is_refused_at_its_column(text: str, column: int):
     with pytest.raises(ExpressionError) as caught:
         parse_number(text)
     assert caught.value.text == text
@@ -116,18 +95,18 @@ def test_what_is_not_a_number_is_refused_at_its_column(text: str, column: int) -
 
 
 @pytest.mark.parametrize("text", ["1e10001", "1e-10001", "1e999999999", "1e" + "9" * 5000, "0e99999"])
-def test_a_power_of_ten_beyond_the_limit_is_refused(text: str) -> None:
+def test_a_power_of_ten_beyond_the_limit_is_refused(text: str):
     with pytest.raises(ExpressionError, match="expected at most 10000 in size"):
         parse_number(text)
 
 
-def test_a_number_of_too_many_digits_is_refused() -> None:
+def test_a_number_of_too_many_digits_is_refused():
     for text in ["1" * 1_000_001, "1/" + "1" * 1_000_001, "." + "1" * 1_000_001]:
         with pytest.raises(ExpressionError, match="digits"):
             parse_number(text)
 
 
-def test_numbers_pass_the_4300_digits_at_which_python_stops() -> None:
+def test_numbers_pass_the_4300_digits_at_which_python_stops():
     digits = "123456789" * 2000
     assert format_number(parse_number(digits)) == digits
     assert parse_number(f"{digits}1/{digits}") == fmpq(fmpz(digits) * 10 + 1, fmpz(digits))
@@ -135,7 +114,7 @@ def test_numbers_pass_the_4300_digits_at_which_python_stops() -> None:
 
 
 @given(rationals)
-def test_a_printed_number_parses_back(value: fmpq) -> None:
+def test_a_printed_number_parses_back(value: fmpq):
     assert parse_number(format_number(value)) == value
     assert parse_constant(format_number(value)) == value
 
@@ -143,14 +122,14 @@ def test_a_printed_number_parses_back(value: fmpq) -> None:
 # Points
 
 
-def test_a_point_is_a_comma_separated_list() -> None:
+def test_a_point_is_a_comma_separated_list():
     assert parse_point("1/2, -1/3,0") == (fmpq(1, 2), fmpq(-1, 3), fmpq(0))
     assert parse_point("1", 1) == (fmpq(1),)
     assert parse_point(" ", 0) == ()
 
 
 @given(st.lists(rationals).map(tuple))
-def test_a_printed_point_parses_back(point: tuple[fmpq, ...]) -> None:
+def test_a_printed_point_parses_back(point: tuple[fmpq, ...]):
     assert parse_point(format_point(point), len(point)) == point
 
 
@@ -158,13 +137,11 @@ def test_a_printed_point_parses_back(point: tuple[fmpq, ...]) -> None:
     ("text", "dimension", "message"),
     [
         ("1,2", 3, "found 2 numbers, expected 3"),
-        ("1", 2, "found 1 number, expected 2"),
-        ("1,2,", 2, "found 3 numbers, expected 2"),
         ("", 2, "found nothing, expected a point"),
         ("", None, "found nothing, expected a point"),
     ],
 )
-def test_a_point_of_the_wrong_length_says_both_lengths(text: str, dimension: int | None, message: str) -> None:
+def test_a_point_of_the_wrong_length_says_both_lengths(text: str, dimension: int | None, message: str):
     with pytest.raises(ExpressionError, match=message):
         parse_point(text, dimension)
 
@@ -173,7 +150,7 @@ def test_a_point_of_the_wrong_length_says_both_lengths(text: str, dimension: int
     ("text", "entry", "column"),
     [("1,2,x", 3, 4), ("1,,2", 2, 2), ("1,2,", 3, 4), ("(1,2)", 1, 0), ("1, 2/0", 2, 5), ("1;2", 1, 1)],
 )
-def test_a_mistake_in_a_point_names_entry_and_column(text: str, entry: int, column: int) -> None:
+def test_a_mistake_in_a_point_names_entry_and_column(text: str, entry: int, column: int):
     with pytest.raises(ExpressionError, match=f"^entry {entry}: ") as caught:
         parse_point(text)
     assert caught.value.column == column
@@ -185,35 +162,24 @@ def test_a_mistake_in_a_point_names_entry_and_column(text: str, entry: int, colu
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("0", x - x),
-        ("x", x),
         ("-x^2", -(x**2)),  # the power binds tighter than the sign
         ("(-x)^2", x**2),
         ("- - -x", -x),
-        ("x - -y", x + y),
         ("2*-x", -2 * x),
-        ("x**2 + y^2", x**2 + y**2),
         ("2^3^2*x", 512 * x),  # powers from the right
-        ("x^2^0", x),
         ("1/2*x/3", x / 6),
-        ("x - y - z", x - y - z),
-        ("x*y/2*z", x * y * z / 2),
         ("0.1*x + 1e-2 + .5", x / 10 + fmpq(51, 100)),
         ("a*x + A", x / 3 + 5),
         ("x^a0", x**2),
         ("2^-1*x", x / 2),
         ("x/(2 - 1/2)", 2 * x / 3),
-        ("x/(y - y + 2)", x / 2),
         ("x^(y - y + 2)", x**2),
-        ("(x + y)^3", (x + y) ** 3),
-        ("(x + y)*(x - y)", x**2 - y**2),
         ("x^0 + 0^0", x - x + 2),
         ("\n x\t+\r y ", x + y),
-        ("((((x))))", x),
         ("x^64", x**64),
     ],
 )
-def test_a_polynomial_in_text_means_what_algebra_says(text: str, value: fmpq_mpoly) -> None:
+def test_a_polynomial_in_text_means_what_algebra_says(text: str, value: fmpq_mpoly):
     assert parse_polynomial(text, NAMES, {"a": THIRD, "A": fmpq(5), "a0": fmpq(2)}) == value
 
 
@@ -222,43 +188,22 @@ def test_a_polynomial_in_text_means_what_algebra_says(text: str, value: fmpq_mpo
     [
         ("y*0", "0"),
         ("5/3", "5/3"),
-        ("-5", "-5"),
         ("x^3/3 + 2/3*x*y^2 - y", "x^3/3 + 2/3*x*y^2 - y"),
-        ("-1*x", "-x"),
         ("1 - x/2", "-x/2 + 1"),
         ("-3*x^2*y", "-3*x^2*y"),
-        ("z - y + x", "x - y + z"),
     ],
 )
-def test_a_polynomial_is_printed_with_its_signs_folded_in(text: str, printed: str) -> None:
+def test_a_polynomial_is_printed_with_its_signs_folded_in(text: str, printed: str):
     assert format_polynomial(parse_polynomial(text, NAMES)) == printed
 
 
-@given(polynomials)
-def test_a_printed_polynomial_parses_back(polynomial: fmpq_mpoly) -> None:
-    assert parse_polynomial(format_polynomial(polynomial), NAMES) == polynomial
-
-
-@given(polynomials, polynomials)
-def test_sums_and_products_of_texts_are_sums_and_products(left: fmpq_mpoly, right: fmpq_mpoly) -> None:
-    a, b = format_polynomial(left), format_polynomial(right)
-    assert parse_polynomial(f"({a}) - ({b})", NAMES) == left - right
-    assert parse_polynomial(f"({a})*({b})", NAMES) == left * right
-    assert parse_polynomial(f"-({a})^3", NAMES) == -(left**3)
-
-
-def test_a_polynomial_lives_in_the_ring_of_its_variables() -> None:
-    assert parse_polynomial("x", NAMES).context() is RING
-    assert parse_polynomial("3", []) == ring([]).constant(3)
-
-
 @pytest.mark.parametrize("text", ["1/x", "x^2/x", "x^-1", "(x + y)^-2", "1/(x - y)"])
-def test_a_polynomial_is_not_divided_by_variables(text: str) -> None:
+def test_a_polynomial_is_not_divided_by_variables(text: str):
     with pytest.raises(ExpressionError, match="expected a polynomial"):
         parse_polynomial(text, NAMES)
 
 
-def test_a_constant_knows_its_constants_only() -> None:
+def test_a_constant_knows_its_constants_only():
     assert parse_constant("(1 + a)^-2", {"a": THIRD}) == fmpq(9, 16)
     with pytest.raises(ExpressionError, match="unknown name 'b': known are a"):
         parse_constant("b", {"a": THIRD})
@@ -267,14 +212,6 @@ def test_a_constant_knows_its_constants_only() -> None:
 
 
 # Rational functions
-
-
-def test_a_rational_function_comes_out_as_it_was_written() -> None:
-    names = ["x", "y", "z", "eps"]
-    u, v, w, eps = ring(names).gens()
-    function = parse_rational_function("(x^2 + y^2)/(1 - eps^2*z^2)", names)
-    assert function.numerator == -(u**2) - v**2  # the denominator starts with a positive coefficient
-    assert function.denominator == w**2 * eps**2 - 1
 
 
 @pytest.mark.parametrize(
@@ -286,14 +223,12 @@ def test_a_rational_function_comes_out_as_it_was_written() -> None:
         ("1/x + 1/y", x + y, x * y),
         ("1/(1/(1/x))", x / x, x),
         ("(x/y)^-2", y**2, x**2),
-        ("x/y/z", x, y * z),
         ("x/(y/z)", x * z, y),
-        ("(x + y)/3", (x + y) / 3, x**0),
         ("1/y - 1/y", x - x, x**0),
         ("x^2/x", x**2, x),  # common factors stay
     ],
 )
-def test_a_quotient_is_kept_simple(text: str, above: fmpq_mpoly, below: fmpq_mpoly) -> None:
+def test_a_quotient_is_kept_simple(text: str, above: fmpq_mpoly, below: fmpq_mpoly):
     function = parse_rational_function(text, NAMES)
     assert (function.numerator, function.denominator) == (above, below)
 
@@ -303,24 +238,23 @@ def test_a_quotient_is_kept_simple(text: str, above: fmpq_mpoly, below: fmpq_mpo
     [
         (RationalFunction(x + 1, x**0), "x + 1"),
         (RationalFunction(x - x, y), "0"),
-        (RationalFunction(x, y), "x/y"),
         (RationalFunction(-x, y**2), "-x/y^2"),
         (RationalFunction(x, 2 * y), "x/2/y"),
         (RationalFunction(x, y * z), "x/(y*z)"),
         (RationalFunction(x + 1, 1 - y), "(-x - 1)/(y - 1)"),
     ],
 )
-def test_a_quotient_is_printed_with_brackets_where_they_are_needed(function: RationalFunction, printed: str) -> None:
+def test_a_quotient_is_printed_with_brackets_where_they_are_needed(function: RationalFunction, printed: str):
     assert format_rational_function(function) == printed
 
 
 @given(rational_functions)
-def test_a_printed_rational_function_parses_back(function: RationalFunction) -> None:
+def test_a_printed_rational_function_parses_back(function: RationalFunction):
     assert parse_rational_function(format_rational_function(function), NAMES) == function
 
 
 @given(rational_functions, rational_functions)
-def test_arithmetic_of_texts_is_arithmetic_of_functions(left: RationalFunction, right: RationalFunction) -> None:
+def test_arithmetic_of_texts_is_arithmetic_of_functions(left: RationalFunction, right: RationalFunction):
     a, b = format_rational_function(left), format_rational_function(right)
     product = RationalFunction(left.numerator * right.numerator, left.denominator * right.denominator)
     crossed = left.numerator * right.denominator - right.numerator * left.denominator
@@ -334,59 +268,23 @@ def test_arithmetic_of_texts_is_arithmetic_of_functions(left: RationalFunction, 
 @pytest.mark.parametrize(
     ("text", "column", "message"),
     [
+        *mistakes("no expressions"),
         ("", None, "found nothing, expected an expression"),
-        ("2x", 1, "found 'x' right after '2', expected an operator between them: write 2*x"),
-        ("x y", 2, "write x*y"),
-        ("2 (x)", 2, "found '(' right after '2'"),
-        ("x(y)", 1, "found '(' right after 'x'"),
-        ("(x)(y)", 3, "found '(' right after ')'"),
-        ("(x + 1)2", 7, "found '2' right after ')'"),
-        ("1_000*x", 1, "found '_000' right after '1'"),
-        ("0x10", 1, "found 'x10' right after '0'"),
-        ("1.2.3", 3, "found '.3' right after '1.2'"),
-        ("sin(x)", 0, "found 'sin(', which looks like a function call"),
-        ("1 + sin (x)", 4, "function call"),
-        ("__import__('os')", 0, "function call"),
-        ("x + ", 4, "found the end of the text, expected a number, a name"),
-        ("x + * y", 4, "found '*', expected a number"),
-        ("x ^", 3, "end of the text"),
-        ("()", 1, "found ')', expected a number"),
-        ("x + (y", 4, "found '(' without its ')'"),
-        ("x + y)", 5, "found ')' without its '('"),
-        ("x + w", 4, "unknown name 'w': known are a, x, y, z"),
-        ("X + y", 0, "unknown name 'X': did you mean x?"),
-        ("x + xy", 4, "did you mean x*y?"),
-        ("x/0", 1, "found a division by 0"),
-        ("1 + x/(y - y)", 5, "found a division by 0"),
-        ("0^-1", 1, "found a division by 0"),
-        ("(x - x)^-1", 7, "found a division by 0"),
-        ("2 + x^y", 5, "found an exponent with variables in it, expected an intege"),
-        ("x^(1/2)", 1, "found the exponent 1/2, expected an intege"),
-        ("x^0.5", 1, "found the exponent 1/2, expected an intege"),
-        ("x = y", 2, "found the character '=', give one expression, not an equation"),
-        ("x, y", 1, "found the character ',', give one expression"),
-        ("x[1]", 1, "write brackets as ( )"),
-        ("x $ y", 2, "found the character '$', use numbers, names and"),
         ("x\N{MINUS SIGN}y", 1, "U+2212 MINUS SIGN, write the minus sign as -"),
         ("x\N{SUPERSCRIPT TWO}", 1, "write the power as ^2"),
-        ("x\0", 1, "U+0000"),
         ("ε*x", 0, "U+03B5 GREEK SMALL LETTER EPSILON"),
         ("x\N{NO-BREAK SPACE}+ y", 1, "U+00A0 NO-BREAK SPACE"),
         ("\ud800", 0, "U+D800"),
-        ("1e99999", 2, "power of ten"),
-        ("x**y**", 6, "end of the text"),
-        ("lambda: 1", 6, "':'"),
-        ("x if y else z", 2, "found 'if' right after 'x'"),
     ],
 )
-def test_a_mistake_is_named_at_its_column(text: str, column: int | None, message: str) -> None:
+def test_a_mistake_is_named_at_its_column(text: str, column: int | None, message: str):
     error = refusal(text)
     assert error.column == column
     assert message in error.message
 
 
 @pytest.mark.parametrize("value", [0.5, None, 1, b"x", fmpq(1), ["x"]])
-def test_only_text_is_parsed(value: object) -> None:
+def test_only_text_is_parsed(value: object):
     kind = InexactNumber if isinstance(value, float) else InputError
     for parse in (parse_number, parse_point, parse_constant):
         with pytest.raises(kind, match="as text"):
@@ -397,14 +295,14 @@ def test_only_text_is_parsed(value: object) -> None:
 
 
 @pytest.mark.parametrize("value", [0.5, None, "1/2", 3])
-def test_only_exact_values_are_printed(value: object) -> None:
+def test_only_exact_values_are_printed(value: object):
     kind = InexactNumber if isinstance(value, float) else InputError
     for print_it in (format_number, format_polynomial, format_rational_function, lambda it: format_point([it])):
         with pytest.raises(kind, match="expected a"):
             print_it(value)
 
 
-def test_constants_are_exact_numbers() -> None:
+def test_constants_are_exact_numbers():
     with pytest.raises(InexactNumber, match=r"found the machine number 0\.1"):
         parse_polynomial("a*x", NAMES, {"a": 0.1})  # type: ignore[dict-item]
     with pytest.raises(InputError, match="type int"):
@@ -418,19 +316,15 @@ def test_constants_are_exact_numbers() -> None:
     ("text", "answer"),
     [
         ("x", True),
-        ("x_1", True),
-        ("_", True),
         ("Eps2", True),
         ("", False),
         ("1x", False),
-        ("x y", False),
         ("x\n", False),
         ("ε", False),
-        ("x-1", False),
         ("x\N{ARABIC-INDIC DIGIT ONE}", False),
     ],
 )
-def test_a_name_is_an_ascii_identifier(text: str, answer: bool) -> None:
+def test_a_name_is_an_ascii_identifier(text: str, answer: bool):
     assert is_name(text) is answer
 
 
@@ -444,14 +338,14 @@ def test_a_name_is_an_ascii_identifier(text: str, answer: bool) -> None:
         ("xy", "found the text 'xy', expected a list of names"),
     ],
 )
-def test_bad_names_are_refused(names: list[str], message: str) -> None:
+def test_bad_names_are_refused(names: list[str], message: str):
     with pytest.raises(InputError, match=message):
         check_names(names)
     with pytest.raises(InputError, match=message):
         parse_polynomial("1", names)
 
 
-def test_a_variable_is_not_also_a_constant() -> None:
+def test_a_variable_is_not_also_a_constant():
     check_names(["x", "y"])
     with pytest.raises(InputError, match="found the name 'x' twice"):
         parse_polynomial("x", ["x"], {"x": THIRD})
@@ -463,54 +357,37 @@ POWERS = "(" + " + ".join(f"x^{i}*y^{j}*z^{k}" for i in range(8) for j in range(
 
 HOSTILE = {
     "code": "__import__('os').system('true')",
-    "tower of powers": "9**9**9",
     "higher tower": "9**9**9**9",
     "power of a power": "(9^1000)^1000",
     "exponent": "x^1001",
-    "exponent of many digits": "x^" + "9" * 5000,
-    "nested powers": "((((x^8)^8)^8)^8)",
     "nested powers of sums": "((((x + y)^8 + z)^8)^8)^8",
     "degree of a product": "*".join(["x"] * 65),
-    "degree of a quotient": "1/" + "/".join(["x"] * 65),
     "a million brackets": "(" * 10**6,
-    "brackets": "(" * 101 + "x" + ")" * 101,
     "a megabyte": "x+" * 500_000 + "x",
     "length": "x" + " " * 200_000,
-    "unknown long name": "q" * 199_999,
     "dense power": "(x + y + z + 1)^64",
     "long product of sums": "*".join(f"(x + {i}*y + z + 1)" for i in range(64)),
-    "squares of large sums": "+".join([f"{POWERS}^2"] * 25),
     "growing denominators": "+".join(f"1/(x + {i})" for i in range(1, 10_000)),
     "continued fraction": "1/(x + " * 99 + "1" + ")" * 99,
-    "decimal": "1e999999999",
     "digits": "9" * 100_001,
-    "product of digits": "*".join(["9^1000"] * 20_000),
     "large numbers": "+".join(["(9^999)^99"] * 18_000),
     "large decimals": "+".join(["1e9999"] * 25_000),
-    "small decimals": "+".join(f"1e-{9000 + i % 999}" for i in range(20_000)),
-    "growing common denominator": "+".join(f"x^{i % 32}*y^{i // 32 % 32}*z/{10**8 + i}" for i in range(8_000)),
     "large coefficients": "(9^900*x + 7^900*y + 5^900*z + 3)^30",
-    "many powers": "+".join(["(x + y + z + 1)^20"] * 10_000),
-    "NUL": "x + \0",
     "a bad end": "x+" * 9_990 + "$",
     "a missing end": "x+" * 9_990,
     "signs without end": "-" * 19_999,
 }
 
 
-# These take half a second each, for nobody knows at the beginning how large it will get.
-GROWING = {"squares of large sums", "growing denominators", "growing common denominator", "product of digits"}
-
-
-@pytest.mark.parametrize("name", quick(HOSTILE, HOSTILE.keys() - GROWING))
-def test_a_hostile_text_is_refused(name: str) -> None:
+@pytest.mark.parametrize("name", quick(HOSTILE, HOSTILE.keys() - {"growing denominators"}))
+def test_a_hostile_text_is_refused(name: str):
     text = HOSTILE[name]
     error = refusal(text)
     assert error.text == text
     assert len(str(error)) < 400
 
 
-def test_a_power_in_many_variables_is_refused() -> None:
+def test_a_power_in_many_variables_is_refused():
     names = [f"x{i}" for i in range(1, 17)]
     with pytest.raises(ExpressionError, match="3876 and 3876 terms, which is too large to expand"):
         parse_polynomial(f"({'+'.join(names)})^64", names)
@@ -533,7 +410,7 @@ def test_a_power_in_many_variables_is_refused() -> None:
         (Limits(words=100), "(x + y)^2", "(x + y + z)^9"),
     ],
 )
-def test_every_limit_has_two_sides(limits: Limits, good: str, bad: str) -> None:
+def test_every_limit_has_two_sides(limits: Limits, good: str, bad: str):
     parse_rational_function(good, NAMES, limits=limits)
     refusal(bad, limits)
 
@@ -543,34 +420,20 @@ def test_every_limit_has_two_sides(limits: Limits, good: str, bad: str) -> None:
     [
         ("x+" * 9_999 + "x", 10_000 * x),
         pytest.param("x+" * 99_999 + "x", 100_000 * x, marks=THOROUGH),
-        pytest.param("-" * 199_999 + "x", -x, marks=pytest.mark.slow),
         pytest.param("1^" * 99_999 + "1", x**0, marks=THOROUGH),
         pytest.param("x" + "*1" * 99_999, x, marks=pytest.mark.slow),
-        pytest.param("x" + "/1" * 99_999, x, marks=pytest.mark.slow),
         ("+".join(["x/2"] * 4_000), 2_000 * x),
         ("(" * 100 + "x" + ")" * 100, x),
         ("(x + y + 1)^64", (x + y + 1) ** 64),
     ],
-    ids=["sum", "long sum", "signs", "tower of ones", "product", "quotient", "halves", "brackets", "power"],
+    ids=["sum", "long sum", "tower of ones", "product", "halves", "brackets", "power"],
 )
-def test_a_long_text_within_the_limits_is_read(text: str, value: fmpq_mpoly) -> None:
+def test_a_long_text_within_the_limits_is_read(text: str, value: fmpq_mpoly):
     assert parse_polynomial(text, NAMES) == value
 
 
-def test_a_cubic_with_all_its_monomials_in_16_variables_is_read() -> None:
-    names = [f"x{i}" for i in range(1, 17)]
-    cubes = [(i, j, k) for i in range(16) for j in range(i, 16) for k in range(j, 16)]
-    assert len(cubes) == 816
-    numbers = {cube: fmpq(10**12 - 7 * n, 10**11 + 2 * n + 1) for n, cube in enumerate(cubes)}
-    text = " + ".join(f"{c}*" + "*".join(names[i] for i in cube) for cube, c in numbers.items())
-    exponents = {tuple(cube.count(i) for i in range(16)): c for cube, c in numbers.items()}
-    cubic = ring(names).from_dict(exponents)
-    assert parse_polynomial(text, names) == cubic
-    assert parse_polynomial(format_polynomial(cubic), names) == cubic
-
-
 @given(rational_functions, rational_functions, st.integers(-3, 3))
-def test_the_estimated_size_never_falls_short(left: RationalFunction, right: RationalFunction, power: int) -> None:
+def test_the_estimated_size_never_falls_short(left: RationalFunction, right: RationalFunction, power: int):
     a, b = format_rational_function(left), format_rational_function(right)
     text = f"({a} - {b} + x/2)^{power}*(1/7 - {a})/3"
     work = expressions._Arithmetic(text, RING, {}, Limits(), quotients=True)
@@ -584,22 +447,6 @@ def test_the_estimated_size_never_falls_short(left: RationalFunction, right: Rat
             assert all(c.q == 1 and abs(c.p) <= fmpz(2) ** part.bits for c in integers)
 
 
-def test_the_scale_of_a_product_makes_its_coefficients_integers() -> None:
-    work = expressions._Arithmetic("(x/2 + 1)*(x/3 + 1)", RING, {}, Limits(), quotients=True)
-    value = expressions._parse(work)
-    assert isinstance(value, tuple)
-    assert (value[0].scale, value[0].scale * value[0].value) == (6, (x + 2) * (x + 3))
-
-
-# Manners
-
-
-@pytest.mark.parametrize(("text", "sign"), [("--x", 1), ("---x", -1), ("-+-x", 1), ("+-x", -1), ("-(-(-x))", -1)])
-def test_signs_before_a_variable_multiply(text, sign):
-    assert parse_polynomial(text, NAMES) == sign * x
-    assert parse_polynomial(f"y - {text}", NAMES) == y - sign * x
-
-
 @pytest.mark.parametrize(
     ("good", "bad"),
     [
@@ -610,7 +457,23 @@ def test_signs_before_a_variable_multiply(text, sign):
         ("x" + " " * 199_999, "x" + " " * 200_000),
     ],
 )
-def test_the_limits_are_those_that_are_documented(good: str, bad: str) -> None:
+def test_the_limits_are_those_that_are_documented(good: str, bad: str):
     parse_rational_function(good, NAMES)
     with pytest.raises(ExpressionError):
         parse_rational_function(bad, NAMES)
+
+
+# Products.
+
+
+@given(rational_functions, nonzero, st.integers(0, 3))
+def test_what_is_printed_in_factors_is_read_back(function, factor, power):
+    product = RationalFunction(function.numerator * factor**power, function.denominator * factor)
+    for one in (product, RationalFunction(product.numerator, RING.constant(3))):
+        assert parse_rational_function(format_factored(one), NAMES) == one
+
+
+def test_zero_and_numbers_have_no_factors():
+    assert format_factored(RationalFunction(x - x, x**2)) == "0"
+    assert format_factored(RationalFunction(RING.constant(fmpq(-1, 2)), x**0)) == "-1/2"
+    assert format_product([], fmpq(-2, 3)) == "-2/3"

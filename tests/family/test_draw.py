@@ -1,22 +1,20 @@
 """Members of the family drawn from a seed.
 
-Specified here: the same seed gives the same member, for ever; the matrix has the spectrum asked for; the cubic belongs
-to it, is integral and involves every variable; large m is quick; and what cannot be drawn is refused.
+Specified here: a seed gives the same member, for ever; the matrix has the spectrum asked for; the cubic belongs to it,
+and its planar cubics have no repeated line; large m is quick; and what cannot be drawn is refused.
 """
-
-from __future__ import annotations
 
 import time
 
 import pytest
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.polynomials import gradient
 from kahanmaps.algebra.written.text import format_polynomial
-from kahanmaps.errors import InexactNumber, InputError
-from kahanmaps.family.cubics import belongs, cubic_space
+from kahanmaps.errors import InputError
+from kahanmaps.family.cubics import belongs
 from kahanmaps.family.draw import MAX_M, draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
-from kahanmaps.family.skew_hamiltonian import chi, defects, diagnosis, is_generic
+from kahanmaps.family.skew_hamiltonian import chi, defects
 
 t = fmpq_poly([0, 1])
 
@@ -31,16 +29,6 @@ over_draws = pytest.mark.parametrize("draw", DRAWS.values(), ids=DRAWS.keys())
 over_seeds = pytest.mark.parametrize("seed", range(5))
 
 
-@over_draws
-def test_the_same_seed_gives_the_same_member(draw):
-    assert draw(7) == draw(7)
-
-
-@over_draws
-def test_different_seeds_give_different_members(draw):
-    assert len({draw(seed) for seed in range(10)}) == 10
-
-
 def test_a_seed_gives_the_member_that_it_always_gave():
     # Records of experiments name members by seed: when this fails, old records no longer say what they were about.
     member = draw_with_chi(t**2 - 2, seed=7)
@@ -53,18 +41,6 @@ def test_a_seed_gives_the_member_that_it_always_gave():
 def test_the_matrix_is_skew_hamiltonian_and_the_cubic_belongs_to_it(draw, seed):
     member = draw(seed)
     assert (defects(member.A), belongs(member.A, member.H)) == ([], True)
-
-
-@over_draws
-@over_seeds
-def test_the_cubic_has_integer_coefficients(draw, seed):
-    assert {coefficient.q for coefficient in draw(seed).H.coeffs()} == {1}
-
-
-@over_draws
-@over_seeds
-def test_the_cubic_depends_on_every_variable(draw, seed):
-    assert all(not derivative.is_zero() for derivative in gradient(draw(seed).H))
 
 
 def determinant(rows):
@@ -84,20 +60,12 @@ PARTS = {
 
 
 @pytest.mark.parametrize("draw", PARTS.values(), ids=PARTS.keys())
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_no_planar_cubic_has_a_repeated_line(draw, seed):
     # det Hess H is the product of the D_i = det Hess h_i of the planar cubics, and D_i is a square if disc h_i = 0.
     member = draw(seed)
     hessian = determinant([list(gradient(component)) for component in gradient(member.H)])
     assert {multiplicity for _, multiplicity in hessian.factor()[1]} == {1}
-
-
-@pytest.mark.parametrize("values", [[3], [1, -2], ["1/2", 0, -7], [1, 1, 2], [5, 5, 5, 5]], ids=str)
-def test_the_eigenvalues_are_the_roots_of_chi(values):
-    product = fmpq_poly([1])
-    for value in values:
-        product *= t - (fmpq(1, 2) if value == "1/2" else fmpq(value))
-    assert chi(draw_with_eigenvalues(values, 1).A) == product
 
 
 @pytest.mark.parametrize("polynomial", [t - 5, t**2 - 2, t**3 - t - 1, (t - 1) ** 2 * (t**2 + 1), t**4], ids=str)
@@ -108,48 +76,6 @@ def test_chi_is_the_polynomial_asked_for(polynomial, seed):
 
 def test_a_polynomial_that_is_not_monic_counts_by_its_roots():
     assert draw_with_chi(3 * t**2 - 6, 1) == draw_with_chi(t**2 - 2, 1)
-
-
-def test_repeated_eigenvalues_give_a_diagonalisable_matrix():
-    assert "still diagonalisable" in diagnosis(draw_with_eigenvalues([1, 1, 2], 1).A)
-
-
-def test_a_chi_with_a_repeated_root_gives_a_matrix_that_is_not_diagonalisable():
-    assert "not diagonalisable" in diagnosis(draw_with_chi((t - 1) ** 2 * (t + 1), 1).A)
-
-
-@pytest.mark.parametrize("m", [1, 2, 3, 5])
-@over_seeds
-def test_a_generic_member_is_generic(m, seed):
-    member = draw_generic(m, seed)
-    assert (member.m, member.is_generic, is_generic(member.A)) == (m, True, True)
-
-
-def test_most_generic_members_have_an_irreducible_chi():
-    irreducible = [len(draw_generic(3, seed).factors) == 1 for seed in range(40)]
-    assert sum(irreducible) > 20
-
-
-@over_seeds
-def test_the_normal_form_is_hidden(seed):
-    A = draw_with_eigenvalues([1, -2, 3], seed).A
-    assert sum(A[i, j] != 0 for i in range(6) for j in range(6) if i != j) > 6
-
-
-@over_seeds
-def test_the_matrix_of_an_integral_spectrum_is_integral(seed):
-    assert {entry.q for entry in draw_with_eigenvalues([1, -2, 3], seed).A.entries()} == {1}
-
-
-def test_a_larger_size_gives_other_cubics_of_the_same_matrix():
-    small, large = (draw_with_eigenvalues([1, -2], 3, size) for size in (1, 50))
-    assert (small.A, small.H == large.H) == (large.A, False)
-
-
-def test_the_cubics_drawn_for_one_matrix_span_more_than_a_line():
-    member = draw_generic(2, 1)
-    assert cubic_space(member.A).dimension == 8
-    assert belongs(member.A, member.H + cubic_space(member.A).basis[0])
 
 
 @pytest.mark.parametrize("draw", [lambda: draw_generic(8, 1), lambda: draw_with_eigenvalues(range(8), 1)])
@@ -166,11 +92,6 @@ def test_random_eigenvalues_are_distinct_nonzero_integers_of_small_size(m):
     assert {abs(value) for values in drawn for value in values} <= set(range(1, m + 2))
 
 
-def test_random_eigenvalues_are_determined_by_the_seed():
-    assert random_eigenvalues(5, 3) == random_eigenvalues(5, 3)
-    assert random_eigenvalues(5, 3) != random_eigenvalues(5, 4)
-
-
 # What is refused.
 
 
@@ -180,21 +101,10 @@ def test_an_m_out_of_range_is_refused(m):
         draw_generic(m, 1)
 
 
-@pytest.mark.parametrize("values", [[], list(range(MAX_M + 1))], ids=len)
-def test_no_or_too_many_eigenvalues_are_refused(values):
-    with pytest.raises(InputError, match="expected 1 <= m"):
-        draw_with_eigenvalues(values, 1)
-
-
 @pytest.mark.parametrize("polynomial", [fmpq_poly([]), fmpq_poly([3])], ids=["zero", "constant"])
 def test_a_chi_without_roots_is_refused(polynomial):
     with pytest.raises(InputError, match="expected 1 <= m"):
         draw_with_chi(polynomial, 1)
-
-
-def test_a_machine_number_as_eigenvalue_is_refused():
-    with pytest.raises(InexactNumber):
-        draw_with_eigenvalues([1, 0.5], 1)
 
 
 @pytest.mark.parametrize("size", [0, -1])

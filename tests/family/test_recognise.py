@@ -5,8 +5,6 @@ A is forgotten an A with the same splitting is found again, and its normal form 
 structure nothing is found; and an A that leaves repeated roots is said not to be generic.
 """
 
-from __future__ import annotations
-
 import itertools
 import random
 from dataclasses import replace
@@ -17,10 +15,11 @@ from helpers import random_point
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from planar_helpers import invertible, moved
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import det, rank
-from kahanmaps.algebra.polynomials import linear_combinations, monomials, ring
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InputError
@@ -39,10 +38,9 @@ from kahanmaps.family.recognise import (
     recognised_member_of,
     structure_space,
 )
-from kahanmaps.family.skew_hamiltonian import chi, defects, evaluate_at_matrix, random_symplectic
+from kahanmaps.family.skew_hamiltonian import chi, evaluate_at_matrix, random_symplectic
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
 
@@ -51,15 +49,9 @@ GENERIC = {
     "m = 2, split": draw_with_eigenvalues([1, -2], 1),
     "m = 2, irreducible": draw_with_chi(t**2 - 2, 1),
     "m = 2, complex": draw_with_chi(t**2 + 1, 1),
-    "m = 3, split, fractions": draw_with_eigenvalues(["1/2", "-2/3", 4], 1),
     "m = 3, partly split": draw_with_chi((t - 1) * (t**2 + 1), 1),
     "m = 3, irreducible": draw_generic(3, 1),
-    "m = 3, of the paper": load("paper_m3").member,
-    "m = 3, of the paper, irreducible": load("paper_m3_irreducible").member,
-    "m = 4, split": draw_with_eigenvalues([1, -1, 0, 5], 2),
     "m = 4, twice the same field": draw_with_chi((t**2 - 2) * (t**2 - 2 * t - 1), 1),
-    "m = 4, two fields": draw_with_chi((t**2 + 1) * (t**2 - 2), 1),
-    "m = 5, irreducible": draw_with_chi(t**5 - t + 1, 1),
     "m = 5, partly split": draw_with_chi((t - 1) * (t + 3) * (t**3 - t - 1), 1),
     "m = 6, split": draw_with_eigenvalues([1, -2, 3, 5, -7, 4], 1),
 }
@@ -83,21 +75,6 @@ def found_in(hamiltonian: CubicHamiltonian):
     return found
 
 
-def moved(hamiltonian: CubicHamiltonian, R: fmpq_mat) -> CubicHamiltonian:
-    """The same system in the coordinates R x."""
-    context = ring(hamiltonian.variables)
-    H = hamiltonian.H.compose(*linear_combinations(R.inv(), context.gens()), ctx=context)
-    return CubicHamiltonian(H, R * hamiltonian.J * R.transpose())
-
-
-def random_invertible(n: int, seed: int) -> fmpq_mat:
-    rng = random.Random(seed)
-    while True:
-        R = fmpq_mat(n, n, [rng.randint(-2, 2) for _ in range(n * n)])
-        if det(R) != 0:
-            return R
-
-
 def random_cubic(n: int, seed: int) -> CubicHamiltonian:
     """Every coefficient drawn: no structure, but in dimension 2."""
     rng = random.Random(seed)
@@ -110,10 +87,6 @@ def involutions(member: FamilyMember) -> set[str]:
     return {str(B) for g in member.associated() for B in (g.B, -g.B)}
 
 
-def applied(matrix: fmpq_mat, vector) -> tuple[fmpq, ...]:
-    return tuple((matrix * fmpq_mat(len(vector), 1, list(vector))).entries())
-
-
 # A member that forgot its A.
 
 
@@ -124,13 +97,6 @@ def test_the_splitting_is_found_again(member):
     assert (found.dimension, found.member.H) == (member.m, member.H)
     assert involutions(found.member) == involutions(member)
     assert sorted(f.degree for f in found.member.factors) == sorted(f.degree for f in member.factors)
-
-
-@over_generic
-def test_the_forgotten_a_is_among_the_solutions(member):
-    space = structure_space(member.H)
-    flat = [X.entries() for X in space]
-    assert rank(QQ, fmpq_mat(flat)) == len(space) == rank(QQ, fmpq_mat([*flat, member.A.entries()]))
 
 
 @over_generic
@@ -153,18 +119,6 @@ def test_a_is_as_simple_as_it_can_be():
     assert found.A == fmpq_mat(4, 4, [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1])
 
 
-def test_the_field_has_a_generator_with_a_small_polynomial():
-    """Q(sqrt 2), given by the generator 7 + 30 sqrt 2."""
-    member = draw_with_chi(t**2 - 2, 5)
-    disguised = FamilyMember(evaluate_at_matrix(30 * t + 7, member.A), member.H)
-    assert chi(found_in(forgotten(disguised)).A) == t**2 - 2
-
-
-def test_two_searches_find_the_same():
-    hamiltonian = forgotten(draw_generic(4, 3))
-    assert found_in(hamiltonian).A == found_in(hamiltonian).A
-
-
 @given(
     st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]),
     st.integers(0, 10**6),
@@ -185,8 +139,7 @@ def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
 # Nothing to be found.
 
 
-@pytest.mark.parametrize("n", [4, 6, 8])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("n", "seed"), [(4, 0), (4, 1), (6, 2)])
 def test_a_cubic_without_structure_is_no_member(n, seed):
     hamiltonian = random_cubic(n, seed)
     assert [
@@ -197,16 +150,10 @@ def test_a_cubic_without_structure_is_no_member(n, seed):
     assert reason_against(hamiltonian).startswith("only the multiples of I")
 
 
-def test_one_term_that_couples_the_parts_destroys_the_splitting():
-    assert recognised_member(cubic("x1^3 + x3^3 + x2^3 + x4^3", 4)) is not None
-    assert recognised_member(cubic("x1^3 + x3^3 + x2^3 + x4^3 + x1*x3*x2", 4)) is None
-
-
 @pytest.mark.parametrize(
     ("H", "J", "reason"),
     [
         ("x1^3 + x1*x2", [[0, 1], [-1, 0]], "H is not a homogeneous cubic"),
-        ("x1^3 + 1", [[0, 1], [-1, 0]], "H is not a homogeneous cubic"),
         ("x1^3", [[0, 0], [0, 0]], "J is singular"),
         ("x1^3", [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], "the dimension is 3, expected an even one"),
     ],
@@ -227,41 +174,16 @@ def test_the_size_is_limited():
         structure_space(hamiltonian.H)
 
 
-@pytest.mark.parametrize("name", ["henon_heiles", "three_wave", "weierstrass", "harmonic", "planar_cubic_hamiltonian"])
-def test_these_systems_of_the_catalogue_are_no_members(name):
-    assert recognised_member(load(name).hamiltonian) is None
-
-
 # All solutions.
 
 
-@pytest.mark.parametrize("n", [2, 4, 6])
-def test_of_zero_every_skew_hamiltonian_matrix_is_a_solution(n):
-    space = structure_space(ring(default_variables(n)).constant(0))
-    assert len(space) == n * (n - 1) // 2  # m(2m-1)
-    assert all(defects(X) == [] for X in space)
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("n", [2, 4, 6])
-def test_the_solutions_for_any_structure_satisfy_both_conditions(n, seed):
-    member = draw_with_chi([t, t**2 - 2, (t - 1) * (t**2 + 1)][n // 2 - 1], seed)
-    hamiltonian = moved(forgotten(member), random_invertible(n, seed))
-    space = structure_space(hamiltonian.H, hamiltonian.J)
-    assert len(space) == n // 2
-    for A in space:
-        assert A.transpose() * hamiltonian.J == hamiltonian.J * A
-        assert belongs(A, hamiltonian.H)
-        assert all(entry.q == 1 for entry in A.entries())
-
-
 @pytest.mark.parametrize("n", [4, 6])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
     """The same conditions, written down for all n^2 entries of A; H has few terms, so that solutions abound."""
     rng = random.Random(seed)
     H = ring(default_variables(n)).from_dict({e: fmpq(rng.randint(1, 3)) for e in rng.sample([*monomials(n, 3)], 4)})
-    R = random_invertible(n, seed)
+    R = invertible(n, seed)
     J = R * standard_structure(n) * R.transpose()
     rows = []
     for left, sign in [(J, 1), *((third, -1) for third in third_derivatives(H))]:
@@ -279,58 +201,7 @@ def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
     assert len(structure_space(H, J)) == n * n - rank(QQ, fmpq_mat(rows))
 
 
-def test_a_few_conditions_are_not_taken_for_all():
-    """Here three combinations of the conditions have a solution more than all of them."""
-    H = parse_polynomial("-1/2*x2^2*x7 + x4*x5*x7", default_variables(8))
-    assert all(belongs(A, H) for A in structure_space(H))
-
-
-def test_the_basis_generates_all_integer_solutions():
-    """The idempotent of q1 + q2, p1 + p2 has entries 1/2: of the a E + b (I - E) the integral ones are a = b mod 2."""
-    space = structure_space(parse_polynomial("(x1+x2)^3 + (x3+x4)^3 + (x1-x2)^2*(x3-x4)", default_variables(4)))
-    gram = fmpq_mat(
-        [[sum((a * b for a, b in zip(X.entries(), Y.entries(), strict=True)), fmpq(0)) for Y in space] for X in space]
-    )
-    assert len(space) == 2
-    assert det(gram) == 16  # I and the exchange of the two, orthogonal, both of squared length 4
-
-
 # Another structure J.
-
-
-@over_generic
-def test_another_structure_is_brought_to_the_standard_one(member):
-    R = random_invertible(member.dim, member.dim)
-    hamiltonian = moved(forgotten(member), R)
-    found = found_in(hamiltonian)
-    assert not found.is_standard
-    assert found.T * standard_structure(member.dim) * found.T.transpose() == hamiltonian.J
-    assert found.A.transpose() * hamiltonian.J == hamiltonian.J * found.A
-    assert belongs(found.A, hamiltonian.H)
-    # x = R z: what was B in the coordinates z is R^-T B R^T.
-    inverse, back = R.inv().transpose(), found.T.inv().transpose()
-    expected = {str(s * inverse * g.B * R.transpose()) for g in member.associated() for s in (1, -1)}
-    assert {str(s * back * g.B * found.T.transpose()) for g in found.member.associated() for s in (1, -1)} == expected
-
-
-@over_generic
-def test_in_the_new_coordinates_the_normal_form_steps_like_the_system(member):
-    hamiltonian = moved(forgotten(member), random_invertible(member.dim, 5))
-    found = found_in(hamiltonian)
-    form = normal_form(found.member)
-    x = random_point(member.dim, 1)
-    y = form.point(*form.step(*form.coordinates(applied(found.T.inv(), x)), "1/10"))
-    assert applied(found.T, y) == KahanMap(hamiltonian.system, "1/10").step(x)
-
-
-@pytest.mark.parametrize("n", [2, 4, 6, 8])
-def test_coordinates_that_make_a_structure_standard(n):
-    R = random_invertible(n, n)
-    T = darboux_coordinates(R * standard_structure(n) * R.transpose())
-    assert T * standard_structure(n) * T.transpose() == R * standard_structure(n) * R.transpose()
-    assert darboux_coordinates(standard_structure(n)) == fmpq_mat(
-        n, n, [int(i == j) for i in range(n) for j in range(n)]
-    )
 
 
 def test_pairs_in_another_order_are_only_put_in_order():
@@ -364,28 +235,7 @@ def test_in_the_plane_every_homogeneous_cubic_is_a_member():
     assert found.text == "every homogeneous cubic in dimension 2 is a member, with A = I and chi = (t - 1)"
 
 
-@pytest.mark.parametrize("m", [2, 3, 4])
-def test_equal_eigenvalues_of_the_forgotten_a_do_not_matter(m):
-    """A = 2 I on all parts: H splits all the same."""
-    found = found_in(forgotten(draw_with_eigenvalues([2] * m, 1)))
-    assert found.is_generic
-    assert [factor.root for factor in found.member.factors] == list(range(1, m + 1))
-
-
-def test_identical_parts_are_told_apart():
-    found = found_in(
-        moved(cubic("x1^3 + x1*x4^2 + x2^3 + x2*x5^2 + x3^3 + x3*x6^2", 6), random_symplectic(3, random.Random(1)))
-    )
-    assert (found.is_generic, found.dimension) == (True, 3)
-
-
-def test_a_cubic_may_split_further_than_the_declared_a():
-    """One factor of chi is declared, (t - 1)^2 (t - 2); the part of the first one splits as well."""
-    member = draw_with_eigenvalues([1, 1, 2], 3)
-    assert (len(member.factors), len(found_in(forgotten(member)).member.factors)) == (2, 3)
-
-
-@pytest.mark.parametrize("power", [2, 3, 4])
+@pytest.mark.parametrize("power", [2, 3])
 def test_nilpotent_structure_is_found_and_not_generic(power):
     member = draw_with_chi((t - 5) ** power, 1)
     found = found_in(forgotten(member))
@@ -397,13 +247,6 @@ def test_nilpotent_structure_is_found_and_not_generic(power):
     assert found.text == (f"H does not split: A, not scalar, with A Hess(H) = Hess(H) A^T has chi = (t - 1)^{power}")
 
 
-def test_a_field_with_nilpotent_elements_is_found():
-    found = found_in(forgotten(draw_with_chi((t**2 + 1) ** 2, 1)))
-    assert (found.is_generic, found.dimension) == (False, 4)
-    assert [(factor.degree, factor.multiplicity) for factor in found.member.factors] == [(2, 2)]
-    assert evaluate_at_matrix(found.member.factors[0].polynomial, found.A) != found.A * 0
-
-
 def test_a_part_that_cannot_be_split_keeps_a_repeated_root():
     """A planar part beside one of dimension 4 without structure."""
     H = "x1^3 + x4^3 + x2^3 + x5^3 + x3^3 + x6^3 + x2*x3*x5"
@@ -412,7 +255,7 @@ def test_a_part_that_cannot_be_split_keeps_a_repeated_root():
     assert sorted(factor.multiplicity for factor in found.member.factors) == [1, 2]
 
 
-@pytest.mark.parametrize("n", [2, 4, 6, 8])
+@pytest.mark.parametrize("n", [2, 6])
 @pytest.mark.parametrize("H", ["0", "x1^3", "x1^2*x2", "(x1+x2)^3"])
 def test_a_cubic_of_few_variables_is_found(n, H):
     hamiltonian = cubic(H, n)
@@ -433,30 +276,7 @@ def test_solutions_that_do_not_commute_are_dealt_with():
     assert (found.is_generic, found.dimension) == (True, 8)
 
 
-def test_a_lagrangian_cubic_has_nilpotent_structure_only():
-    """H(q1, q2, q3) without structure: A = c I + [[0, X], [0, 0]], X skew."""
-    found = found_in(cubic("x1^3 + x2^3 + x3^3 + x1^2*x2 - x2^2*x3 + 5*x1*x2*x3", 6))
-    assert (found.is_generic, found.dimension) == (False, 4)
-
-
 # Systems of which not even H is given.
-
-
-@over_generic
-def test_a_system_of_equations_is_recognised(member):
-    system = forgotten(member).system
-    assert recognised_hamiltonian(system) == forgotten(member)
-    found = recognised_member_of(system)
-    assert found is not None
-    assert found.A == found_in(forgotten(member)).A
-
-
-def test_the_hamiltonian_may_have_terms_of_lower_degree():
-    hamiltonian = CubicHamiltonian(
-        parse_polynomial("x1^2*x4 - 1/2*x2*x3 + x4^2 + 3*x1 - x3 + x2^3", default_variables(4)), standard_structure(4)
-    )
-    assert recognised_hamiltonian(hamiltonian.system) == hamiltonian
-    assert recognised_member_of(hamiltonian.system) is None
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz", "euler_top", "volterra_periodic_4"])
@@ -464,11 +284,6 @@ def test_what_has_no_hamiltonian_is_no_member(name):
     assert recognised_hamiltonian(load(name).system) is None
     assert recognised_member_of(load(name).system) is None
     assert reason_against(recognised_hamiltonian(load(name).system)) == "x' is not J grad H with J = [[0, I], [-I, 0]]"
-
-
-def test_a_system_that_is_hamiltonian_for_twice_the_structure_has_half_the_hamiltonian():
-    system = QuadraticSystem.from_text(["q", "p"], ["6*p^2", "-6*q^2"])
-    assert str(recognised_hamiltonian(system).H) == "2*q^3 + 2*p^3"
 
 
 # What was found is checked.
@@ -488,10 +303,8 @@ def test_a_member_of_another_system_is_refused():
     ("before", "after"),
     [
         ([-12, 0, 1], [-3, 0, 1]),  # t^2 = 12, so that X/2 has the square 3
-        ([-18, 0, 1], [-2, 0, 1]),
         ([7, 6, 1], [-2, 0, 1]),  # (t + 3)^2 = 2: X + 3
         ([-54, 0, 0, 1], [-2, 0, 0, 1]),
-        ([-2, 0, 1], [-2, 0, 1]),
     ],
 )
 def test_an_element_is_made_simpler_by_an_integer_shift_and_divisor(before, after):

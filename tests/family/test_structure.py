@@ -4,19 +4,15 @@ Specified here: what is declared is taken as it is, what is not is looked for; t
 for another J; and where there is none the reason is said.
 """
 
-from __future__ import annotations
-
 import pytest
-from flint import fmpq, fmpq_poly
+from flint import fmpq_poly
 from helpers import EULER_TOP, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, random_point
-from planar_helpers import diagonal, invertible, moved, over_members, structure_and_system
+from planar_helpers import invertible, moved, over_members, structure_and_system
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.written.text import parse_polynomial
-from kahanmaps.documents.catalog import load
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
@@ -55,13 +51,6 @@ def test_the_same_member_not_declared_is_found_with_simpler_roots():
     assert found.text == "a hidden member of the family, chi = (t - 1)*(t - 2)"
 
 
-@pytest.mark.parametrize("chi", [t**2 - 2, t**2 + 1, (t - 1) * (t**2 + 1)], ids=str)
-def test_a_member_whose_chi_does_not_split_has_a_structure_too(chi):
-    found = structure_of(draw_with_chi(chi, 1).chosen.system)
-    assert isinstance(found, Structure)
-    assert found.form.chi.degree() == chi.degree()
-
-
 @over_members
 def test_the_structure_steps_like_the_system(name):
     structure, system = structure_and_system(name)
@@ -78,27 +67,6 @@ def test_with_another_J_there_is_a_change_of_coordinates(n):
     assert steps_like(found, other.system)
     # x = S z alone, without T, are other coordinates
     assert not steps_like(Structure(found.form, None, False, ""), other.system)
-
-
-def test_with_the_standard_J_there_is_none():
-    member = draw_with_eigenvalues([1, -2], 2)
-    standard = CubicHamiltonian(member.H, standard_structure(4))
-    assert structure_of(standard.system, standard).T is None
-
-
-def test_a_hamiltonian_in_a_plane_has_the_plane_for_its_structure():
-    found = structure_of(hamiltonian("x1^3 + x1*x2^2", 2).system)
-    assert (found.form.m, found.T) == (1, None)
-
-
-@pytest.mark.parametrize("name", ["paper_m3", "paper_m3_irreducible"])
-def test_the_members_of_the_catalogue_have_a_structure(name):
-    entry = load(name)
-    declared = structure_of(entry.system, entry.hamiltonian, entry.member)
-    hidden = structure_of(entry.system)
-    assert (declared.declared, hidden.declared) == (True, False)
-    assert steps_like(declared, entry.system)
-    assert steps_like(hidden, entry.system)
 
 
 # None, with the reason.
@@ -125,19 +93,6 @@ def test_a_member_with_a_repeated_root_has_no_normal_form():
     assert structure_of(member.chosen.system, member=member) == NoStructure("chi has a repeated root")
 
 
-def test_a_recognised_member_with_a_repeated_root_has_none_either():
-    # H depends on x1 and x2 alone, and does not split: A is nilpotent or a multiple of I, up to the rest.
-    system = hamiltonian("x1^2*x2", 4).system
-    assert structure_of(system) == NoStructure("chi has a repeated root")
-
-
 def test_a_dimension_that_is_too_large_is_not_searched():
     system = hamiltonian("x1^3", 34).system
     assert structure_of(system) == NoStructure("the dimension 34 is above 32")
-
-
-def test_a_declared_member_need_not_be_the_simplest():
-    H = parse_polynomial("x1^3 + x3^3 + x2^3 + 2*x4^3", default_variables(4))
-    member = FamilyMember(diagonal([fmpq(5, 3), 7] * 2), H)
-    found = structure_of(hamiltonian("x1^3 + x3^3 + x2^3 + 2*x4^3", 4).system, member=member)
-    assert found.text == "a member of the family, chi = (t - 5/3)*(t - 7)"

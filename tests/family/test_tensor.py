@@ -3,8 +3,6 @@
 The algebra is a product of fields or has nilpotent elements; what is not over an algebra is not taken for it.
 """
 
-from __future__ import annotations
-
 import random
 
 import pytest
@@ -112,10 +110,6 @@ def test_a_perturbed_system_is_no_longer_over_the_algebra():
     assert tensor_structure(moved) is None
     with pytest.raises(InputError, match="C does not make this a system"):
         TensorStructure(moved, C, t**2 - 2)
-
-
-def test_where_f_does_not_depend_on_all_variables_nothing_is_said():
-    assert tensor_structure(QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "0", "0"])) is None
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,6 @@ Specified here: the points in the file are those of the orbit; the file grows by
 leaves what it had computed; an orbit that ends early leaves the points before that.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -22,23 +20,6 @@ from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1", "1/2", "1/3"]
-
-
-def test_the_file_holds_the_points_of_the_orbit(tmp_path):
-    end = stream_orbit(FloatOrbit(EULER_TOP, "1/10", START, 100, every=7, kernel="numpy"), tmp_path / "x.npy")
-    points = dict(FloatOrbit(EULER_TOP, "1/10", START, 100, every=7, kernel="numpy"))
-    assert (end.status, end.steps) == ("completed", 100)
-    assert np.array_equal(np.load(tmp_path / "x.npy"), np.array(list(points.values())))
-
-
-def test_the_file_of_an_ensemble_holds_its_records(tmp_path):
-    starts = np.random.default_rng(0).uniform(-1, 1, (5, 3))
-    rows = FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy").stream(tmp_path / "x.npy", 50, 5)
-    assert rows == 11
-    assert np.array_equal(
-        np.load(tmp_path / "x.npy"),
-        np.concatenate(list(FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy").records(50, 5))),
-    )
 
 
 def test_orbits_that_have_ended_are_nan_in_the_file(tmp_path):

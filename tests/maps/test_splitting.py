@@ -1,20 +1,17 @@
 """The planes of a normal form over Q, over prime fields and over real balls.
 
-Specified here: a point comes back from its triples, in every field, split or not, and also where J is not the standard
-one; one step in every plane is the step of the Kahan map; a prime at which chi has a repeated root is refused.
+Specified here: one step in every plane is the step of the Kahan map, in every field, split or not, and also where J is
+not the standard one; a prime at which chi has a repeated root is refused.
 """
 
-from __future__ import annotations
-
 import pytest
-from flint import fmpq
 from helpers import random_point, step_or_none
-from planar_helpers import over_members, over_split, over_unsplit, structure_and_system
+from planar_helpers import over_members, structure_and_system
 
 from kahanmaps.algebra.fields import CC, GF, QQ, RR
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form.splitting import Splitting, rational_factors
+from kahanmaps.maps.normal_form.splitting import Splitting
 
 FIELDS = [QQ, GF(11), GF(101), GF(10007), GF(2**61 - 1), GF(2**89 - 1), RR(128)]
 over_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
@@ -28,15 +25,6 @@ def splitting_of(name, field, eps="1/10"):
 def same(field, left, right) -> bool:
     with field.working():
         return all(field.equal(a, b) for a, b in zip(left, right, strict=True))
-
-
-@over_members
-@over_fields
-def test_a_point_comes_back_from_its_triples(name, field):
-    splitting, _ = splitting_of(name, field)
-    for seed in range(3):
-        x = tuple(map(field.convert, random_point(splitting.dim, seed)))
-        assert same(field, splitting.point(splitting.triples(x)), x)
 
 
 @over_members
@@ -56,46 +44,6 @@ def test_a_step_in_every_plane_is_a_step_of_the_kahan_map(name, field):
             assert same(field, splitting.point(images), expected)
             stepped += 1
     assert stepped > 0
-
-
-@over_members
-@over_fields
-def test_any_lift_of_the_triples_is_the_same_point(name, field):
-    splitting, _ = splitting_of(name, field)
-    x = tuple(map(field.convert, random_point(splitting.dim, 5)))
-    with field.working():
-        lifts = [tuple(entry * (k + 3) for entry in P) for k, P in enumerate(splitting.triples(x))]
-    assert same(field, splitting.point(lifts), x)
-
-
-@over_members
-@over_fields
-def test_the_planes_have_the_whole_dimension(name, field):
-    splitting, _ = splitting_of(name, field)
-    assert 2 * sum(plane.degree for plane in splitting.planes) == splitting.dim
-    for i, plane in enumerate(splitting.planes):
-        rows = splitting.matrix(i)
-        assert (len(rows), {len(row) for row in rows}) == (splitting.dim, {2 * plane.degree})
-
-
-@over_split
-def test_over_q_a_point_is_the_sum_of_its_planes(name):
-    splitting, _ = splitting_of(name, QQ)
-    x = random_point(splitting.dim, 3)
-    total = [fmpq(0)] * splitting.dim
-    for i, (U, V, _) in enumerate(splitting.triples(x)):
-        u, v = U / fmpq(1, 5), V / fmpq(1, 5)
-        total = [entry + row[0] * u + row[1] * v for entry, row in zip(total, splitting.matrix(i), strict=True)]
-    assert tuple(total) == x
-
-
-@over_unsplit
-def test_over_q_a_generator_is_integral_and_the_planes_have_the_degrees_of_the_factors(name):
-    structure, _ = structure_and_system(name)
-    planes = Splitting(structure.form, QQ, 1, structure.T).planes
-    assert sum(plane.degree for plane in planes) == structure.form.m
-    for plane in planes:
-        assert plane.degree == 1 or plane.block.a.field.chi.denom() == 1
 
 
 @pytest.mark.parametrize(
@@ -121,13 +69,6 @@ def test_planes_are_the_factors_of_chi_in_the_field(name, field, degrees):
     assert sorted(plane.degree for plane in splitting.planes) == degrees
 
 
-def test_planes_over_q_are_named_after_their_roots_in_increasing_order():
-    splitting, _ = splitting_of("m = 3", QQ)
-    assert [plane.name for plane in splitting.planes] == ["t = 1", "t = 2", "t = 3"]
-    chi = splitting.form.chi
-    assert [-factor[0] for factor in rational_factors(chi)] == [1, 2, 3]
-
-
 @pytest.mark.parametrize(
     ("name", "prime"), [("m = 2, sqrt 2", 2), ("m = 2, i", 2), ("m = 3", 2), ("m = 3, a cubic field", 23)]
 )
@@ -145,12 +86,6 @@ def test_an_eps_that_is_zero_or_has_no_value_is_refused(field, eps):
 def test_complex_balls_are_refused():
     with pytest.raises(InputError, match="expected QQ, GF"):
         splitting_of("m = 2", CC(64))
-
-
-def test_a_point_of_another_dimension_is_refused():
-    splitting, _ = splitting_of("m = 2", QQ)
-    with pytest.raises(InputError, match="3 coordinates, expected 4"):
-        splitting.triples([fmpq(1)] * 3)
 
 
 @over_fields
