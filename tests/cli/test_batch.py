@@ -3,8 +3,6 @@
 The tasks that go wrong are those of tests/experiments/fault_tasks.py.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -144,14 +142,6 @@ def test_all_mistakes_of_a_spec_are_told_and_nothing_is_begun(batch):
     assert not Path("study.db").exists()
 
 
-def test_absurd_products_are_refused_and_may_be_allowed(batch):
-    absurd = SPACE.replace("0..2", "0..9999999999")
-    done = batch("run", absurd, "--dry-run")
-    assert done.status == 2
-    assert "found 20,000,000,000 tasks, expected at most 1,000,000" in done.err
-    assert batch("run", absurd, "--dry-run --max-tasks 20000000000").status == 0
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -183,11 +173,6 @@ def test_wrong_use_is_status_2_and_a_sentence(batch, words: str, message: str, s
     assert "Traceback" not in done.err
 
 
-def test_results_that_no_experiment_asks_for_are_told(batch, space):
-    batch("run", SPACE.replace("2..3", "3..3"), "-q")
-    assert "3 more results belong to tasks that no experiment has now" in batch("status --db study.db").out
-
-
 def test_the_database_may_be_named_in_the_environment(batch, monkeypatch: pytest.MonkeyPatch, space):
     monkeypatch.setenv("KAHANMAPS_DB", "study.db")
     assert batch("status").status == 0
@@ -203,12 +188,6 @@ def test_show_has_all_that_is_known_of_a_task(batch, space):
     assert data["result"]["dimension"] == 8
     assert data["places"] == [{"experiment": "space", "number": 0}]
     assert data["attempts"] == 1
-
-
-def test_show_tells_the_verdict_of_a_check(batch):
-    batch("run", '[experiments.one]\ntask = "check-measure"\nsystem = "euler_top"\n', "-q")
-    key = batch("export --db study.db --jsonl").records[1]["key"]
-    assert "\noutcome\tok\nverdict\tproved\n" in batch(f"show {key} --db study.db").out
 
 
 def test_a_task_can_be_redone_from_what_show_prints(batch):
@@ -426,18 +405,3 @@ def test_two_batches_do_not_write_to_one_database(batch, start):
     assert done.status == 2
     assert "another batch is writing to study.db" in done.err
     assert batch("status --db study.db").status == 0  # looking is allowed
-
-
-@pytest.mark.slow
-def test_the_documented_shell_examples_run(tmp_path: Path):
-    (tmp_path / "study.toml").write_text(SPACE)
-    script = """
-    set -e
-    kahanmaps batch run study.toml -q --shard 1/2 --db part1.db
-    kahanmaps batch run study.toml -q --shard 2/2 --db part2.db
-    kahanmaps batch merge study.db part1.db part2.db
-    kahanmaps batch export --db study.db --jsonl | grep -c '"record": "result"'
-    """
-    done = shell(script, tmp_path)
-    assert done.status == 0, done.err
-    assert done.out.splitlines()[-1] == "6"

@@ -4,8 +4,6 @@ Starts come from text, .npy files, standard input or a seed; whatever is wrong w
 .npy file that is written is valid at every moment, and what a row means follows from --every.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import shlex
@@ -17,7 +15,6 @@ import numpy as np
 import pytest
 from cli_helpers import COMMAND, shell
 
-from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps_cli.runs import ensemble_starts
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
@@ -145,15 +142,6 @@ def test_near_singular_steps_are_counted(kahanmaps, tmp_path):
     assert found["near_singular"] == {"steps": 1, "orbits": 1, "first": {"orbit": 1, "step": 0}}
 
 
-def test_an_integral_that_is_none_is_seen_to_move(kahanmaps, pair):
-    outcome = kahanmaps("ensemble", pair, "--random 9 --eps 1/10 --steps 50 --kernel numpy --integral x1 --json")
-    last = outcome.json["drift"][-1]
-    assert last["name"] == "x1"
-    assert last["largest"] > 0.1
-    lines = summary(kahanmaps("ensemble", pair, "--random 9 --eps 1/10 --steps 50 --kernel numpy --integral x1"))
-    assert lines["drift"][-1].startswith("x1\tat most ")
-
-
 def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):
     command = f"{TOP} --random 40 --steps 5 --arithmetic mod:{PRIME} --integral F1 --integral y=x1 --json"
     first, second = kahanmaps(command).json["drift"]
@@ -178,14 +166,6 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
         kahanmaps(f"{TOP} --random 3 --steps 1000 --every 500{more} -o", path)
         assert two.tolist() == np.load(path)[::2].tolist()
         assert two.dtype == (np.int64 if "mod" in more else np.float64)
-
-
-def test_a_file_of_residues_is_valid_after_every_row(tmp_path):
-    with NpyFile(tmp_path / "r.npy", (2, 1), "<i8") as file:
-        assert np.load(tmp_path / "r.npy").shape == (0, 2, 1)
-        for k in range(12):
-            file.append(np.array([[[k], [PRIME]]]))
-            assert np.load(tmp_path / "r.npy").tolist() == [[[j], [PRIME]] for j in range(k + 1)]
 
 
 # Interrupts

@@ -5,8 +5,6 @@ with a message that says what was found and what is expected; 3 undecided or sto
 130 interrupted. (70 and 130 are in test_main.py and test_orbit.py.) Wrong use prints nothing on standard output.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -18,9 +16,6 @@ from kahanmaps_cli.screen.render import exit_status
 
 COMMANDS = table(Path(__file__).with_name("exit_statuses.txt"))
 TOP = "euler_top --start 1,2,3 --eps 1/10"
-ROTATION = "--vars x,y --rhs y --rhs=-x"
-SQUARE = "--vars x --rhs x^2"  # the Kahan map x/(1 - 2 eps x) ...
-AT_ITS_POLE = f"{SQUARE} --start 1 --eps 1/2"  # ... where it has no value
 
 
 def report(verdict: Verdict, ended_early: bool = False, control: Verdict = Verdict.REFUTED) -> Report:

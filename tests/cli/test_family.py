@@ -3,8 +3,6 @@
 What a seed draws is the same everywhere. Files that are written are read by every other command.
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
 from fractions import Fraction
@@ -44,24 +42,6 @@ def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
     assert (shown["system"], shown["m"], shown["dim"]) == ("drawn", m, 2 * m)
 
 
-def test_the_eigenvalues_are_those_asked_for(kahanmaps, tmp_path):
-    kahanmaps("family new --eigenvalues 3,-1/2 -o", tmp_path / "a.toml")
-    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
-    assert [(factor["factor"], factor["multiplicity"]) for factor in shown["factors"]] == [("t + 1/2", 1), ("t - 3", 1)]
-
-
-def test_chi_is_the_one_asked_for_made_monic(kahanmaps, tmp_path):
-    kahanmaps("family new --chi '2*(t - 1)*(t^2 - 2)' -o", tmp_path / "a.toml")
-    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
-    assert shown["chi"] == "t^3 - t^2 - 2*t + 2"
-
-
-def test_repeated_eigenvalues_are_said_not_to_be_generic(kahanmaps):
-    outcome = kahanmaps("family new --eigenvalues 1,1")
-    assert outcome.status == 0
-    assert "A is not generic: chi = (t - 1)^2 has repeated roots" in outcome.err
-
-
 def test_signs_pick_an_associated_system(kahanmaps, tmp_path):
     kahanmaps("family new --eigenvalues 1,2 --seed 4 --signs 1,-1 -o", tmp_path / "a.toml")
     assert tomllib.loads((tmp_path / "a.toml").read_text())["family"]["signs"] == [1, -1]
@@ -79,12 +59,6 @@ def test_a_file_gets_what_standard_output_would(kahanmaps, tmp_path):
 # show
 
 
-def test_a_member_is_shown_to_people(kahanmaps, pair):
-    lines = kahanmaps("family show", pair).out.splitlines()
-    assert lines[0] == "pair: m = 2, dimension 4, variables x1, x2, x3, x4"
-    assert [line.partition(" = ")[0] for line in lines[-2:]] == ["H_0", "H_1"]
-
-
 def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
     shown = kahanmaps("family show", pair, "--normal-form --json").json
     form = shown.pop("normal_form")
@@ -92,15 +66,6 @@ def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
     assert set(form) == {"chi", "h", "D", "S", "h_in_powers_of_t", "parts"}
     assert (form["chi"], [len(c) for c in form["h_in_powers_of_t"]]) == (shown["chi"], [2, 2, 2, 2])
     assert [(part["root"], part["weight"]) for part in form["parts"]] == [("-2", "-1/3"), ("1", "1/3")]
-
-
-def test_people_see_the_normal_form_after_the_member(kahanmaps, pair):
-    lines = kahanmaps("family show", pair, "--normal-form").out.splitlines()
-    plain = kahanmaps("family show", pair).out.splitlines()
-    form = kahanmaps("family show", pair, "--normal-form --json").json["normal_form"]
-    assert lines[: len(plain) + 1] == [*plain, "normal form over Q[t]/chi, chi = t^2 + t - 2:"]
-    assert {f"h = {form['h']}", f"D = {form['D']}"} <= set(lines)
-    assert [line.split() for line in lines[-4:]] == form["S"]
 
 
 @pytest.mark.parametrize("options", ["--eigenvalues 1,1", "--chi (t-1)^2"])
@@ -172,39 +137,6 @@ def test_another_structure_is_shown_in_coordinates_that_make_it_standard(kahanma
     assert "\ny = S z with" in out
 
 
-def test_a_homogeneous_cubic_in_the_plane_is_a_member(kahanmaps):
-    assert kahanmaps("family show nahm_tetrahedral --json").json["found"]["A"] == [["1", "0"], ["0", "1"]]
-
-
-@pytest.mark.parametrize(
-    ("name", "kind", "reason"),
-    [
-        ("henon_heiles", "hamiltonian", "H is not a homogeneous cubic"),
-        ("three_wave", "hamiltonian", "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"),
-        ("lorenz", "system", "x' is not J grad H with J = [[0, I], [-I, 0]]"),
-    ],
-)
-def test_where_nothing_is_found_it_is_said_what_was_looked_for(kahanmaps, name, kind, reason):
-    outcome = kahanmaps(f"family show {name}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert f"{name} is of kind [{kind}], expected one of kind [family]. An A that makes it a member" in outcome.err
-    assert reason in outcome.err
-
-
-# space
-
-
-def test_the_unknowns_are_the_cubic_monomials(kahanmaps, pair):
-    space = kahanmaps("family space", pair, "--json").json
-    assert (space["unknowns"], space["unknowns"] - space["rank"]) == (20, space["dimension"])  # 4*5*6/6
-
-
-@pytest.mark.parametrize("matrix", ["1,0;0,1", " 1, 0 ; 0, 1 ", "1/2,0;0,0.5"])
-def test_the_matrix_may_stand_on_the_command_line(kahanmaps, matrix):
-    # m = 1: every cubic in two variables
-    assert kahanmaps(f"family space --matrix '{matrix}' --json").json["basis"] == ["x1^3", "x1^2*x2", "x1*x2^2", "x2^3"]
-
-
 # associated
 
 
@@ -249,8 +181,3 @@ def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanm
     assert kahanmaps("check-measure", file).status == 0
     statements = kahanmaps("analyze", file, "--seconds 1 --json").json
     assert statements["algebra"]["text"] == "a system in 3 variables over K = Q[t]/(t^2 - 2)"
-
-
-def test_a_parameter_t_is_the_generator_of_the_algebra(kahanmaps):
-    text = kahanmaps("family tensor --vars x --rhs t*x^2 -p t=0 --algebra t^2+1").out
-    assert 'rhs = ["-2*x_0*x_1", "x_0^2 - x_1^2"]' in text

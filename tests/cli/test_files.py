@@ -4,8 +4,6 @@ an internal error.
 The commands and their options are found from the tree of commands, so that a new one has to be entered in `READS`.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -299,18 +297,6 @@ def places(value: Any) -> Iterator[tuple[Any, Any]]:
             yield from places(value[key])
 
 
-@pytest.mark.parametrize("damage", [b"", b"PK", b"\x93NUMPY\x01\x00"])
-@pytest.mark.parametrize(
-    "line", ["plot portrait --from x.npz", "plot portrait --from x.npy", "plot degrees --from x.npy"]
-)
-def test_a_damaged_file_gives_2(kahanmaps, tmp_path, monkeypatch, line, damage):
-    monkeypatch.chdir(tmp_path)
-    Path(line.split()[-1]).write_bytes(damage)
-    outcome = kahanmaps(line)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert outcome.err.startswith(f"Error: {line.split()[-1]}: found no ")
-
-
 # Readers that leave
 
 
@@ -352,10 +338,6 @@ def test_a_reader_that_has_left_changes_no_exit_status(kahanmaps, unread, least_
 def test_a_batch_goes_on_when_nobody_reads_its_records(unread, kahanmaps, least_folder):
     assert unread("batch run SPEC --db new.db --jsonl -q") == 0
     assert kahanmaps("batch status --db new.db --json").json["experiments"][0]["missing"] == 0
-
-
-def test_an_orbit_ends_early_when_its_reader_leaves(unread):
-    assert unread("orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007") == 3
 
 
 def test_a_command_ends_early_when_the_reader_of_its_pipe_leaves(tmp_path):

@@ -1,7 +1,5 @@
 """kahanmaps find-integrals: formulas that check-integrals accepts, honest words where there are none, no traceback."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -9,9 +7,6 @@ from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.version import __version__
-
-OSCILLATOR = "--vars x,y --rhs y --rhs=-x+x^2"
-RAMP = "--vars x,y --rhs x --rhs 3*y"
 
 
 def without_claims(name):
@@ -23,26 +18,6 @@ def without_claims(name):
         if not skips:
             kept.append(line)
     return "\n".join(kept) + "\n"
-
-
-def test_formulas_verdicts_and_what_was_measured(kahanmaps):
-    outcome = kahanmaps("find-integrals nahm_tetrahedral")
-    assert outcome.status == 0
-    assert outcome.out.splitlines() == [
-        "find-integrals: nahm_tetrahedral, every eps (the time step is 2 eps)",
-        "I1\tproved\ty*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)",
-        "\trelations of degree 3 along orbits: both sides are the same rational function, for every eps",
-        "found\t1 functionally independent; in all 1 independent (1 by theorems: 1 modified Hamiltonian; "
-        "measured: relations of degree up to 3 along orbits show no more)",
-    ]
-
-
-def test_symbols(kahanmaps):
-    outcome = kahanmaps("find-integrals euler_top --symbolic a1,a2,a3,eps -q")
-    assert (outcome.status, outcome.err) == (0, "")
-    first = outcome.out.splitlines()[0]
-    assert first == "find-integrals: euler_top, every eps (the time step is 2 eps), every a1, a2, a3"
-    assert all(f"a{k}" in outcome.out for k in (1, 2, 3))
 
 
 @pytest.mark.parametrize(
@@ -114,51 +89,6 @@ def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
     assert again.json == found
 
 
-def test_latex(kahanmaps):
-    outcome = kahanmaps("find-integrals nahm_tetrahedral --latex")
-    assert outcome.out.startswith("I1 = \\frac{")
-    assert outcome.status == 0
-
-
-@pytest.mark.parametrize(("command", "steps"), [(f"{OSCILLATOR} --eps 1", 4), ("--vars x --rhs 1+x^2 --eps 1/2", 4)])
-def test_a_map_that_is_periodic_at_this_eps_is_told(kahanmaps, command, steps):
-    outcome = kahanmaps(f"find-integrals {command}")
-    eps = command.split()[-1]
-    note = f"note\torbits close after {steps} steps: at eps = {eps} the map is periodic (measured); "
-    assert outcome.status == 0
-    assert note + "nothing follows for other eps" in outcome.out.splitlines()
-    assert "every eps" not in outcome.out
-    assert kahanmaps(f"find-integrals {command} --json").json["relations"]["period"] == steps
-
-
-@pytest.mark.slow
-def test_henon_heiles_at_eps_1(kahanmaps):
-    outcome = kahanmaps("find-integrals henon_heiles --eps 1")
-    assert "nothing follows for other eps" in outcome.out
-    assert "every eps" not in outcome.out
-
-
-def test_the_zero_system(kahanmaps):
-    outcome = kahanmaps("find-integrals --vars x,y --rhs 0 --rhs 0")
-    assert outcome.status == 0
-    assert "note\torbits close after 1 step at every eps that was tried: the map is periodic (measured)" in outcome.out
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        (f"{RAMP} --eps 1", "at eps = 1 the map has no value anywhere: det(I - eps f'(x)) is identically 0"),
-        (f"{RAMP} --eps -1/3", "at eps = -1/3 the map is not invertible: det(I + eps f'(x)) is 0 at all images"),
-        ("--vars x --rhs x --eps 1", "the map has no value anywhere"),
-    ],
-)
-def test_maps_that_are_none_give_3(kahanmaps, command, words):
-    outcome = kahanmaps(f"find-integrals {command}")
-    assert outcome.status == 3
-    assert outcome.out.splitlines()[1] == "orbits\tnot measured"
-    assert words in outcome.out
-
-
 def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.LIFTS", ())
     outcome = kahanmaps("find-integrals clebsch_first_flow --max-degree 2 --json")
@@ -174,44 +104,6 @@ def test_integrals_in_iterates_are_shown_with_the_others(kahanmaps):
     assert "p1*m1~*eps^2" in one["integral"]
     assert r"\tilde{p_1}" in one["latex"]
     assert f"# I4: {one['integral']}" in kahanmaps("find-integrals lagrange_top --max-degree 2 --toml").out
-
-
-def test_too_little_time_gives_3(kahanmaps):
-    outcome = kahanmaps("find-integrals lorenz --max-degree 20 --seconds 1")
-    assert outcome.status == 3
-    assert "and more were not tried: too many unknowns or too little time" in outcome.out
-
-
-def test_bases_of_given_polynomials(kahanmaps):
-    outcome = kahanmaps(
-        "find-integrals lagrange_top --monomials 'm1^2+m2^2,m1*p1+m2*p2,p1^2+p2^2,p3^2,p3,1' --monomials m3,1"
-    )
-    lines = outcome.out.splitlines()
-    assert outcome.status == 0
-    assert lines[0] == (
-        "Hirota-Kimura bases: lagrange_top, generic eps, measured on two orbits modulo each of two primes"
-    )
-    assert [line.split("\t")[0] for line in lines if line.startswith("dim")][1] == "dimension 1"
-    assert "\tcoefficients that are integrals: 1" in lines
-
-
-def test_bases_in_json(kahanmaps):
-    found = kahanmaps("find-integrals euler_top --monomials x1^2,x2^2,x3^2,1 --eps 1/3 --json").json
-    assert (found["command"], found["eps"], found["time_step"], found["version"]) == (
-        "hirota-kimura",
-        "1/3",
-        "2/3",
-        __version__,
-    )
-    assert found["bases"][0]["dimension"] == 2
-    assert (found["note"], found["reason"], len(found["primes"])) == ("", "", 2)
-
-
-def test_bases_where_orbits_close_or_are_none(kahanmaps):
-    closes = kahanmaps(f"find-integrals {OSCILLATOR} --eps 1 --monomials x^2,y^2,x,y,1")
-    assert (closes.status, "nothing follows for other eps" in closes.out) == (0, True)
-    none = kahanmaps(f"find-integrals {RAMP} --eps 1 --monomials x,y")
-    assert (none.status, "no value anywhere" in none.out) == (3, True)
 
 
 def test_symbols_in_a_family_file_are_refused(kahanmaps, tmp_path):

@@ -1,7 +1,5 @@
 """Help: examples first and as they stand, lines that fit 80 columns, commands under headings."""
 
-from __future__ import annotations
-
 import click
 import pytest
 from command_tree import all_commands, all_examples, examples_in, words_of

@@ -4,8 +4,6 @@ The options are found from the commands themselves, so that a new one is covered
 for each kind of them. No outcome is an internal error, none is a traceback, and no line repeats a long text.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import sqlite3

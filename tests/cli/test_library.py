@@ -1,7 +1,5 @@
 """The list of names that commands take from the library: each is there, and used, and nothing is left in it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

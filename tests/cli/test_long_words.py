@@ -1,7 +1,5 @@
 """Compositions too large to be multiplied out: every command steps them, or says in one line that it needs formulas."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -4,8 +4,6 @@ Data goes to standard output, talk to standard error. Whatever happens to these 
 a sentence and an exit status, never a traceback.
 """
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
@@ -73,19 +71,6 @@ def test_version_is_one_line(kahanmaps):
 def test_the_version_command_names_what_is_computed_with(kahanmaps):
     expected = {"kahanmaps", "python", "python-flint", "flint", "numpy", "click", "rich"}
     assert set(kahanmaps("version --json").json) == expected
-
-
-# Suggestions
-
-
-@pytest.mark.parametrize(
-    ("written", "meant"), [("eulr_top", "euler_top"), ("volterra", "volterra_periodic_3"), ("Lorenz", "lorenz")]
-)
-@pytest.mark.parametrize("command", ["orbit {} --start 1,2,3 --eps 1/10 --steps 1", "check-measure {}", "systems {}"])
-def test_a_misspelt_system_is_recognised(kahanmaps, command, written, meant):
-    outcome = kahanmaps(command.format(written))
-    assert outcome.status == 2
-    assert meant in outcome.err.partition("did you mean")[2]
 
 
 # Errors become messages

@@ -1,7 +1,5 @@
 """Maps that are not Kahan's on the command line: what takes them, and what says that it does not."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -9,9 +7,7 @@ from pathlib import Path
 import pytest
 from schema_helpers import mistakes
 
-from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import read_system
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.maps.convention import NO_EPS
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
@@ -110,17 +106,6 @@ def test_pictures_and_pages_of_maps(kahanmaps, tmp_path, command):
     assert output.stat().st_size > 5000
 
 
-def test_starts_are_chosen_for_fields_only(kahanmaps, tmp_path):
-    found = kahanmaps(f"plot portrait lyness -o {tmp_path}/p.svg")
-    assert (found.status, "expected --start X, --starts FILE or --random N" in found.err) == (2, True)
-
-
-def test_a_map_on_the_line_with_a_parameter(kahanmaps):
-    found = kahanmaps("find-integrals --vars x,y --image 'y; (a + y)/x' -p a=3 --symbolic a -q")
-    assert "I1\tproved\t(x^2*y + x*y^2 + x^2 + y^2 + x*a + y*a + x + y + a)/(x*y)" in found.out
-    assert "for every a" in found.out
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -138,33 +123,9 @@ def test_a_witness_of_a_map_without_eps_has_none(kahanmaps, command):
     assert not re.search(r"\beps\b", kahanmaps(f"{command} -q").out)
 
 
-def test_an_ensemble_names_the_denominator_of_its_map(kahanmaps):
-    found = kahanmaps("ensemble lyness --random 5 --steps 20 --arithmetic mod:101 -q")
-    assert "det M(x) = 0 at step 11" in found.out
-
-
-def test_commands_about_fields_do_not_ask_for_eps_first(kahanmaps):
-    assert "expected a quadratic vector field" in kahanmaps("plot drift lyness --start 1,2").err
-    assert "it is an explicit map" in kahanmaps("period lyness --start 1,2").err
-
-
 def test_a_page_about_a_map_without_eps_does_not_speak_of_it(kahanmaps, tmp_path):
     kahanmaps(f"report lyness --seconds 3 -o {tmp_path}/page.html -q")
     text = re.sub(
         r"<style.*?</style>|<svg.*?</svg>|<script.*?</script>", "", (tmp_path / "page.html").read_text(), flags=re.S
     )
     assert not re.search(r"\beps\b|ε|time step", text)
-
-
-def test_a_notebook_shows_the_analysis_of_a_map():
-    found = analyze(load("lyness"), seconds=3)
-    assert "y~ = (y + 3)/x" in found._repr_html_()
-    assert not re.search(r"\beps\b", found._repr_html_())
-
-
-def test_equations_in_the_place_of_a_system_are_one(kahanmaps):
-    shear, turn = "\"x' = y^2; y' = 0\"", "\"x' = y; y' = -x\""
-    assert kahanmaps(f"check-commute {turn} \"x' = -3*y; y' = 3*x\" -q").status == 0
-    assert kahanmaps(f"check-commute {shear} {turn} -q").status == 1
-    assert kahanmaps("scan \"x' = y^2; y' = -x + a*y\" --over a -q").status == 0
-    assert "give a SYSTEM" in kahanmaps(f"degrees {turn} --vars x,y").err

@@ -1,7 +1,5 @@
 """On a terminal lines are broken at words, whatever its width; in a pipe they stay whole."""
 
-from __future__ import annotations
-
 import re
 import shlex
 

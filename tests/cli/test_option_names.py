@@ -1,7 +1,5 @@
 """One name for one thing: options that several commands share have one spelling, one metavar and one meaning."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import click

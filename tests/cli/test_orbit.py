@@ -4,8 +4,6 @@ The JSON lines are an interface: a header from which the orbit can be made again
 what happened.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -70,18 +68,6 @@ def test_the_header_has_the_documented_shape(kahanmaps):
     }
 
 
-def test_a_point_has_the_integrals_that_were_asked_for(kahanmaps):
-    records = kahanmaps(f"{TOP} --steps 0 --integral F1 --integral s=x1+x2 --format jsonl").records
-    # by hand: F1 = (1 - eps^2 x2^2)/(1 + 2 eps^2 x3^2) = (399/400)/(902/900)
-    assert records[1]["integrals"] == {"F1": "3591/3608", "s": "3/2"}
-
-
-def test_the_end_of_a_periodic_orbit_has_the_period(kahanmaps):
-    # x~ = -y, y~ = x at eps = 1: a quarter turn
-    end = kahanmaps("orbit harmonic --start 1,0 --eps 1 --steps 10 --format jsonl").records[-1]
-    assert (end["status"], end["steps"], end["period"]) == ("periodic", 10, 4)
-
-
 @pytest.mark.parametrize(
     ("command", "status", "steps"),
     [
@@ -120,13 +106,6 @@ def test_at_picks_iterates(kahanmaps):
     assert picked[1:-1] == [every[1 + step] for step in (0, 4, 6)]
 
 
-def test_every_picks_multiples(kahanmaps):
-    every = kahanmaps(f"{TOP} --steps 8 --format jsonl").records
-    picked = kahanmaps(f"{TOP} --steps 8 --every 3 --format jsonl").records
-    assert picked[1:-1] == [every[1 + step] for step in (0, 3, 6)]
-    assert picked[-1] == every[-1]
-
-
 # Where the system comes from
 
 
@@ -142,27 +121,7 @@ def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_co
     assert piped.records[1:] == from_catalogue
 
 
-def test_parameters_are_set_with_p(kahanmaps):
-    assert kahanmaps(f"{TOP} -p a1=5/2 -p a3=0.5 --steps 1 --format jsonl").records[0]["rhs"] == [
-        "5/2*x2*x3",
-        "-2*x1*x3",
-        "x1*x2/2",
-    ]
-
-
 # Integrals
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007"])
-def test_a_conserved_integral_keeps_its_value(kahanmaps, arithmetic):
-    outcome = kahanmaps(f"{TOP} --steps 5 --integral F1 --arithmetic {arithmetic} --format jsonl")
-    assert len({record["integrals"]["F1"] for record in outcome.records[1:-1]}) == 1
-
-
-def test_known_integrals_are_those_of_theorems_and_of_the_file(kahanmaps, pair):
-    assert kahanmaps(f"{TOP} --steps 1 --integral known").rows[0][4:] == ["F1", "F2"]
-    names = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known").rows[0][5:]
-    assert {"modified H", "H~", "K~_+-"} <= set(names)
 
 
 def test_known_integrals_of_a_member_of_the_family_are_conserved(kahanmaps, pair):
@@ -174,13 +133,6 @@ def test_integrals_of_theorems_are_refused_in_floats(kahanmaps, pair):
     outcome = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known --arithmetic float")
     assert outcome.status == 2
     assert "needs exact, mod:P or ball:BITS arithmetic" in outcome.err
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:64"])
-def test_an_integral_has_no_value_at_a_pole(kahanmaps, arithmetic):
-    outcome = kahanmaps(f"{TOP} --steps 1 --integral p=1/(x1-1) --arithmetic {arithmetic} --format jsonl")
-    assert outcome.status == 0
-    assert [record["integrals"]["p"] is None for record in outcome.records[1:-1]] == [True, False]
 
 
 # Formats
@@ -249,14 +201,6 @@ def test_npz_holds_residues_as_integers(npz, kahanmaps, prime):
     assert found.x.tolist() == fractions(kahanmaps(f"{command} --format jsonl"))
 
 
-def test_npz_holds_floats_as_they_are(npz, kahanmaps):
-    command = f"{TOP} --steps 3 --arithmetic float"
-    found = npz(command)
-    assert found.x.dtype == np.float64
-    records = kahanmaps(f"{command} --format jsonl").records
-    assert found.x.tolist() == [[float(entry) for entry in record["x"]] for record in records[1:-1]]
-
-
 def test_npz_holds_header_and_end(npz, kahanmaps):
     command = f"{TOP} --steps 3 --integral F1"
     found = npz(command)
@@ -287,12 +231,6 @@ def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monke
 
 
 # Files
-
-
-@pytest.mark.parametrize("form", ["jsonl", "csv"])
-def test_the_name_of_the_file_says_the_format(kahanmaps, tmp_path, form):
-    kahanmaps(f"{TOP} --steps 2 -o", tmp_path / f"orbit.{form}")
-    assert (tmp_path / f"orbit.{form}").read_text() == kahanmaps(f"{TOP} --steps 2 --format {form}").out
 
 
 def test_what_a_csv_file_is_of_stands_beside_it(kahanmaps, tmp_path):
@@ -363,11 +301,6 @@ def test_in_narrow_columns_long_numbers_are_decimals_with_their_digits_as_well()
     assert "(30/28)" not in terminal(*shlex.split(f"{TOP} --steps 1"), columns=64).out
 
 
-def test_columns_are_aligned_on_a_terminal(on_terminal):
-    table = [line for line in on_terminal.out.splitlines() if "#" not in line]
-    assert len({len(line) for line in table}) == 1
-
-
 def test_npz_is_refused_on_a_terminal():
     outcome = terminal(*shlex.split(f"{TOP} --steps 5 --format npz"))
     assert (outcome.status, outcome.out) == (2, "")
@@ -397,12 +330,6 @@ def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(interrupted):
     assert (end["record"], end["status"]) == ("end", "interrupted")
     assert steps == list(range(0, end["steps"] + 1, 100))
     assert len(steps) > 1
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "float"])
-def test_integrals_are_those_of_eps_also_backward(kahanmaps, arithmetic):
-    run = kahanmaps(f"{TOP} --steps 1 --backward --integral e=10*eps --arithmetic {arithmetic} --format jsonl")
-    assert {float(record["integrals"]["e"]) for record in run.records if record["record"] == "point"} == {1.0}
 
 
 # Methods.
@@ -489,13 +416,6 @@ def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
         assert len(middle) >= 40
 
 
-def test_automatic_balls_work_without_a_normal_form(kahanmaps):
-    start = "--start 1/10,1/10,1/10,1/10 --eps 1/10 --steps 100 --every 100"
-    run = kahanmaps(f"orbit henon_heiles {start} --arithmetic ball:auto --format jsonl")
-    assert (run.status, run.records[-1]["status"]) == (0, "completed")
-    assert run.records[0]["arithmetic"].startswith("ball:")
-
-
 # Float orbits in .npy files, and what their end says.
 
 
@@ -511,19 +431,6 @@ def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path, every):
     assert outcome.err.startswith(f"{tmp_path / 'x.npy'}: completed: 30 steps; block integrals moved by at most ")
 
 
-def test_an_interrupted_npy_file_is_valid(tmp_path):
-    path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**10} --arithmetic float --every 10 --kernel numpy -o {path}"
-    process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
-    while not path.exists() or path.stat().st_size < 2000:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    err = process.communicate(timeout=60)[1]
-    assert process.returncode == 130
-    step = int(err.rpartition("interrupted after step ")[2])
-    assert np.load(path).shape == (step // 10 + 1, 3)
-
-
 def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singular_steps(kahanmaps):
     end = kahanmaps(f"{MEMBER} --steps 30 --arithmetic float --format jsonl").records[-1]
     assert list(end["drift"]) == [f"h/(1 + eps^2 D) at t = {root}" for root in (1, 2, 3)]
@@ -531,13 +438,6 @@ def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singul
     assert f"moved by at most {max(end['drift'].values()):.3g}" in end["message"]
     end = kahanmaps(f"{TOP} --steps 5 --arithmetic float --format jsonl").records[-1]
     assert (end["near_singular"], end["message"], "drift" in end) == (0, "5 steps", False)
-
-
-def test_balls_that_no_precision_makes_accurate_end_with_that_status(kahanmaps):
-    # x~ = (1 - 1) x / (1 + 1): zero, but no ball around it is
-    run = kahanmaps("orbit --vars x --rhs=-3*x --start 1 --eps 1/3 --steps 3 --arithmetic ball:auto --format jsonl")
-    assert (run.status, run.records[-1]["status"]) == (3, "precision")
-    assert "give 15 digits at every point" in run.records[-1]["message"]
 
 
 @pytest.mark.parametrize("method", ["generic", "normal-form", "doubling"])

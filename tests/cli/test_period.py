@@ -4,13 +4,10 @@ Walking the orbit gives the same number where that is short enough; at a pole th
 the orbit continued.
 """
 
-from __future__ import annotations
-
 import random
 
 import pytest
 
-PAIR = "--start 1/2,-1/5,0,1 --eps 1/10"
 M3 = "paper_m3 --start 1,2,3,4,5,6 --eps 1/11"
 
 # H = x^3/3 + x y^2 with J = [[0, 3], [-3, 0]]: a member in coordinates of its own
@@ -67,57 +64,6 @@ def test_the_period_is_that_of_the_orbit_walked(kahanmaps, pair, files, name, st
     assert compared >= 4
 
 
-def test_the_period_is_printed_with_a_line_for_each_plane(kahanmaps, pair):
-    assert kahanmaps("period", pair, PAIR, "--arithmetic mod:10007").out.splitlines() == [
-        "# pair, eps = 1/10 (time step 2 eps = 1/5), mod:10007 arithmetic",
-        "period\t17121375",
-        "plane\tt = 10005 mod 10007\tperiod 5073\ta smooth level cubic",
-        "plane\tt = 1 mod 10007\tperiod 10125\ta smooth level cubic",
-        "poles\tthe orbit meets none",
-        "# periodic: the orbit has period 17121375 and meets no pole of the map",
-    ]
-
-
-def test_that_a_pole_is_met_is_told(kahanmaps, pair):
-    out = kahanmaps("period", pair, "--start 1/2,-1/3,0,1 --eps 1/10 --arithmetic mod:2305843009213693951").out
-    assert "period\t332306998856115862344354572863389520\n" in out
-    assert "poles\tthe orbit meets one\n" in out
-    assert "continued through its poles the orbit has period" in out.splitlines()[-1]
-
-
-def test_over_the_rationals_an_orbit_is_proved_aperiodic(kahanmaps, pair):
-    outcome = kahanmaps("period", pair, PAIR, "--json")
-    assert (outcome.status, outcome.json["status"], outcome.json["period"]) == (0, "aperiodic", None)
-    assert [plane["reason"] for plane in outcome.json["planes"]] == [
-        "T has the orders 18 and 56 modulo 101 and 103",
-        "T has the orders 34 and 50 modulo 101 and 103",
-    ]
-    assert outcome.json["planes"][0]["field_size"] is None
-    assert "period\tnone\n" in kahanmaps("period", pair, PAIR).out
-
-
-def test_modulo_two_the_map_is_the_identity(kahanmaps, pair):
-    options = "--start 1,0,1,1 --eps 1/7 --arithmetic mod:2"
-    assert walked(kahanmaps, ("orbit", pair, options), 9)["period"] == 1
-    outcome = kahanmaps("period", pair, options, "--json")
-    assert (outcome.status, outcome.json["period"]) == (0, "1")
-
-
-def test_a_field_too_large_gives_3_and_says_so(kahanmaps, pair):
-    outcome = kahanmaps("period", pair, f"--start 1,2,3,4 --eps 1 --arithmetic mod:{2**255 - 19} --json")
-    assert (outcome.status, outcome.json["status"], outcome.json["period"]) == (3, "undecided", None)
-    assert "more than about 2^192" in outcome.json["planes"][0]["reason"]
-    assert "undecided: the period was not found" in outcome.err
-
-
-def test_a_start_where_the_map_has_no_value_gives_3(kahanmaps):
-    # H = x y^2/2 with a repeated factor: at y = 1/eps = 1 a pole of the map that nothing leads on from
-    outcome = kahanmaps("period --vars x,y --rhs x*y --rhs=-y^2/2 --start 2,1 --eps 1 --json")
-    assert (outcome.status, outcome.json["status"], outcome.json["period"]) == (3, "undefined", None)
-    assert outcome.json["meets_pole"] is True
-    assert "cannot be continued" in outcome.err
-
-
 def test_recognised_members_have_periods(kahanmaps):
     # the right-hand sides of paper_m3, with nothing said of A
     rhs = kahanmaps("systems paper_m3 --json").json["rhs"]
@@ -131,26 +77,3 @@ def test_recognised_members_have_periods(kahanmaps):
 def test_a_prime_that_the_coordinates_of_the_normal_form_do_not_have_is_refused(kahanmaps, files):
     outcome = kahanmaps("period", files / "scaled.toml", "--start 1,2 --eps 1 --arithmetic mod:3")
     assert (outcome.status, "the prime 3 divides" in outcome.err) == (2, True)
-
-
-# Levels
-
-
-def test_the_levels_with_a_period_are_printed(kahanmaps):
-    assert kahanmaps("period --levels 6").out.splitlines()[1:] == [
-        "period 6 only\t-27*gamma + 28",
-        "rational gamma\t28/27",
-    ]
-    assert "rational gamma\tnone" in kahanmaps("period --levels 7").out
-
-
-def test_the_levels_of_a_system_are_those_of_its_planes(kahanmaps):
-    text = "--vars u,v --rhs 2*u^2-2*u*v+6*v^2 --rhs -4*u*v+v^2"
-    assert "(h/(1 + eps^2*D))^2 = 1/324" in kahanmaps(f"period {text} --eps 1/2 --levels 5").out
-    assert "no real level" in kahanmaps(f"period {text} --eps 1/2 --levels 9").out
-    assert "gamma = 1" not in kahanmaps(f"period {text} --eps 1/2 --levels 5").out
-
-
-def test_a_plane_whose_cubic_has_a_square_has_no_level_with_a_period(kahanmaps):
-    said = "none but perhaps 0: disc(h) = 0, so that gamma = 1 on every level"
-    assert said in kahanmaps("period --vars u,v --rhs u^2 --rhs -2*u*v --eps 1/2 --levels 5").out

@@ -1,7 +1,5 @@
 """kahanmaps plot batch."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

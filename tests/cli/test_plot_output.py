@@ -1,7 +1,5 @@
 """Where pictures go and how they are remade: colours in a terminal, `plot recipe`."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps_cli.pictures.output import _seen_on_both_grounds

@@ -1,7 +1,5 @@
 """kahanmaps plot portrait: what is drawn from which words, what is said, exit statuses, stored orbits, wrong use."""
 
-from __future__ import annotations
-
 import signal
 
 import numpy as np
@@ -11,7 +9,6 @@ import kahanmaps as km
 from kahanmaps.documents.catalog import load
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.portraits import draw_portrait as drawing
-from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli.pictures.stored import read_orbits
 from kahanmaps_cli.screen.progress import Progress
 
@@ -40,19 +37,6 @@ def test_a_portrait_is_drawn_in_the_terminal_unless_a_file_is_named(kahanmaps):
     assert outcome.status == 0
     assert any("\N{BRAILLE PATTERN BLANK}" < mark <= "\N{BRAILLE PATTERN DOTS-12345678}" for mark in outcome.out)
     assert outcome.err == "lotka_volterra: 1 orbit, 30 steps, eps = 1/20 (time step 2 eps = 1/10)\n"
-
-
-def test_lines_between_steps_are_told_where_orbits_fill_no_curve(kahanmaps):
-    said = "fill no curve that could be followed: lines join each point"
-    assert said in kahanmaps("plot portrait paper_m2 --eps 1/20 --start 1,2,3,4 --steps 50 --lines").err
-    assert said not in kahanmaps("plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 900 --lines").err
-
-
-def test_a_file_carries_its_recipe(kahanmaps, tmp_path):
-    assert kahanmaps(LV + " --size 4 -q -o", tmp_path / "lv.svg").status == 0
-    recipe = read_recipe(str(tmp_path / "lv.svg"))
-    assert recipe.command.startswith(f"kahanmaps {LV}")
-    assert 'rhs = ["x*(a - b*y)"' in recipe.system
 
 
 def test_a_long_title_is_set_in_lines_and_no_formula(kahanmaps, monkeypatch):
@@ -127,11 +111,6 @@ def test_of_more_than_two_variables_the_axes_are_chosen_and_said(kahanmaps, draw
     assert len(drawn[0][0].labels) == 2
 
 
-def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
-    assert "1 orbit, 100 steps" in kahanmaps("plot portrait riccati --eps 1/10 --start 0").err
-    assert drawn[0][0].labels == ("step", "$x$")
-
-
 def test_a_plane_over_the_step_has_no_arrows(kahanmaps, drawn):
     assert kahanmaps(LV + " --axes x,y,step").status == kahanmaps(LV).status == 0
     assert [len(portrait.flow.places) > 0 for portrait, _ in drawn] == [False, True]
@@ -159,15 +138,6 @@ def test_points_outside_are_counted_on_standard_error_and_in_the_picture(kahanma
     outcome = kahanmaps("plot portrait --vars x,y --rhs x --rhs y --eps 1/4 --start 1,1 --steps 40")
     assert "points lie outside the window" in outcome.err
     assert drawn[0][1]["note"] == f"{drawn[0][0].left_out} points outside"
-
-
-def test_an_orbit_that_ends_early_is_drawn_and_the_status_is_3(kahanmaps, tmp_path):
-    outcome = kahanmaps(
-        "plot portrait --vars x --rhs x^2 --eps 1 --start 1/2 --start 3 --steps 5 -o", tmp_path / "a.png"
-    )
-    assert outcome.status == 3
-    assert "1 of 2 orbits ended early: met a singular matrix I - eps f'" in outcome.err
-    assert (tmp_path / "a.png").exists()
 
 
 def test_a_density_counts_every_point(kahanmaps, drawn):

@@ -1,7 +1,5 @@
 """`print` of a result shows what its command prints, and `rows()` is what tables are made of."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import pytest

@@ -1,7 +1,5 @@
 """kahanmaps report: pages of an analysis, of verify, of checks and of a batch; what is refused; exit statuses."""
 
-from __future__ import annotations
-
 import pytest
 from cli_helpers import shell
 from page_helpers import require_sound

@@ -1,7 +1,5 @@
 """What others wrote obeys nobody: texts of files on terminals, in pipes, pages and tables, commands printed."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

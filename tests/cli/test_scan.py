@@ -1,7 +1,5 @@
 """kahanmaps scan: blocks of components, files of members, and what stops it."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import signal

@@ -1,7 +1,5 @@
 """`kahanmaps schema`, and the schemas themselves: complete, closed, described, in the words of the code."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

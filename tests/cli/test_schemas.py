@@ -3,8 +3,6 @@
 A schema that lets everything pass says nothing, so keys are left out, added and misspelt as well.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Iterator
@@ -19,7 +17,6 @@ from schema_helpers import is_wrong, mistakes, schema_of
 Run = Callable[..., Outcome]
 
 COMMANDS = table(Path(__file__).with_name("json_commands.txt"))
-ORBIT = "--eps 1/10 --steps 3 --format jsonl"
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """System files and batch specs satisfy their schemas, and what a schema refuses the reader refuses, too."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

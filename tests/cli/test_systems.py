@@ -1,9 +1,5 @@
 """kahanmaps systems: the catalogue, listed, shown, and printed as files to copy and change."""
 
-from __future__ import annotations
-
-import tomllib
-
 import pytest
 from schema_helpers import mistakes
 
@@ -88,13 +84,6 @@ def test_the_file_that_is_printed_reads_back_equal(kahanmaps, name):
     assert parse_system(kahanmaps("systems", name, "--toml").out, name) == catalog.load(name)
 
 
-def test_parameters_are_set_in_equations_and_files(kahanmaps):
-    shown = kahanmaps("systems euler_top -p a1=1/2 -p a3=0.25 --json").json
-    assert shown["rhs"] == ["x2*x3/2", "-2*x1*x3", "x1*x2/4"]
-    toml = tomllib.loads(kahanmaps("systems euler_top -p a1=1/2 -p a3=0.25 --toml").out)
-    assert toml["parameters"] == {"a1": "1/2", "a2": "-2", "a3": "1/4"}
-
-
 def test_a_file_of_ones_own_is_shown_as_well(kahanmaps, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('variables = ["x"]\n[system]\nrhs = ["x^2"]\n')
@@ -109,18 +98,6 @@ def test_a_file_of_ones_own_is_shown_as_well(kahanmaps, tmp_path):
 
 
 # Structured facts
-
-
-def test_structured_facts_are_shown(kahanmaps):
-    lines = [line.strip() for line in kahanmaps("systems zhukovski_volterra_2").out.splitlines()]
-    assert "for generic parameters and eps:" in lines
-    assert "verdict: not integrable" in lines
-    growth = "(exponential growth, by the largest root of x^2 - 2*x - 1)"
-    assert f"degrees of the iterates: 3, 9, 23, 57, 139, ... {growth}" in lines
-    assert "a generic orbit lies in a variety of codimension 1" in lines
-    assert "1 relation along an orbit among: polynomials of degree <= 2" in lines
-    assert "  2 relations along an orbit among: x1^2, x2^2, x3^2, 1\n" in kahanmaps("systems euler_top").out
-    assert "no relation along an orbit among: polynomials of degree <= 4" in kahanmaps("systems lorenz").out
 
 
 def test_structured_facts_are_there_for_scripts(kahanmaps):
@@ -146,9 +123,6 @@ def test_each_structured_fact_can_stand_alone(kahanmaps, tmp_path, keys, line):
     path = tmp_path / "mine.toml"
     path.write_text(f'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[catalog]\n{keys}\n')
     assert kahanmaps("systems", path).out == f"mine\nx' = x^2\nfor generic eps:\n  {line}\n"
-
-
-# Terminals
 
 
 # LaTeX
@@ -187,17 +161,3 @@ def test_every_system_is_written_in_latex_with_balanced_braces(kahanmaps, name):
     formulas = 1 + len(file.integrals) + (file.density is not None) + (file.hamiltonian is not None)
     assert text.count("\\[\n") == text.count("\\]\n") == formulas
     assert text.count(r"\dot{") == file.system.dim
-
-
-@pytest.mark.parametrize("options", ["--latex --toml", "--latex --json", "--toml --json"])
-def test_two_forms_at_once_are_refused(kahanmaps, options):
-    shown = kahanmaps("systems euler_top", *options.split())
-    assert shown.status == 2
-    assert "one of the three" in shown.err
-
-
-@pytest.mark.parametrize("option", ["--latex", "--toml", "-p a1=2"])
-def test_what_needs_a_name_says_so(kahanmaps, option):
-    shown = kahanmaps("systems", option)
-    assert shown.status == 2
-    assert "need the NAME of a system" in shown.err
