@@ -45,13 +45,11 @@ STARTS = [[1.0, 0.5, -2.0], [0.25, 3.0, 1.0]]
     "text",
     [
         "1,1/2,-2\n0.25,3,1\n",
-        "1 1/2 -2\n0.25 3 1",
         "# two points\n\n1\t0.5\t-2 # the first\n  25e-2 , 3 , 1  \n",
-        "x1,x2,x3\n1,1/2,-2\n0.25,3,1\n",
         "step,x3,x1,x2\r\n0,-2,1,1/2\r\n5,1,0.25,3\r\n",
         "\ufeff1,1/2,-2\n0.25,3,1\n",
     ],
-    ids=["commas", "blanks", "comments", "names", "other columns", "byte order mark"],
+    ids=["commas", "comments", "other columns", "byte order mark"],
 )
 def test_text_has_a_point_in_each_line(kahanmaps, tmp_path, text):
     (tmp_path / "starts.csv").write_text(text, encoding="utf-8")
@@ -149,9 +147,8 @@ def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):
     assert second == {"name": "y", "orbits": 40, "changed": 40, "orbit": 0}
 
 
-@pytest.mark.parametrize("backward", ["", " --backward"])
-def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps, backward):
-    drift = kahanmaps(f"{TOP} --random 3 --steps 10{backward} --integral e=eps --json").json["drift"][0]
+def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps):
+    drift = kahanmaps(f"{TOP} --random 3 --steps 10 --backward --integral e=eps --json").json["drift"][0]
     assert (drift["initial"], drift["largest"]) == (0.1, 0)
 
 
@@ -171,16 +168,15 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
 # Interrupts
 
 
-@pytest.mark.parametrize(("number", "arithmetic"), [(signal.SIGINT, "float"), (signal.SIGTERM, "mod:10007")])
-def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path, number, arithmetic):
+def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**9} --arithmetic {arithmetic} --random 5 --every 100 -o {path} --json"
+    words = f"{TOP} --steps {10**9} --random 5 --every 100 -o {path} --json"
     process = subprocess.Popen(
         [*COMMAND, *shlex.split(words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     while not path.exists() or path.stat().st_size < 2000:  # the first records are in the file
         time.sleep(0.02)
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=60)
     found = json.loads(out)
     assert (process.returncode, found["status"]) == (130, "interrupted")
@@ -205,36 +201,27 @@ ABSURD = npy(np.ones((2, 3))).replace(b"(2, 3), }", b"(-2, 3),}")
     ("data", "words"),
     [
         (b"", "found no point, expected one a line: x1, x2, x3"),
-        (b"# nothing\n\n", "found no point"),
-        (b"x1,x2,x3\n", "found no point"),
         (b"1,2\n", "s:1: found 2 numbers, expected 3: x1, x2, x3"),
         (b"1,2,3\n\n1,2,3,4\n", "s:3: found 4 numbers, expected 3"),
         (b"1,2,3\nx1,x2,x3\n", "s:2: entry 1: found 'x1'"),
         (b"1,nan,3\n", "s:1: entry 2: found 'nan', expected an integer, p/q or a decimal"),
-        (b"1,inf,3\n", "s:1: entry 2: found 'inf'"),
         (b"1,,3\n", "s:1: entry 2: found nothing"),
         (b"1,2/0,3\n", "s:1: entry 2: found the denominator 0"),
         (b"1,1e400,3\n", "s:1: entry 2: found a number beyond the range of machine floats"),
         (b"1,1e99999999,3\n", "s:1: entry 2: found the power of ten"),
         (b"1,2,\x1b[31m\n", r"s:1: entry 3: found '\x1b[31m'"),
-        (b"1,2,3\x00\n", r"s:1: entry 3: found '3\x00'"),
         (b"1" * 2_000_000 + b",2,3\n", "s:1: entry 1: found a number of 2000000 characters"),
         (b"1," * 100_000 + b"1\n", "s:1: found 100001 numbers, expected 3"),
         (bytes(range(256)), "neither a .npy file nor UTF-8 text"),
         (b"\x93NUMPY", "a .npy file that cannot be read"),
-        (b"\x93NUMPY\x01\x00\xff\xff", "a .npy file that cannot be read"),
         (b"\x93NUMPY\x09\x00" + b"x" * 100, "not (9, 0)"),
-        (b"\x93NUMPY\x01\x00\x10\x00" + b"((((((((((((((((", "a .npy file that cannot be read"),
         (npy(np.ones(3)), "found an array of shape (3,), expected (n, 3)"),
         (npy(np.ones((2, 2))), "found an array of shape (2, 2), expected (n, 3)"),
-        (npy(np.ones((0, 3))), "found an array of shape (0, 3)"),
         (npy(np.ones((2, 3)))[:-1], "expected 48 bytes got 47"),
         (HUGE, "Unable to allocate"),
         (ABSURD, "negative dimensions"),
         (npy(np.array([[1, 2, None]])), "Object arrays cannot be loaded"),
-        (npy(np.array([["1", "2", "3"]])), "found an array of text"),
         (npy(np.ones((1, 3), dtype=complex)), "found an array of complex numbers"),
-        (npy(np.ones((1, 3), dtype=bool)), "found an array of truth values"),
         (npy(np.array([(1.0, 2)], dtype=[("a", "f8"), ("b", "i4")])), "found an array of the type"),
         (npy(np.array([[1.0, 2, 3], [1, np.nan, 3], [np.inf, 1, 1]])), "row 1: found nan"),
     ],

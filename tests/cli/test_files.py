@@ -156,7 +156,7 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
     assert "it would be written over" in outcome.err
 
 
-@pytest.mark.parametrize("words", ["orbit", "convert", "ensemble", "batch export"])
+@pytest.mark.parametrize("words", ["convert", "batch export"])
 def test_any_other_file_is_written_over(kahanmaps, given, words):
     ending, lines = READS[words]
     source, target = Path("in" + ending), Path("out" + ending)

@@ -149,7 +149,7 @@ def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, l
 
 
 @pytest.mark.usefixtures("_folder")
-@pytest.mark.parametrize("value", [None, 7, -5, 10**17, 1e300, "[]", b"\xff\0"], ids=str)
+@pytest.mark.parametrize("value", [None, 10**17, "[]", b"\xff\0"], ids=str)
 def test_no_cell_of_a_database_makes_a_command_fail_or_hang(kahanmaps, value):
     with closing(sqlite3.connect("DB")) as connection, connection:
         tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()

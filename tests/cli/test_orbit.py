@@ -25,7 +25,6 @@ from kahanmaps_cli.screen.progress import Progress
 TOP = "orbit euler_top --start 1,1/2,-1/3 --eps 1/10"
 LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
 LOTKA_VOLTERRA = "orbit lotka_volterra --start 1/2,2/3 --eps 1/10"
-PRIMES = [10007, 2**61 - 1, 2**63 - 25, 2**63 + 29, 2**89 - 1]
 
 
 def test_an_inline_system_may_be_written_as_equations(kahanmaps):
@@ -129,12 +128,6 @@ def test_known_integrals_of_a_member_of_the_family_are_conserved(kahanmaps, pair
     assert len({tuple(row[5:]) for row in rows[1:]}) == 1
 
 
-def test_integrals_of_theorems_are_refused_in_floats(kahanmaps, pair):
-    outcome = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known --arithmetic float")
-    assert outcome.status == 2
-    assert "needs exact, mod:P or ball:BITS arithmetic" in outcome.err
-
-
 # Formats
 
 
@@ -161,19 +154,6 @@ def test_csv_is_read_by_the_csv_module(kahanmaps):
         assert row["p"] == (record["integrals"]["p"] or "")
 
 
-@pytest.mark.parametrize(("arithmetic", "kind"), [("exact", None), ("float", "f")])
-def test_a_csv_file_is_a_table_without_options(kahanmaps, tmp_path, arithmetic, kind):
-    path = tmp_path / "orbit.csv"
-    kahanmaps(f"{TOP} --steps 4 --arithmetic {arithmetic} -o", path)
-    with path.open(newline="") as stream:
-        names, *rows = csv.reader(stream, strict=True)
-    assert (names, len(rows)) == (["step", "x1", "x2", "x3"], 5)
-    assert {len(row) for row in rows} == {4}
-    table = pytest.importorskip("pandas").read_csv(path)
-    assert (table.shape, table["step"].dtype.kind) == ((5, 4), "i")
-    assert kind in (None, table["x1"].dtype.kind)
-
-
 @pytest.fixture
 def npz(kahanmaps, tmp_path):
     """Run an orbit into an npz file and load it."""
@@ -193,7 +173,7 @@ def test_npz_holds_exact_numbers_exactly(npz, kahanmaps):
     assert [[Fraction(x.decode()) for x in row] for row in npz(f"{TOP} --steps 6").x] == exact
 
 
-@pytest.mark.parametrize("prime", [p for p in PRIMES if p < 2**63])
+@pytest.mark.parametrize("prime", [10007, 2**63 - 25])
 def test_npz_holds_residues_as_integers(npz, kahanmaps, prime):
     command = f"{TOP} --steps 3 --arithmetic mod:{prime}"
     found = npz(command)
@@ -213,9 +193,7 @@ def test_npz_holds_header_and_end(npz, kahanmaps):
     }
 
 
-@pytest.mark.parametrize(
-    ("arithmetic", "first"), [("exact", b""), ("mod:10007", b""), ("float", np.nan), ("ball:64", b"")]
-)
+@pytest.mark.parametrize(("arithmetic", "first"), [("exact", b""), ("float", np.nan)])
 def test_npz_holds_integrals_with_a_mark_for_poles(npz, arithmetic, first):
     found = npz(f"{TOP} --steps 2 --integral p=1/(x1-1) --integral x1+x2 --arithmetic {arithmetic}")
     assert found.integrals.shape == (3, 2)
@@ -271,11 +249,11 @@ def test_the_clock_on_a_terminal_moves_by_itself_until_the_end(monkeypatch):
     monkeypatch.setattr("sys.stderr", screen)
     with Progress() as progress:
         progress("a long step")
-        time.sleep(2.3)
+        time.sleep(1.3)
         progress.clear()
         cleared = screen.getvalue()
         time.sleep(1.2)
-    assert re.findall(r"a long step \((\d) s\)", cleared) == ["1", "2"]
+    assert re.findall(r"a long step \((\d) s\)", cleared) == ["1"]
     assert screen.getvalue() == cleared
 
 
@@ -310,21 +288,16 @@ def test_npz_is_refused_on_a_terminal():
 # Interrupts
 
 
-@pytest.fixture(scope="module", params=[signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
-def interrupted(request, tmp_path_factory):
-    """An endless orbit, written to a file, that got a signal: exit status, standard error, lines of the file."""
-    path = tmp_path_factory.mktemp("interrupted") / "orbit.jsonl"
+def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
+    path = tmp_path / "orbit.jsonl"
     words = f"{TOP} --steps {10**12} --arithmetic mod:10007 --every 100 -o {path}"
     process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
     while not path.exists() or not path.stat().st_size:  # the first records are in the file
         time.sleep(0.02)
-    process.send_signal(request.param)
-    err = process.communicate(timeout=30)[1]
-    return SimpleNamespace(status=process.returncode, err=err, lines=path.read_text().splitlines())
-
-
-def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(interrupted):
-    records = [json.loads(line) for line in interrupted.lines]
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    assert process.returncode == 130
+    records = [json.loads(line) for line in path.read_text().splitlines()]
     steps = [record["step"] for record in records[1:-1]]
     end = records[-1]
     assert (end["record"], end["status"]) == ("end", "interrupted")
@@ -343,7 +316,7 @@ def points(run) -> list:
     return [record for record in run.records if record["record"] == "point"]
 
 
-@pytest.mark.parametrize("extra", ["", " --backward", " --every 5", " --integral known"])
+@pytest.mark.parametrize("extra", ["", " --backward --every 5 --integral known"])
 def test_all_methods_print_the_same_points(kahanmaps, extra):
     generic = kahanmaps(f"{MEMBER} --steps 20 --format jsonl --method generic{extra}")
     normal = kahanmaps(f"{MEMBER} --steps 20 --format jsonl --method normal-form{extra}")
@@ -364,11 +337,8 @@ def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
         (f"{MEMBER} --steps 20", "normal-form"),
         (f"{MEMBER} --steps 2", "generic"),  # looking for a structure costs more
         (f"{MEMBER} --at 30", "doubling"),
-        (f"{IRREDUCIBLE} --steps 20", "normal-form"),
-        (f"{IRREDUCIBLE} --at 30", "doubling"),
         (f"{MEMBER} --steps 20 --arithmetic mod:10007", "generic"),
         (f"{MEMBER} --at 100000 --arithmetic mod:10007", "doubling"),
-        (f"{MEMBER} --steps 20 --arithmetic ball:200", "normal-form"),
         (f"{MEMBER} --steps 20 --arithmetic float", "normal-form"),
         ("orbit lotka_volterra --start 1,2 --eps 1/10 --steps 8", "generic"),
     ],
@@ -404,7 +374,7 @@ def test_an_iterate_that_would_be_too_long_is_not_begun(kahanmaps):
     assert run.records[-1]["status"] == "budget"
 
 
-@pytest.mark.parametrize("line", ["--steps 60", "--at 60", "--at 1000"])
+@pytest.mark.parametrize("line", ["--steps 60", "--at 1000"])
 def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
     run = kahanmaps(f"{MEMBER} {line} --arithmetic ball:auto --accuracy 40 --format jsonl")
     assert run.status == 0
@@ -419,9 +389,8 @@ def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
 # Float orbits in .npy files, and what their end says.
 
 
-@pytest.mark.parametrize("every", [1, 7])
-def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path, every):
-    command = f"{MEMBER} --steps 30 --every {every} --arithmetic float"
+def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path):
+    command = f"{MEMBER} --steps 30 --every 7 --arithmetic float"
     outcome = kahanmaps(f"{command} -o", tmp_path / "x.npy")
     points = [
         [float(entry) for entry in record["x"]] for record in kahanmaps(f"{command} --format jsonl").records[1:-1]

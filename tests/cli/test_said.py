@@ -1,7 +1,7 @@
 """What commands say: their exit status, and words of it.
 
-The table is tests/cli/said.txt: a command, behind a number where it does not end with 0, and behind each ` => ` words of
-standard output or standard error, blanks for tabs and line breaks; behind ` => not: ` words that are in neither.
+The table is tests/cli/said.txt: a command, behind a number where it does not end with 0, and behind each ` => ` words
+of standard output or standard error, blanks for tabs and line breaks; behind ` => not: ` words that are in neither.
 """
 
 import re

@@ -1,11 +1,9 @@
 """System files and batch specs satisfy their schemas, and what a schema refuses the reader refuses, too."""
 
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cli_helpers import Outcome
 from schema_helpers import mistakes
 
 from kahanmaps.documents import reader
@@ -15,12 +13,11 @@ from kahanmaps.experiments.registry import task_kinds
 from kahanmaps.experiments.spec import SpecError, parse_spec
 from kahanmaps_cli.schema_files import schema
 
-Run = Callable[..., Outcome]
 ROOT = Path(__file__).parents[2]
 CATALOG = ROOT / "kahanmaps" / "documents" / "catalog"
 
 
-def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> None:
+def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader():
     parts = schema("system-file")["$defs"]
     found = {"": parts["system_file"], "catalog": parts["catalog_section"]}
     found |= {key: parts["system_file"]["properties"][key] for key in (*reader.KINDS, "density")}
@@ -29,12 +26,12 @@ def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> 
 
 
 @pytest.mark.parametrize("path", sorted(CATALOG.glob("*.toml")), ids=lambda path: path.stem)
-def test_a_file_of_the_catalogue_satisfies_the_schema(path: Path) -> None:
+def test_a_file_of_the_catalogue_satisfies_the_schema(path):
     assert mistakes("system-file", tomllib.loads(path.read_text())) == []
 
 
 @pytest.mark.parametrize("options", ["--m 2 --seed 3 --signs 1,-1", "--m 1 --generic", "--chi t^2-2"])
-def test_what_family_new_writes_satisfies_the_schema(kahanmaps: Run, options: str) -> None:
+def test_what_family_new_writes_satisfies_the_schema(kahanmaps, options):
     assert mistakes("system-file", tomllib.loads(kahanmaps(f"family new {options} -q").out)) == []
 
 
@@ -62,14 +59,14 @@ BAD_FILES = [
 
 
 @pytest.mark.parametrize("text", BAD_FILES)
-def test_what_the_schema_refuses_in_a_system_file_is_refused_by_the_reader_as_well(text: str) -> None:
+def test_what_the_schema_refuses_in_a_system_file_is_refused_by_the_reader_as_well(text):
     assert mistakes("system-file", tomllib.loads(text))
     with pytest.raises(SystemFileError):
         parse_system(text)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").rglob("*.toml")), ids=lambda path: path.stem)
-def test_a_file_of_the_examples_satisfies_its_schema(path: Path) -> None:
+def test_a_file_of_the_examples_satisfies_its_schema(path):
     found = tomllib.loads(path.read_text(encoding="utf-8"))
     assert mistakes("batch-spec" if "experiments" in found else "system-file", found) == []
 
@@ -96,19 +93,19 @@ BAD_SPECS = [
 
 
 @pytest.mark.parametrize("text", GOOD_SPECS)
-def test_a_spec_that_is_read_satisfies_the_schema(text: str) -> None:
+def test_a_spec_that_is_read_satisfies_the_schema(text):
     assert parse_spec(text).size > 0
     assert mistakes("batch-spec", tomllib.loads(text)) == []
 
 
 @pytest.mark.parametrize("text", BAD_SPECS)
-def test_what_the_schema_refuses_in_a_spec_is_refused_by_the_reader_as_well(text: str) -> None:
+def test_what_the_schema_refuses_in_a_spec_is_refused_by_the_reader_as_well(text):
     assert mistakes("batch-spec", tomllib.loads(text))
     with pytest.raises(SpecError):
         parse_spec(text)
 
 
-def test_the_schema_of_specs_knows_every_task_and_option() -> None:
+def test_the_schema_of_specs_knows_every_task_and_option():
     experiment = schema("batch-spec")["$defs"]["experiment"]["properties"]
     assert set(experiment["task"]["enum"]) == set(task_kinds())
     known = {*VOCABULARY, *FAMILY, "time_step", "parameters"}

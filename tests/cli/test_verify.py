@@ -14,20 +14,8 @@ from kahanmaps.paper.registry import claims
 from kahanmaps.version import __version__
 
 QUICK = "verify --m 2 --section 6"
-COMMON = {
-    "command",
-    "check",
-    "verdict",
-    "holds",
-    "version",
-    "system",
-    "eps",
-    "time_step",
-    "convention",
-    "arithmetic",
-    "seed",
-}
-COMMON |= {"error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
+COMMON = {"command", "check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic"}
+COMMON |= {"seed", "error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
 
 
 def keys(report):

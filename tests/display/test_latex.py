@@ -1,13 +1,11 @@
 """Formulas in LaTeX: what is written is read back, by a small reader of its own, as the same polynomial."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
 from flint import fmpq
 from helpers import rationals
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
@@ -150,9 +148,12 @@ def test_names(name, latex):
     assert latex_name(name) == latex
 
 
-@given(st.lists(st.from_regex(r"[A-Za-z_][A-Za-z_0-9]{0,8}", fullmatch=True), min_size=2, max_size=2, unique=True))
-def test_different_names_are_different_in_latex(names):
-    first, second = names
+identifiers = st.text("abehptxA_019", min_size=1, max_size=6).filter(str.isidentifier)
+
+
+@given(identifiers, identifiers)
+def test_different_names_are_different_in_latex(first, second):
+    assume(first != second)
     assert latex_name(first) != latex_name(second)
 
 

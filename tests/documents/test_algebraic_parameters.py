@@ -1,7 +1,5 @@
 """Parameters that are algebraic numbers: exact over Q[t]/g, modulo primes where g has a root, rounded for floats."""
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpq_poly
 
@@ -38,11 +36,6 @@ def test_claims_are_proved_or_refuted_over_the_number_field(integral, expected):
     assert verdict(integral) is expected
 
 
-def test_what_holds_for_this_root_fails_for_another_number():
-    integral = "(1 + eps^2*x^2)/(1 - 2/a*eps^2*y^2)"
-    assert verdict(integral, "root of t^2 - 3") is verdict(integral, "3/2") is Verdict.REFUTED
-
-
 def test_a_density_that_is_zero_at_the_root_is_refused():
     file = km.System("x' = a*y; y' = -x", a=ROOT)
 
@@ -53,14 +46,6 @@ def test_a_density_that_is_zero_at_the_root_is_refused():
     for phi in ("a^2 - 2", "(a^4 - 4)*x"):
         with pytest.raises(InputError, match="identically 0 at a root of t"):
             measure(phi)
-
-
-def test_an_integral_that_is_a_constant_at_the_root_is_called_one():
-    file = km.System(TOP, a=ROOT)
-    for text, is_constant in (("(a^2 - 2)*x + 5", True), ("(a*x + 2)/(x + a)", True), ("y^2 + z^2 + a^2 - 2", False)):
-        claimed = km.parse_rational_function(text, file.claim_names, file.parameters)
-        (finding,) = km.check_integrals(file, extra={"I": claimed}).findings
-        assert ("being a constant" in finding.claim) is is_constant
 
 
 def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
@@ -116,26 +101,6 @@ def test_the_points_of_an_orbit_agree_in_all_arithmetics():
     assert list(residues) == [
         field.convert(entry.coefficients[0]) + field.convert(entry.coefficients[1]) * t for entry in exact
     ]
-
-
-def test_the_digit_budget_ends_orbits_over_a_number_field_too():
-    walk = km.orbit(km.System("x' = a*x^2 + y; y' = x*y", a=ROOT), [1, 2], "1/10", steps=30, max_digits=50)
-    assert len(list(walk)) < 12
-    assert walk.end.status == "budget"
-
-
-def test_degrees_are_those_of_another_value():
-    assert (
-        km.degrees(km.System(TOP, a=ROOT), max_terms=8).degrees == km.degrees(km.System(TOP, a=2), max_terms=8).degrees
-    )
-
-
-def test_degrees_that_grow_exponentially_in_the_plane_have_no_bounds_over_a_number_field():
-    file = km.load("lotka_volterra", {"a": ROOT})
-    found, rational = (km.degrees(one, max_terms=5) for one in (file, km.load("lotka_volterra", {"a": 2})))
-    assert found.degrees == rational.degrees
-    assert found.enclosure is None
-    assert rational.enclosure is not None
 
 
 def test_a_file_reads_back_equal():

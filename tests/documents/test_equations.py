@@ -1,7 +1,5 @@
 """Right-hand sides as equations, in files: what they mean, and what is told where they cannot be meant."""
 
-from __future__ import annotations
-
 import pytest
 
 import kahanmaps as km
