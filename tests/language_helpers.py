@@ -52,7 +52,7 @@ NASTY = {
 }
 
 
-# Of every kind in the catalogue: parameters or none, integrals, densities, Hamiltonians, members, from one variable to six.
+# Of every kind: with parameters or without, integrals, densities, Hamiltonians, members, from one variable to six.
 CATALOGUE = (
     *("riccati", "lotka_volterra", "weierstrass", "planar_cubic_hamiltonian", "harmonic", "euler_top", "lorenz"),
     *("zhukovski_volterra_1", "henon_heiles", "paper_m2", "lagrange_top"),

@@ -100,25 +100,6 @@ def test_a_tensor_may_be_given_in_a_file(kahanmaps, tmp_path):
         assert kahanmaps("check-poisson lotka_volterra --json --tensor", path).status == status
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "expected a section [poisson] with tensor ="),
-        ("[poisson]\ntensor = [[0, true], [1, 0]]", "found 'True' in the tensor"),
-        ("[poisson]\ntensor = [[0, 1], [1, 0]]", "expected a skew matrix"),
-        ("[poisson]\ntensor = [[0, 1], [1]]", "is not square"),
-        ("[poisson]\ntensor = [[0]]", "with 1 rows, expected 2"),
-        ("[poisson", "cannot read the tensor"),
-    ],
-)
-def test_a_file_that_holds_no_tensor_is_wrong_use(kahanmaps, tmp_path, text, message):
-    path = tmp_path / "p.toml"
-    path.write_text(text)
-    outcome = kahanmaps("check-poisson lotka_volterra --tensor", path)
-    assert outcome.status == 2
-    assert message in outcome.err
-
-
 # For people
 
 

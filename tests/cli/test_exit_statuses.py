@@ -100,29 +100,6 @@ def test_messages_stay_short_whatever_was_written(kahanmaps, option, word):
 
 # Wrong files
 
-FAMILY = 'A = [["1", "0", "0", "0"], ["0", "2", "0", "0"], ["0", "0", "1", "0"], ["0", "0", "0", "2"]]'
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "found none of the sections [system], [hamiltonian], [family]"),
-        ("\xff", "not UTF-8 text"),
-        ("a = " + "[" * 100_000, "nested too deeply"),
-        ('variables = ["x"]\n[system]\nrhs = ["' + "(" * 1_000_000 + '"]', "found 1000000 characters"),
-        ('variables = ["x"]\n[system]\nrhs = ["x^3"]', "system.rhs[1]: found a polynomial of degree 3"),
-        (f'[family]\n{FAMILY}\nH = "x1^3"\nsigns = [1]', "expected 2 numbers 1 or -1"),
-    ],
-    ids=lambda text: text[-70:],
-)
-def test_a_wrong_file_gives_2_and_a_message_with_the_file_and_the_key(kahanmaps, tmp_path, text, words):
-    path = tmp_path / "wrong.toml"
-    path.write_bytes(text.encode("latin-1"))
-    outcome = kahanmaps("check-measure", path)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert outcome.err.startswith(f"Error: {path}: ")
-    assert words in outcome.err
-
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_a_file_that_may_not_be_read_gives_2(kahanmaps, tmp_path):

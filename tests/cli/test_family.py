@@ -103,13 +103,6 @@ def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, whic
     assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
 
 
-def test_what_was_found_has_a_normal_form(kahanmaps, forgetful):
-    outcome = kahanmaps("family show", forgetful[1], "--normal-form")
-    assert "x = S z with the coefficients" in outcome.out
-    form = kahanmaps("family show", forgetful[1], "--normal-form --json").json["normal_form"]
-    assert [(part["root"], part["weight"]) for part in form["parts"]] == [("1", "-1"), ("2", "1")]
-
-
 def test_another_structure_is_shown_in_coordinates_that_make_it_standard(kahanmaps, tmp_path):
     (tmp_path / "a.toml").write_text(HIDDEN)
     shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json

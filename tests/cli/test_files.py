@@ -156,17 +156,6 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
     assert "it would be written over" in outcome.err
 
 
-@pytest.mark.parametrize("words", ["convert", "batch export"])
-def test_any_other_file_is_written_over(kahanmaps, given, words):
-    ending, lines = READS[words]
-    source, target = Path("in" + ending), Path("out" + ending)
-    name = next(reversed(lines))
-    source.write_bytes(Path(source_of(words, name)).read_bytes())
-    target.write_bytes(before := source.read_bytes())
-    assert kahanmaps(lines[name].replace("IN", str(source)), "-o", target).status == 0
-    assert (source.read_bytes(), target.read_bytes() == before) == (before, False)
-
-
 def test_standard_input_is_not_written_over(given):
     before = Path("system.toml").read_bytes()
     outcome = shell("kahanmaps convert - --to latex -o system.toml < system.toml", given)

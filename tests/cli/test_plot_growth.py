@@ -36,15 +36,6 @@ def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
     assert (image.imread(first) == image.imread(second)).all()
 
 
-@pytest.mark.parametrize("command", ["degrees", "heights"])
-@pytest.mark.parametrize("text", ["", "[1, 2]", '{"command": "orbit"}', "[" * 100_000])
-def test_a_file_that_is_no_record_is_refused(kahanmaps, tmp_path, command, text):
-    (tmp_path / "r.json").write_text(text)
-    done = kahanmaps(f"plot {command} --from", tmp_path / "r.json")
-    assert done.status == 2
-    assert "expected an object written by" in done.err
-
-
 @pytest.mark.usefixtures("unrendered")
 def test_a_record_of_a_survey_that_was_not_whole_is_told(kahanmaps, tmp_path):
     record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").json

@@ -50,29 +50,6 @@ def test_a_system_is_shown_with_equations_facts_and_sources(kahanmaps, name):
 
 
 @over_names
-def test_a_system_is_shown_for_scripts(kahanmaps, name):
-    shown = kahanmaps("systems", name, "--json").json
-    assert set(shown) == {
-        *(
-            "command",
-            "version",
-            "name",
-            "dim",
-            "kind",
-            "title",
-            "parameters",
-            "variables",
-            "rhs",
-            "integrals",
-            "density",
-        ),
-        *("facts", "convention", "sources", "known", "document"),
-    }
-    assert (shown["name"], shown["dim"]) == (name, len(shown["rhs"]))
-    assert shown["known"]["degrees"] == catalog.load(name).catalog["degrees"]
-
-
-@over_names
 def test_the_file_that_is_printed_reads_back_equal(kahanmaps, name):
     assert parse_system(kahanmaps("systems", name, "--toml").out, name) == catalog.load(name)
 
@@ -88,34 +65,6 @@ def test_a_file_of_ones_own_is_shown_as_well(kahanmaps, tmp_path):
     assert "Integrals of the map, as the file claims:" in document
     assert "varphi$, as the file claims:" in document
     assert "claim" not in kahanmaps("systems", "euler_top").out + kahanmaps("convert", "euler_top", "--to", "latex").out
-
-
-# Structured facts
-
-
-def test_structured_facts_are_there_for_scripts(kahanmaps):
-    assert kahanmaps("systems zhukovski_volterra_2 --json").json["known"] == {
-        "degrees": [3, 9, 23, 57, 139],
-        "growth": "exponential",
-        "dynamical_degree": "x^2 - 2*x - 1",
-        "verdict": "not integrable",
-        "codimension": 1,
-        "relations": [{"monomials": "degree <= 2", "dimension": 1}],
-    }
-
-
-@pytest.mark.parametrize(
-    ("keys", "line"),
-    [
-        ('growth = "linear"', "degrees of the iterates: linear growth"),
-        ("degrees = [1, 2]", "degrees of the iterates: 1, 2, ..."),
-        ('dynamical_degree = "x - 2"', "degrees of the iterates: by the largest root of x - 2"),
-    ],
-)
-def test_each_structured_fact_can_stand_alone(kahanmaps, tmp_path, keys, line):
-    path = tmp_path / "mine.toml"
-    path.write_text(f'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[catalog]\n{keys}\n')
-    assert kahanmaps("systems", path).out == f"mine\nx' = x^2\nfor generic eps:\n  {line}\n"
 
 
 # LaTeX
@@ -143,14 +92,3 @@ F_2 = \frac{2 \varepsilon^2 x_3^2 + 1}{2 \varepsilon^2 x_1^2 + 1}
 
 def test_a_system_in_latex(kahanmaps):
     assert kahanmaps("systems euler_top --latex").out == EULER
-
-
-@over_names
-def test_every_system_is_written_in_latex_with_balanced_braces(kahanmaps, name):
-    text = kahanmaps("systems", name, "--latex").out
-    file = catalog.load(name)
-    plain = text.replace(r"\{", "").replace(r"\}", "")
-    assert plain.count("{") == plain.count("}")
-    formulas = 1 + len(file.integrals) + (file.density is not None) + (file.hamiltonian is not None)
-    assert text.count("\\[\n") == text.count("\\]\n") == formulas
-    assert text.count(r"\dot{") == file.system.dim

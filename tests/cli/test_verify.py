@@ -55,12 +55,6 @@ def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, tmp_pat
     assert again["claims"] == first["claims"]
 
 
-def test_the_seed_draws_the_member(kahanmaps):
-    first, second = (kahanmaps(f"{QUICK} --seed {seed} --json").json for seed in (1, 2))
-    assert first["chi"] != second["chi"]
-    assert (first["seed"], second["seed"]) == (1, 2)
-
-
 # What to verify
 
 
@@ -72,13 +66,6 @@ def test_controls_are_refuted_and_that_is_success(once):
     assert all(claim["control"] and claim["expected"] == "refuted" for claim in found)
     assert {claim["key"] for claim in found} == set(expected(2))
     assert last["verdict"] == "proved"
-
-
-def test_the_member_in_general_is_verified(once):
-    outcome = once("verify --universal --m 1 --json")
-    assert outcome.status == 0
-    assert outcome.json["verdict"] in ("proved", "supported")
-    assert keys(outcome.json) == expected(1)
 
 
 def test_balls_enclose_the_complex_roots(kahanmaps):
@@ -104,10 +91,6 @@ def test_in_a_pipe_the_statements_are_those_of_json(once):
     for claim in report["claims"]:
         assert f"{claim['verdict']}\t{claim['claim']}" in text
         assert claim["formula"] in text
-
-
-def test_a_quiet_command_says_nothing_on_standard_error(kahanmaps, slow_clock):
-    assert kahanmaps(f"{QUICK} -q").err == ""
 
 
 def test_progress_names_the_statement_and_counts(kahanmaps, slow_clock):

@@ -1,9 +1,11 @@
 """Wrong use of every command: status 2, a sentence on standard error, nothing on standard output, and no file made.
 
 The table is tests/cli/wrong_use.txt: a command, and behind ` => ` words of what is said; behind ` => not: ` words that
-are not said. What lists the checks is made of their table.
+are not said. Behind ` <= ` stands what is in the file that the command names, with \\n for a new line. What lists the
+checks is made of their table.
 """
 
+import re
 from pathlib import Path
 
 import pytest
@@ -20,8 +22,12 @@ CASES.append(("check euler_top", f"Did you mean {' or '.join(CHECKS)}?"))
 def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, case):
     monkeypatch.chdir(tmp_path)
     command, *expected = case
+    command, is_with_file, content = command.partition(" <= ")
+    if is_with_file:
+        name = next(word for word in command.split() if re.fullmatch(r"s|\w+\.\w+", word))
+        Path(name).write_text(content.replace("\\n", "\n"))
     outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert (outcome.status, outcome.out, len(list(tmp_path.iterdir()))) == (2, "", bool(is_with_file))
     said = " ".join(outcome.err.split())
     for words in expected:
         assert (words.removeprefix("not: ") in said) is not words.startswith("not: ")

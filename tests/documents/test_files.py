@@ -335,38 +335,6 @@ def test_tables_nested_by_dotted_keys_are_a_mistake_and_no_crash(key):
     assert key in keys(key + ".a" * 1500 + " = 1\n")  # Python stops at a depth of 1000; tomllib is slow beyond
 
 
-def test_all_mistakes_of_a_file_are_told_at_once():
-    text = """
-name = 1
-variables = ["x", "y"]
-colour = "red"
-[parameters]
-eps = 1
-"2" = 1
-[system]
-rhs = ["x^3", "x*", "y"]
-lhs = []
-[integrals]
-I1 = "x +"
-I2 = "z"
-[density]
-phi = "0"
-"""
-    assert keys(text) == [
-        "colour",
-        "parameters.eps",
-        "parameters.2",
-        "name",
-        "system.lhs",
-        "system.rhs[1]",
-        "system.rhs[2]",
-        "system.rhs",
-        "integrals.I1",
-        "integrals.I2",
-        "density.phi",
-    ]
-
-
 def test_the_message_names_the_file_counts_the_mistakes_and_lists_them():
     with pytest.raises(SystemFileError) as caught:
         parse_system('variables = ["x"]\n[system]\nrhs = ["x^3", "y"]\n', "pair.toml")

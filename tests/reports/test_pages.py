@@ -195,15 +195,6 @@ def test_a_batch_has_its_tables(tmp_path):
         assert report_html(store) == page.html
 
 
-def test_numbers_of_a_batch_that_are_asked_for_are_drawn(tmp_path):
-    path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(k, k) for k in (1, 2, 3)])
-    with km.Store.open(path, readonly=True) as store:
-        page = require_sound(report_html(store, by=["experiment", "seed"], values=["value"]))
-        assert {"counts", "distributions-figure"} <= set(page.ids)
-        with pytest.raises(InputError):
-            report_html(store, values=["nothing"])
-
-
 def test_the_tasks_of_a_batch_that_failed_or_were_refuted_are_listed(tmp_path):
     path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(1, 7, "proved"), ok(2, 8, "refuted")])
     with km.Store.open(path, readonly=True) as store:
