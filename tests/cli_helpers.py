@@ -1,7 +1,5 @@
 """What the tests of the command line share: the outcome of a command, a shell and a terminal to run it in."""
 
-from __future__ import annotations
-
 import fcntl
 import io
 import json

@@ -1,7 +1,5 @@
 """All commands of the command line, and the examples in their help."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What the tests of `convert` share: systems, the values that a converted file has to give, and programs to run it."""
 
-from __future__ import annotations
-
 import json
 import random
 import re

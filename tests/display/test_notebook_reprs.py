@@ -217,12 +217,6 @@ def test_integrals_are_shown_as_formulas(top):
     assert "2 found; in all 2 independent (measured: relations of degree up to 2 along orbits show 2)" in text_of(found)
 
 
-def test_a_scan_shows_where_degrees_are_smaller():
-    text = text_of(km.scan(km.load("henon_heiles"), ["c"], primes=[31, 37, 41], terms=3))
-    assert "over c" in text
-    assert "quadratic growth" in text
-
-
 def test_darboux_polynomials_a_census_and_a_period_are_shown(member):
     assert "cofactor" in text_of(km.darboux_polynomials(km.load("lotka_volterra"), 1))
     assert "GF(31)" in text_of(km.cycle_census(km.load("lotka_volterra").system, "1/10", 31))

@@ -96,12 +96,6 @@ def test_newcomers_are_told_what_a_fact_looks_like():
 
 
 @over_the_catalogue
-def test_no_file_is_longer_than_a_newcomer_reads(name):
-    lines = (PACKAGE / "documents" / "catalog" / f"{name}.toml").read_text(encoding="utf-8").splitlines()
-    assert len(lines) <= 60
-
-
-@over_the_catalogue
 def test_a_file_without_integrals_says_so_and_no_other_does(name):
     file = load(name)
     says_so = any(re.search("no integral is known|none is written out", fact) for fact in file.catalog["facts"])
@@ -243,12 +237,6 @@ def test_a_path_is_what_ends_in_toml_has_a_separator_or_is_an_existing_file(refe
         (tmp_path / name).write_text(MINE, encoding="utf-8")
     assert load(reference, {"a": 3}).system.dim == 1
     assert load(reference, {"a": 3}).parameters == {"a": 3}
-
-
-def test_the_catalogue_wins_over_a_file_of_the_same_name(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "euler_top").write_text(MINE, encoding="utf-8")
-    assert load("euler_top").system.dim == 3
 
 
 @pytest.mark.parametrize("reference", ["missing.toml", f"missing{os.sep}system", "euler_top.toml"])

@@ -62,10 +62,3 @@ def test_symbols_get_any_values_afterwards(name, tmp_path):
     text = convert(SYSTEMS[name], "pari", parts, symbols=symbols)
     answers = ask_gp(text, asked, tmp_path, more="".join(f", {value}" for value in values.values()))
     assert answers == [question.expected for question in asked]
-
-
-def test_two_systems_fit_into_one_session_under_different_names(tmp_path):
-    text = convert(km.load("euler_top"), "pari", name="euler") + convert(km.load("lorenz"), "pari", name="lorenz")
-    lines = ["print(euler_vector_field([1, 2, 3]~));", "print(lorenz_vector_field([1, 2, 3]~));"]
-    expected = [km.load(name).system.over(km.QQ).value((fmpq(1), fmpq(2), fmpq(3))) for name in ("euler_top", "lorenz")]
-    assert gp_prints(text, lines, tmp_path) == [f"[{', '.join(map(str, value))}]~" for value in expected]
