@@ -220,18 +220,6 @@ def test_a_summary_groups_and_counts(batch, space):
     assert batch("summary --db study.db --by m --markdown").out.startswith("| m | tasks | ok |\n| --- | ---: | ---: |")
 
 
-def test_shards_are_merged_into_one_database(batch):
-    for part in (1, 2, 3):
-        done = batch("run", SPACE, f"--shard {part}/3 --db part{part}.db --json -q")
-        assert done.json["done"] == {"ok": 2}
-        assert done.status == 0  # this part of it is complete
-    done = batch("merge all.db part1.db part2.db part3.db --json")
-    assert [one["results"] for one in done.json["merged"]] == [2, 2, 2]
-    batch("run", SPACE, "--db whole.db -q")
-    assert batch("export --db all.db --csv --stable").out == batch("export --db whole.db --csv --stable").out
-    assert batch("run", SPACE, "--db all.db -q --json").json["done"] == {}
-
-
 def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
     from kahanmaps.experiments.results.records import Limits, Record, Task
     from kahanmaps.experiments.results.records import Outcome as Word

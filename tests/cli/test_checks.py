@@ -90,16 +90,6 @@ def test_an_integral_without_a_name_does_not_take_one_of_the_file(kahanmaps, tmp
     }
 
 
-# check-measure, check-poisson
-
-
-def test_a_tensor_may_be_given_in_a_file(kahanmaps, tmp_path):
-    path = tmp_path / "p.toml"
-    for entry, status in (("x*y", 0), ("x*y^2", 1)):
-        path.write_text(f'[poisson]\ntensor = [[0, "{entry}"], ["-{entry}", 0]]\n')
-        assert kahanmaps("check-poisson lotka_volterra --json --tensor", path).status == status
-
-
 # For people
 
 

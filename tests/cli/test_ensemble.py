@@ -13,12 +13,11 @@ import time
 
 import numpy as np
 import pytest
-from cli_helpers import COMMAND, shell
+from cli_helpers import COMMAND
 
 from kahanmaps_cli.runs import ensemble_starts
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
-SQUARE = "ensemble --vars x --rhs x^2 --eps 1/2 --kernel numpy"  # the Kahan map x/(1 - x)
 PRIME = 2**61 - 1
 
 
@@ -66,12 +65,6 @@ def test_starts_modulo_a_prime_are_reduced(kahanmaps, tmp_path):
     assert np.load(tmp_path / "x.npy").tolist() == [[[10006, 2**62 % 10007, 1]]]
 
 
-def test_orbits_in_csv_are_starts(tmp_path):
-    orbit = "kahanmaps orbit euler_top --start 1,2,3 --eps 1/10 --steps 4 --format csv"
-    outcome = shell(f"{orbit} | kahanmaps {TOP} --steps 2 --starts - --json", tmp_path)
-    assert outcome.json["orbits"] == 5
-
-
 def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
     def drawn(more):
         assert kahanmaps(f"{TOP} --steps 0 --random 50 {more} -q -o", tmp_path / "x.npy").status == 0
@@ -113,31 +106,6 @@ def test_modulo_a_prime_where_chi_does_not_split_there_is_elimination(kahanmaps)
 
 
 # The summary
-
-
-def test_the_summary_is_a_table_of_lines(kahanmaps, tmp_path):
-    (tmp_path / "s.txt").write_text("1/2\n-1\n1/3\n")  # 1/2, 1, pole; 1/3, 1/2, 1, pole
-    outcome = kahanmaps(f"{SQUARE} --steps 9 --starts", tmp_path / "s.txt")
-    lines = outcome.out.splitlines()
-    assert outcome.status == 3
-    assert lines[0] == "# inline, eps = 1/2 (time step 2 eps = 1), float arithmetic"
-    assert lines[1:7] == [
-        "orbits\t3",
-        "steps\t9",
-        "kernel\tnumpy generic",
-        "completed\t2",
-        "overflow\t0",
-        "singular\t1",
-    ]
-    assert lines[-1] == "ended early\torbit 0\tsingular: I - eps f'(x) is singular in machine numbers at step 1"
-
-
-def test_near_singular_steps_are_counted(kahanmaps, tmp_path):
-    (tmp_path / "s.txt").write_text("1/3,1\n0.99999999999999,1\n")
-    command = "ensemble --vars x,y --rhs x^2 --rhs y --eps 1/2 --kernel numpy"
-    found = kahanmaps(f"{command} --steps 1 --json --starts", tmp_path / "s.txt").json
-    # I - eps f'(x) = diag(1 - x, 1/2), and 1 - x = 1e-14 is below 2^-40
-    assert found["near_singular"] == {"steps": 1, "orbits": 1, "first": {"orbit": 1, "step": 0}}
 
 
 def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):

@@ -5,7 +5,6 @@ What a seed draws is the same everywhere. Files that are written are read by eve
 
 import json
 import tomllib
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -72,13 +71,6 @@ def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
 
 # show: members that do not say so
 
-HIDDEN = """
-variables = ["q1", "p1", "q2", "p2"]
-[hamiltonian]
-H = "q1^3 + p1^2*q1 + 3*q2^3 - 2*p2^2*q2"
-J = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 2], [0, 0, -2, 0]]
-"""
-
 
 @pytest.fixture
 def forgetful(kahanmaps, pair):
@@ -101,26 +93,6 @@ def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, whic
     assert (shown["found"]["generic"], shown["found"]["dimension"], shown["found"]["standard"]) == (True, 2, True)
     assert shown["hamiltonians"][0] == member["hamiltonians"][0]
     assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
-
-
-def test_another_structure_is_shown_in_coordinates_that_make_it_standard(kahanmaps, tmp_path):
-    (tmp_path / "a.toml").write_text(HIDDEN)
-    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
-    assert shown["variables"] == ["y1", "y2", "y3", "y4"]
-    assert shown["found"]["standard"] is False
-    t, m = ([[Fraction(entry) for entry in row] for row in shown["found"][key]] for key in ("T", "A"))
-    # T [[0, I], [-I, 0]] T^T = J
-    structure = [
-        [sum(t[i][k] * t[j][k + 2] - t[i][k + 2] * t[j][k] for k in range(2)) for j in range(4)] for i in range(4)
-    ]
-    assert structure == [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 2], [0, 0, -2, 0]]
-    # q1, p1 are one part, q2, p2 the other
-    assert [[m[i][j] * (i != j) for j in range(4)] for i in range(4)] == [[0] * 4] * 4
-    assert m[0][0] == m[1][1] != m[2][2] == m[3][3]
-    out = kahanmaps("family show", tmp_path / "a.toml", "--normal-form").out
-    assert "in coordinates y with x = T y and standard J\n" in out
-    assert "\nx = T y, T =\n" in out
-    assert "\ny = S z with" in out
 
 
 # associated

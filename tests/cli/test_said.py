@@ -2,12 +2,14 @@
 
 The table is tests/cli/said.txt: a command, behind a number where it does not end with 0, and behind each ` => ` words
 of standard output or standard error, blanks for tabs and line breaks; behind ` => not: ` words that are in neither.
+Behind ` <= ` stands what is in the file that the command names, with \\n for a new line.
 """
 
 import re
 from pathlib import Path
 
 import pytest
+from cli_helpers import with_its_file
 from helpers import table
 
 TABLE = table(Path(__file__).with_name("said.txt"))
@@ -21,7 +23,7 @@ def test_a_command_says_what_it_found(kahanmaps, pair, tmp_path, monkeypatch, re
         request.getfixturevalue("unrendered")
     monkeypatch.chdir(tmp_path)
     status, words = re.fullmatch(r"(?:([0-9]+) )?(.*)", command).groups()
-    outcome = kahanmaps(words.replace("{pair}", str(pair)))
+    outcome = kahanmaps(with_its_file(words).replace("{pair}", str(pair)))
     assert outcome.status == int(status or 0), outcome.err
     said = " ".join(f"{outcome.out} {outcome.err}".split())
     missing = [one for one in expected if not one.startswith("not: ") and one not in said]

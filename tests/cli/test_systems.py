@@ -54,19 +54,6 @@ def test_the_file_that_is_printed_reads_back_equal(kahanmaps, name):
     assert parse_system(kahanmaps("systems", name, "--toml").out, name) == catalog.load(name)
 
 
-def test_a_file_of_ones_own_is_shown_as_well(kahanmaps, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('variables = ["x"]\n[system]\nrhs = ["x^2"]\n')
-    assert kahanmaps("systems", path).out == "mine\nx' = x^2\n"
-    path.write_text(path.read_text() + '[integrals]\nI = "x"\n[density]\nphi = "x"\n')
-    lines = kahanmaps("systems", path).out.splitlines()
-    assert lines[2:] == ["claimed integral I = x", "claimed density phi = x  (dx/phi is invariant)"]
-    document = kahanmaps("convert", path, "--to", "latex").out
-    assert "Integrals of the map, as the file claims:" in document
-    assert "varphi$, as the file claims:" in document
-    assert "claim" not in kahanmaps("systems", "euler_top").out + kahanmaps("convert", "euler_top", "--to", "latex").out
-
-
 # LaTeX
 
 EULER = r"""\[

@@ -5,10 +5,10 @@ are not said. Behind ` <= ` stands what is in the file that the command names, w
 checks is made of their table.
 """
 
-import re
 from pathlib import Path
 
 import pytest
+from cli_helpers import with_its_file
 from helpers import table
 
 from kahanmaps.checks.table import CHECKS
@@ -22,12 +22,8 @@ CASES.append(("check euler_top", f"Did you mean {' or '.join(CHECKS)}?"))
 def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, case):
     monkeypatch.chdir(tmp_path)
     command, *expected = case
-    command, is_with_file, content = command.partition(" <= ")
-    if is_with_file:
-        name = next(word for word in command.split() if re.fullmatch(r"s|\w+\.\w+", word))
-        Path(name).write_text(content.replace("\\n", "\n"))
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out, len(list(tmp_path.iterdir()))) == (2, "", bool(is_with_file))
+    outcome = kahanmaps(with_its_file(command))
+    assert (outcome.status, outcome.out, len(list(tmp_path.iterdir()))) == (2, "", " <= " in command)
     said = " ".join(outcome.err.split())
     for words in expected:
         assert (words.removeprefix("not: ") in said) is not words.startswith("not: ")
