@@ -140,24 +140,11 @@ def test_all_mistakes_of_a_spec_are_told_and_nothing_is_begun(batch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("run", "missing SPEC"),
-        ("run no.toml", "cannot read the spec no.toml"),
-        ("run --db no.db", "there is no database no.db"),
-        ("run study.toml --shard 4/3", "expected I/N"),
-        ("run study.toml -e spice", "did you mean space?"),
-        ("run study.toml -j 0", "-j"),
-        ("run study.toml --json --jsonl", "not both"),
-        ("run study.toml -j 2 --scheduler x", "not both"),
-        ("status", "--db"),
-        ("status --db no.db", "there is no database no.db"),
-        ("status --db study.toml", "study.toml"),
         ("show 12 --db study.db", "4"),
         ("show ffff0000 --db study.db", "no task"),
         ("export --db study.db", "missing --csv, --jsonl or --parquet"),
         ("export --db study.db --parquet", "needs -o"),
         ("summary --db study.db --by sead", "seed"),
-        ("merge all.db no.db", "there is no database no.db"),
-        ("tasks orbot", "did you mean orbit?"),
     ],
 )
 def test_wrong_use_is_status_2_and_a_sentence(batch, words, message, space):

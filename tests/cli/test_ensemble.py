@@ -21,14 +21,6 @@ TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
 PRIME = 2**61 - 1
 
 
-def summary(outcome):
-    """The lines of the table, by their first word; those of a word that comes twice in a list."""
-    found = {}
-    for name, *cells in outcome.rows:
-        found.setdefault(name, []).append("\t".join(cells))
-    return found
-
-
 def saved(path, array, **how):
     np.save(path, array, **how)
     return path

@@ -135,22 +135,6 @@ def test_a_root_of_degree_one_is_a_rational_number():
     assert km.load("euler_top", {"a1": "root of 2*t - 3"}) == km.load("euler_top", {"a1": "3/2"})
 
 
-@pytest.mark.parametrize(
-    ("value", "words"),
-    [
-        ("root of t^2 - 4", "expected an irreducible polynomial: its factors are t - 2, t [+] 2"),
-        ("root of t^2 - s", "expected a polynomial in one variable"),
-        ("root of 3", "one variable"),
-        ("root of t^13 - 2", "expected a degree from 1 to 12"),
-        ("root of t^2 - 2 near x", "found 'x'"),
-        ("root of t^2 - ", "t"),
-    ],
-)
-def test_what_names_no_root_is_refused(value, words):
-    with pytest.raises(InputError, match=words):
-        km.System(TOP, a=value)
-
-
 def test_what_needs_rational_numbers_refuses_in_a_sentence():
     file = km.System(TOP, a=ROOT)
     for function in (km.find_poisson, km.find_symmetry, km.commuting_systems):
@@ -191,10 +175,3 @@ def test_the_bound_is_one_for_all_conjugates():
     sizes = [abs(complex(z)) for z, _ in root.polynomial.complex_roots()]
     assert all(bound.scale * size <= 2**bound.above.bits for size in sizes)
     assert root.number_field == EtaleAlgebra(root.polynomial)
-
-
-@pytest.mark.parametrize(("value", "is_hinted"), [("1 + sqrt(2)", True), ("2,5", False)])
-def test_other_expressions_with_a_square_root_are_told_how_to_be_given(value, is_hinted):
-    with pytest.raises(InputError) as refused:
-        km.System("x' = a*x", a=value)
-    assert ("root of t^2 - 2" in str(refused.value)) is is_hinted

@@ -207,18 +207,6 @@ def test_a_key_is_recognised_in_the_middle_of_a_sentence():
 # load
 
 
-@pytest.mark.parametrize(
-    ("wrong", "meant"),
-    [
-        ("Euler-Top", "euler_top"),
-        ("planar", "planar_cubic_hamiltonian"),
-    ],
-)
-def test_an_unknown_name_is_answered_with_a_close_one_and_the_way_to_list_all(wrong, meant):
-    with pytest.raises(InputError, match=f"did you mean .*{meant}.* 'kahanmaps systems' lists the catalogue"):
-        load(wrong)
-
-
 @pytest.mark.parametrize("wrong", ["", "x" * 1000, "\x1b[31m"])
 def test_a_name_that_is_like_no_other_is_refused_in_one_short_printable_line(wrong):
     with pytest.raises(InputError, match="'kahanmaps systems' lists the catalogue") as caught:

@@ -16,7 +16,6 @@ from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.lotka_volterra import degree
-from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.recipes import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -56,26 +55,6 @@ def test_a_member_is_the_system_that_one_would_write():
     assert load("lv(3,1)").system == load("volterra_periodic_3").system
     rhs = ["x1*(x2+x3+x4-x5)", "x2*(x3+x4+x5-x1)", "x3*(x4+x5-x1-x2)", "x4*(x5-x1-x2-x3)", "x5*(x1-x2-x3-x4)"]
     assert load("lv(5,1)").system == QuadraticSystem.from_text([f"x{i}" for i in range(1, 6)], rhs)
-
-
-@pytest.mark.parametrize(
-    ("reference", "words"),
-    [
-        ("lv", "expected lv(n,k) with integers, e.g. lv(7,3)"),
-        ("lv(7)", "expected lv(n,k) with integers"),
-        ("lv(7,1/2)", "expected lv(n,k) with integers"),
-        ("lv(1,0)", "found lv(1,0), expected lv(n,k) with 2 <= n <= 40, 0 <= k and 2k + 1 <= n"),
-        ("lv(6,3)", "2k + 1 <= n"),
-        ("lv(6,-1)", "0 <= k"),
-        ("lv(999,1)", "n <= 40"),
-        ("vl(7,3)", "found the unknown system"),
-    ],
-)
-def test_other_arguments_are_refused_in_one_line(reference, words):
-    with pytest.raises(InputError) as caught:
-        load(reference)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):

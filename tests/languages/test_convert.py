@@ -5,9 +5,6 @@ import pytest
 import kahanmaps as km
 from kahanmaps.languages.convert import LANGUAGES, convert
 
-CALL = "import kahanmaps as km; from kahanmaps.languages.convert import convert, PARTS; "
-CALL += "print(convert(km.load('weierstrass'), 'julia', PARTS), end='')"
-
 
 @pytest.mark.parametrize(
     ("language", "what", "more", "told"),
