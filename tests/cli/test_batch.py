@@ -145,6 +145,7 @@ def test_all_mistakes_of_a_spec_are_told_and_nothing_is_begun(batch):
         ("export --db study.db", "missing --csv, --jsonl or --parquet"),
         ("export --db study.db --parquet", "needs -o"),
         ("summary --db study.db --by sead", "seed"),
+        ("merge all.db no.db", "there is no database no.db"),
     ],
 )
 def test_wrong_use_is_status_2_and_a_sentence(batch, words, message, space):
