@@ -292,6 +292,10 @@ def test_a_batch_goes_on_when_nobody_reads_its_records(unread, kahanmaps, least_
     assert kahanmaps("batch status --db new.db --json").json["experiments"][0]["missing"] == 0
 
 
+def test_an_orbit_ends_early_when_its_reader_leaves(unread):
+    assert unread("orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007") == 3
+
+
 def test_a_command_ends_early_when_the_reader_of_its_pipe_leaves(tmp_path):
     words = "orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007 -q -o p"
     outcome = shell(f"mkfifo p; head -n 1 p > /dev/null & kahanmaps {words}", tmp_path)

@@ -1,5 +1,7 @@
 """kahanmaps singularities: verdicts as text and JSON, exit statuses, and wrong use."""
 
+from cli_helpers import terminal
+
 from kahanmaps.version import __version__
 
 
@@ -14,3 +16,8 @@ def test_two_eps_and_the_symbolic_denominator_by_default(kahanmaps):
             assert len(hypersurface["ranks"]) == 12
             assert len(set(hypersurface["primes"])) == 2
     assert found["document"]["system"]
+
+
+def test_long_polynomials_are_shortened_on_a_terminal_only(kahanmaps):
+    assert "chars)" in terminal("singularities", "lorenz", "--eps", "1/7", "--steps", "2").out
+    assert "chars)" not in kahanmaps("singularities lorenz --eps 1/7 --steps 2").out

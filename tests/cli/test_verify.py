@@ -132,6 +132,13 @@ def test_verbose_shows_the_evidence():
     assert "random points over GF(p): held at" in long
 
 
+def test_what_is_outside_the_hypotheses_is_told_on_a_terminal():
+    outcome = terminal("verify", "--chi", "(t-1)^2*(t+2)", "--section", "9", columns=200)
+    assert outcome.status == 3
+    assert "undecided" in plain(outcome)
+    assert "repeated roots" in plain(outcome)
+
+
 # What survives
 
 
