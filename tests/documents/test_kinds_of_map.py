@@ -14,7 +14,7 @@ from kahanmaps.checks.preserve import check_measure, check_poisson, density_iden
 from kahanmaps.checks.settings import Settings, eps_words
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
@@ -106,22 +106,6 @@ def test_the_new_point_may_have_any_names():
     plain = 'variables = ["x"]\n[bilinear]\nequations = ["X - x = 2*eps*x*X"]'
     named = 'variables = ["x"]\n[bilinear]\nnew = ["b"]\nequations = ["b - x = 2*eps*x*b"]'
     assert parse_system(plain, "same").map.subject == parse_system(named, "same").map.subject
-
-
-def test_the_polarised_map_of_a_system_of_two_names_that_clash_is_refused():
-    with pytest.raises(SystemFileError, match="x_1"):
-        parse_system('variables = ["x", "x_1"]\n[system]\nrhs = ["x^3", "1"]\ndiscretization = "polarised"')
-
-
-def test_a_parameter_that_a_polarised_map_calls_a_variable_is_refused():
-    text = 'variables = ["x"]\n[parameters]\nx_1 = "2"\n[system]\nrhs = ["x^3"]\ndiscretization = "polarised"'
-    with pytest.raises(SystemFileError, match=r"parameters\.x_1: is a variable of the map as well"):
-        parse_system(text)
-
-
-def test_capitals_that_are_taken_ask_for_other_names():
-    with pytest.raises(SystemFileError, match=r"give new = \["):
-        parse_system('variables = ["X"]\n[bilinear]\nequations = ["X = X"]')
 
 
 LOST = 'variables = ["x", "y"]\n[map]\nimage = ["x + y/eps", "y/(eps - 1) + (x + y/eps)^2/(eps^2 - 1/4)"]'
