@@ -27,6 +27,7 @@ FOR_PROGRAMS = (
     "manual",
     "family new",
     "family tensor",
+    "schema",  # lines of its list are not broken
 )
 
 
