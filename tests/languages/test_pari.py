@@ -2,7 +2,7 @@
 
 import pytest
 from flint import fmpq
-from language_helpers import HAS_GP, ask_gp, converted, gp_prints, questions, systems
+from language_helpers import CATALOGUE, HAS_GP, ask_gp, converted, gp_prints, questions, systems
 
 import kahanmaps as km
 from kahanmaps.algebra.written.text import parse_polynomial
@@ -51,7 +51,7 @@ def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themsel
     assert found == [parse_polynomial(piece, names) for piece in ("-3/2*a1", "-3*a2", "a3/2")]
 
 
-WITH_PARAMETERS = [name for name in SYSTEMS if SYSTEMS[name].parameters and SYSTEMS[name].kind != "family"]
+WITH_PARAMETERS = [name for name in CATALOGUE if SYSTEMS[name].parameters and SYSTEMS[name].kind != "family"]
 
 
 @pytest.mark.parametrize("name", WITH_PARAMETERS)
