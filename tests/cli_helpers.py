@@ -1,12 +1,11 @@
 """What the tests of the command line share: the outcome of a command, a shell and a terminal to run it in."""
 
-from __future__ import annotations
-
 import fcntl
 import io
 import json
 import os
 import pty
+import re
 import struct
 import subprocess
 import sys
@@ -57,6 +56,15 @@ class Outcome:
     def rows(self) -> list[list[str]]:
         """The cells of tab-separated lines, comments left out."""
         return [line.split("\t") for line in self.out.splitlines() if not line.startswith("#")]
+
+
+def with_its_file(line: str) -> str:
+    """The command of a line `COMMAND <= CONTENT`, once the file that it names is written; `\\n` is a new line in it."""
+    command, is_given, content = line.partition(" <= ")
+    if is_given:
+        name = next(word for word in command.split() if re.fullmatch(r"s|[a-z]+\.[a-z]+", word))
+        Path(name).write_text(content.replace("\\n", "\n"))
+    return command
 
 
 def environment(**more: str) -> dict[str, str]:

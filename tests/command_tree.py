@@ -1,65 +1,20 @@
 """All commands of the command line, and the examples in their help."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator
+from pathlib import Path
 
 import click
+from helpers import table
 
 from kahanmaps.checks.table import CHECKS
 from kahanmaps_cli.main import WELCOME, cli
 from kahanmaps_cli.options import Renamed
 
-# The least that a command needs, as quick as it can be, in the folder of the fixture `least_folder`.
-LEAST = {
-    "systems": "euler_top",
-    "orbit": "harmonic --start 1,2 --eps 1/10 --steps 1",
-    "period": "paper_m2 --start 1,2,3,4 --eps 1/10 --arithmetic mod:7",
-    "ensemble": "harmonic --random 1 --eps 1/10 --steps 1",
-    **{name: "harmonic harmonic" if check.is_of_pair else "harmonic" for name, check in CHECKS.items()},
-    "analyze": "harmonic --seconds 1",
-    "degrees": "harmonic --terms 3 --seconds 1",
-    "scan": "henon_heiles --over c --primes 5,7,11 --terms 2",
-    "heights": "harmonic --steps 20 --seconds 1",
-    "find-integrals": "harmonic --seconds 1",
-    "find-density": "harmonic --seconds 1",
-    "find-poisson": "harmonic --seconds 1",
-    "find-symmetry": "harmonic --seconds 1",
-    "find-commuting": "harmonic --seconds 1",
-    "singularities": "harmonic --seconds 1",
-    "cycles": "harmonic --prime 5 --eps 1/3 --seconds 1",
-    "lyapunov": "harmonic --random 1 --eps 1/10 --steps 100 --seconds 1",
-    "verify": "--m 1 --section 2",
-    "family new": "--m 1",
-    "family show": "paper_m2",
-    "family space": "paper_m2",
-    "family tensor": "harmonic --algebra t^2-2",
-    "family associated": "paper_m2",
-    "batch run": "SPEC --dry-run",
-    "batch status": "--db DB",
-    "batch show": "0000 --db DB",
-    "batch export": "--csv --db DB",
-    "batch summary": "--db DB",
-    "batch merge": "OTHER DB",
-    "batch tasks": "",
-    "plot commute": "harmonic harmonic --start 1,2 --eps 1/10 --steps 1 --format text",
-    "plot degrees": "harmonic --terms 3 --seconds 1 --format text",
-    "plot drift": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
-    "plot heights": "harmonic --start 1,2 --eps 1/10 --steps 3 --seconds 1 --format text",
-    "plot invariant-curves": "paper_m2 --start 1,2,3,4 --eps 1/100 --steps 2 --format text",
-    "plot scan": "zhukovski_volterra_2 --over b1,b2 --primes 5,7,11 --terms 2 --format text",
-    "plot portrait": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
-    "plot batch": "DB --format text",
-    "plot recipe": "PICTURE",
-    "report": "harmonic --from checks --no-pictures",
-    "convert": "harmonic --to latex",
-    "schema": "",
-    "completion": "bash",
-    "manual": "",
-    "version": "",
-}
+# The least that a command needs, in the folder of the fixture `least_folder`.
+LEAST = dict(line.split(" => ") for line in table(Path(__file__).with_name("cli") / "least.txt")["least"])
+LEAST |= {name: "harmonic harmonic" if check.is_of_pair else "harmonic" for name, check in CHECKS.items()}
 
 
 def all_commands() -> list[tuple[str, click.Command]]:

@@ -1,7 +1,5 @@
 """A page as its reader sees it: parsed, with its text, headings, links and what it would fetch."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from html import unescape

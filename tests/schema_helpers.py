@@ -1,7 +1,5 @@
 """What the tests of JSON schemas share: what is wrong with data, and which schema a command line has."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

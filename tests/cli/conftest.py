@@ -1,7 +1,5 @@
 """The command line in the process of the tests, and a member of the family to try it on."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable
 from itertools import count
@@ -64,6 +62,13 @@ def least_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("SPEC").write_text('[experiments.a]\ntask = "orbit"\nsystem = "harmonic"\naxes = {eps = "1/10"}\n')
     Path("PICTURE").write_bytes(b"\x89PNG\r\n\x1a\n")
     return tmp_path
+
+
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are made but not rendered: for tests of what is said."""
+    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
+    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """Colours: where they go, who decides, and that they are readable and never alone."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -19,11 +17,6 @@ GREEN, RED = "\x1b[32m", "\x1b[31m"
 def no_wishes(monkeypatch):
     for name in ("NO_COLOR", "FORCE_COLOR", "CLICOLOR_FORCE"):
         monkeypatch.delenv(name, raising=False)
-
-
-@pytest.mark.parametrize("command", ["systems", CHECK, "degrees weierstrass"])
-def test_a_pipe_gets_no_colours(kahanmaps, command):
-    assert ESCAPE not in kahanmaps(command).out
 
 
 @pytest.mark.parametrize("command", ["systems", CHECK, "degrees weierstrass"])

@@ -1,7 +1,5 @@
 """Completion in the shell: what is offered where, at once, and never a traceback."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil
@@ -108,13 +106,6 @@ def test_nothing_that_computes_is_loaded():
 
 
 # The scripts
-
-
-@pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
-def test_a_script_is_printed_for_each_shell(kahanmaps, name):
-    script = kahanmaps("completion", name).out
-    assert "_KAHANMAPS_COMPLETE" in script
-    assert f"{name}_complete" in script
 
 
 def test_the_shell_is_that_of_the_environment(kahanmaps, monkeypatch):

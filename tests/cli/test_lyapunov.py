@@ -1,9 +1,6 @@
 """kahanmaps lyapunov: numbers as text and JSON, orbits that end, exit statuses, and wrong use."""
 
-from __future__ import annotations
-
 import pytest
-from cli_helpers import shell
 
 
 def test_numbers_are_printed_per_time_and_per_step(kahanmaps):
@@ -21,31 +18,3 @@ def test_starts_from_a_file(kahanmaps, tmp_path):
     found = kahanmaps("lyapunov harmonic --eps 1/10 --steps 50 --json --starts", tmp_path / "starts.csv").json
     assert found["orbits"] == 2
     assert found["per_time"] == pytest.approx([0, 0], abs=1e-12)
-
-
-def test_orbits_that_end_are_counted(kahanmaps, tmp_path):
-    (tmp_path / "starts.csv").write_text("10\n-1\n")  # 10 is the pole of x^2 at eps = 1/20
-    outcome = kahanmaps("lyapunov --vars x --rhs x^2 --eps 1/20 --steps 50 --starts", tmp_path / "starts.csv")
-    assert outcome.status == 3
-    assert outcome.rows[0] == ["orbits", "1 of 2"]
-    assert "1 of 2 orbits left the range of floats or met a pole" in outcome.err
-
-
-def test_no_orbit_left_is_null_in_json(kahanmaps, tmp_path):
-    (tmp_path / "starts.csv").write_text("10\n")
-    outcome = kahanmaps("lyapunov --vars x --rhs x^2 --eps 1/20 --steps 50 --json --starts", tmp_path / "starts.csv")
-    assert outcome.status == 3
-    assert (outcome.json["per_time"], outcome.json["sum"], outcome.json["log_volume"]) == ([None], None, None)
-    assert outcome.json["residual"] is None
-
-
-def test_a_clock_that_stops_is_status_three(kahanmaps):
-    outcome = kahanmaps("lyapunov lorenz --eps 1/100 --seconds 0.0000001")
-    assert outcome.status == 3
-    assert "stopped by the clock" in outcome.err
-
-
-def test_help_fits_the_screen(tmp_path):
-    outcome = shell("kahanmaps lyapunov --help", tmp_path, COLUMNS="80")
-    assert outcome.status == 0
-    assert max(map(len, outcome.out.splitlines())) <= 80

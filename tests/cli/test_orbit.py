@@ -4,8 +4,6 @@ The JSON lines are an interface: a header from which the orbit can be made again
 what happened.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -26,8 +24,6 @@ from kahanmaps_cli.screen.progress import Progress
 
 TOP = "orbit euler_top --start 1,1/2,-1/3 --eps 1/10"
 LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
-LOTKA_VOLTERRA = "orbit lotka_volterra --start 1/2,2/3 --eps 1/10"
-PRIMES = [10007, 2**61 - 1, 2**63 - 25, 2**63 + 29, 2**89 - 1]
 
 
 def test_an_inline_system_may_be_written_as_equations(kahanmaps):
@@ -70,35 +66,6 @@ def test_the_header_has_the_documented_shape(kahanmaps):
     }
 
 
-def test_a_point_has_the_integrals_that_were_asked_for(kahanmaps):
-    records = kahanmaps(f"{TOP} --steps 0 --integral F1 --integral s=x1+x2 --format jsonl").records
-    # by hand: F1 = (1 - eps^2 x2^2)/(1 + 2 eps^2 x3^2) = (399/400)/(902/900)
-    assert records[1]["integrals"] == {"F1": "3591/3608", "s": "3/2"}
-
-
-def test_the_end_of_a_periodic_orbit_has_the_period(kahanmaps):
-    # x~ = -y, y~ = x at eps = 1: a quarter turn
-    end = kahanmaps("orbit harmonic --start 1,0 --eps 1 --steps 10 --format jsonl").records[-1]
-    assert (end["status"], end["steps"], end["period"]) == ("periodic", 10, 4)
-
-
-@pytest.mark.parametrize(
-    ("command", "status", "steps"),
-    [
-        ("orbit --vars x --rhs x^2 --start 1/3 --eps 1/2 --steps 9", "singular", 2),  # 1/3, 1/2, 1, pole
-        (f"{LOTKA_VOLTERRA} --steps 90 --max-digits 100", "budget", 5),
-        (f"{TOP} --steps 9 --arithmetic ball:2", "precision", 1),
-    ],
-)
-def test_the_end_of_an_orbit_stopped_early_says_why_and_where(kahanmaps, command, status, steps):
-    outcome = kahanmaps(f"{command} --format jsonl")
-    end = outcome.records[-1]
-    assert outcome.status == 3
-    assert (end["status"], end["steps"]) == (status, steps)
-    assert [record["step"] for record in outcome.records[1:-1]] == list(range(steps + 1))
-    assert end["message"]
-
-
 @pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:100"])
 def test_an_orbit_can_be_made_again_from_its_header(kahanmaps, arithmetic):
     first = kahanmaps(f"{LORENZ} --steps 4 --arithmetic {arithmetic} --format jsonl --backward")
@@ -120,13 +87,6 @@ def test_at_picks_iterates(kahanmaps):
     assert picked[1:-1] == [every[1 + step] for step in (0, 4, 6)]
 
 
-def test_every_picks_multiples(kahanmaps):
-    every = kahanmaps(f"{TOP} --steps 8 --format jsonl").records
-    picked = kahanmaps(f"{TOP} --steps 8 --every 3 --format jsonl").records
-    assert picked[1:-1] == [every[1 + step] for step in (0, 3, 6)]
-    assert picked[-1] == every[-1]
-
-
 # Where the system comes from
 
 
@@ -140,47 +100,6 @@ def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_co
     assert kahanmaps(f"orbit {inline} {rest}").records[1:] == from_catalogue
     piped = shell(f"kahanmaps orbit - {rest}", tmp_path, stdin=toml.encode())
     assert piped.records[1:] == from_catalogue
-
-
-def test_parameters_are_set_with_p(kahanmaps):
-    assert kahanmaps(f"{TOP} -p a1=5/2 -p a3=0.5 --steps 1 --format jsonl").records[0]["rhs"] == [
-        "5/2*x2*x3",
-        "-2*x1*x3",
-        "x1*x2/2",
-    ]
-
-
-# Integrals
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007"])
-def test_a_conserved_integral_keeps_its_value(kahanmaps, arithmetic):
-    outcome = kahanmaps(f"{TOP} --steps 5 --integral F1 --arithmetic {arithmetic} --format jsonl")
-    assert len({record["integrals"]["F1"] for record in outcome.records[1:-1]}) == 1
-
-
-def test_known_integrals_are_those_of_theorems_and_of_the_file(kahanmaps, pair):
-    assert kahanmaps(f"{TOP} --steps 1 --integral known").rows[0][4:] == ["F1", "F2"]
-    names = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known").rows[0][5:]
-    assert {"modified H", "H~", "K~_+-"} <= set(names)
-
-
-def test_known_integrals_of_a_member_of_the_family_are_conserved(kahanmaps, pair):
-    rows = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/1000 --steps 3 --integral known").rows
-    assert len({tuple(row[5:]) for row in rows[1:]}) == 1
-
-
-def test_integrals_of_theorems_are_refused_in_floats(kahanmaps, pair):
-    outcome = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known --arithmetic float")
-    assert outcome.status == 2
-    assert "needs exact, mod:P or ball:BITS arithmetic" in outcome.err
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:64"])
-def test_an_integral_has_no_value_at_a_pole(kahanmaps, arithmetic):
-    outcome = kahanmaps(f"{TOP} --steps 1 --integral p=1/(x1-1) --arithmetic {arithmetic} --format jsonl")
-    assert outcome.status == 0
-    assert [record["integrals"]["p"] is None for record in outcome.records[1:-1]] == [True, False]
 
 
 # Formats
@@ -209,19 +128,6 @@ def test_csv_is_read_by_the_csv_module(kahanmaps):
         assert row["p"] == (record["integrals"]["p"] or "")
 
 
-@pytest.mark.parametrize(("arithmetic", "kind"), [("exact", None), ("float", "f")])
-def test_a_csv_file_is_a_table_without_options(kahanmaps, tmp_path, arithmetic, kind):
-    path = tmp_path / "orbit.csv"
-    kahanmaps(f"{TOP} --steps 4 --arithmetic {arithmetic} -o", path)
-    with path.open(newline="") as stream:
-        names, *rows = csv.reader(stream, strict=True)
-    assert (names, len(rows)) == (["step", "x1", "x2", "x3"], 5)
-    assert {len(row) for row in rows} == {4}
-    table = pytest.importorskip("pandas").read_csv(path)
-    assert (table.shape, table["step"].dtype.kind) == ((5, 4), "i")
-    assert kind in (None, table["x1"].dtype.kind)
-
-
 @pytest.fixture
 def npz(kahanmaps, tmp_path):
     """Run an orbit into an npz file and load it."""
@@ -236,25 +142,12 @@ def npz(kahanmaps, tmp_path):
     return run
 
 
-def test_npz_holds_exact_numbers_exactly(npz, kahanmaps):
-    exact = fractions(kahanmaps(f"{TOP} --steps 6 --format jsonl"))
-    assert [[Fraction(x.decode()) for x in row] for row in npz(f"{TOP} --steps 6").x] == exact
-
-
-@pytest.mark.parametrize("prime", [p for p in PRIMES if p < 2**63])
+@pytest.mark.parametrize("prime", [10007, 2**63 - 25])
 def test_npz_holds_residues_as_integers(npz, kahanmaps, prime):
     command = f"{TOP} --steps 3 --arithmetic mod:{prime}"
     found = npz(command)
     assert found.x.dtype == np.int64
     assert found.x.tolist() == fractions(kahanmaps(f"{command} --format jsonl"))
-
-
-def test_npz_holds_floats_as_they_are(npz, kahanmaps):
-    command = f"{TOP} --steps 3 --arithmetic float"
-    found = npz(command)
-    assert found.x.dtype == np.float64
-    records = kahanmaps(f"{command} --format jsonl").records
-    assert found.x.tolist() == [[float(entry) for entry in record["x"]] for record in records[1:-1]]
 
 
 def test_npz_holds_header_and_end(npz, kahanmaps):
@@ -269,9 +162,7 @@ def test_npz_holds_header_and_end(npz, kahanmaps):
     }
 
 
-@pytest.mark.parametrize(
-    ("arithmetic", "first"), [("exact", b""), ("mod:10007", b""), ("float", np.nan), ("ball:64", b"")]
-)
+@pytest.mark.parametrize(("arithmetic", "first"), [("exact", b""), ("float", np.nan)])
 def test_npz_holds_integrals_with_a_mark_for_poles(npz, arithmetic, first):
     found = npz(f"{TOP} --steps 2 --integral p=1/(x1-1) --integral x1+x2 --arithmetic {arithmetic}")
     assert found.integrals.shape == (3, 2)
@@ -287,12 +178,6 @@ def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monke
 
 
 # Files
-
-
-@pytest.mark.parametrize("form", ["jsonl", "csv"])
-def test_the_name_of_the_file_says_the_format(kahanmaps, tmp_path, form):
-    kahanmaps(f"{TOP} --steps 2 -o", tmp_path / f"orbit.{form}")
-    assert (tmp_path / f"orbit.{form}").read_text() == kahanmaps(f"{TOP} --steps 2 --format {form}").out
 
 
 def test_what_a_csv_file_is_of_stands_beside_it(kahanmaps, tmp_path):
@@ -333,11 +218,11 @@ def test_the_clock_on_a_terminal_moves_by_itself_until_the_end(monkeypatch):
     monkeypatch.setattr("sys.stderr", screen)
     with Progress() as progress:
         progress("a long step")
-        time.sleep(2.3)
+        time.sleep(1.3)
         progress.clear()
         cleared = screen.getvalue()
         time.sleep(1.2)
-    assert re.findall(r"a long step \((\d) s\)", cleared) == ["1", "2"]
+    assert re.findall(r"a long step \((\d) s\)", cleared) == ["1"]
     assert screen.getvalue() == cleared
 
 
@@ -363,11 +248,6 @@ def test_in_narrow_columns_long_numbers_are_decimals_with_their_digits_as_well()
     assert "(30/28)" not in terminal(*shlex.split(f"{TOP} --steps 1"), columns=64).out
 
 
-def test_columns_are_aligned_on_a_terminal(on_terminal):
-    table = [line for line in on_terminal.out.splitlines() if "#" not in line]
-    assert len({len(line) for line in table}) == 1
-
-
 def test_npz_is_refused_on_a_terminal():
     outcome = terminal(*shlex.split(f"{TOP} --steps 5 --format npz"))
     assert (outcome.status, outcome.out) == (2, "")
@@ -377,32 +257,21 @@ def test_npz_is_refused_on_a_terminal():
 # Interrupts
 
 
-@pytest.fixture(scope="module", params=[signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
-def interrupted(request, tmp_path_factory):
-    """An endless orbit, written to a file, that got a signal: exit status, standard error, lines of the file."""
-    path = tmp_path_factory.mktemp("interrupted") / "orbit.jsonl"
+def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
+    path = tmp_path / "orbit.jsonl"
     words = f"{TOP} --steps {10**12} --arithmetic mod:10007 --every 100 -o {path}"
     process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
     while not path.exists() or not path.stat().st_size:  # the first records are in the file
         time.sleep(0.02)
-    process.send_signal(request.param)
-    err = process.communicate(timeout=30)[1]
-    return SimpleNamespace(status=process.returncode, err=err, lines=path.read_text().splitlines())
-
-
-def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(interrupted):
-    records = [json.loads(line) for line in interrupted.lines]
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    assert process.returncode == 130
+    records = [json.loads(line) for line in path.read_text().splitlines()]
     steps = [record["step"] for record in records[1:-1]]
     end = records[-1]
     assert (end["record"], end["status"]) == ("end", "interrupted")
     assert steps == list(range(0, end["steps"] + 1, 100))
     assert len(steps) > 1
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "float"])
-def test_integrals_are_those_of_eps_also_backward(kahanmaps, arithmetic):
-    run = kahanmaps(f"{TOP} --steps 1 --backward --integral e=10*eps --arithmetic {arithmetic} --format jsonl")
-    assert {float(record["integrals"]["e"]) for record in run.records if record["record"] == "point"} == {1.0}
 
 
 # Methods.
@@ -416,7 +285,7 @@ def points(run) -> list:
     return [record for record in run.records if record["record"] == "point"]
 
 
-@pytest.mark.parametrize("extra", ["", " --backward", " --every 5", " --integral known"])
+@pytest.mark.parametrize("extra", ["", " --backward --every 5 --integral known"])
 def test_all_methods_print_the_same_points(kahanmaps, extra):
     generic = kahanmaps(f"{MEMBER} --steps 20 --format jsonl --method generic{extra}")
     normal = kahanmaps(f"{MEMBER} --steps 20 --format jsonl --method normal-form{extra}")
@@ -429,27 +298,6 @@ def test_all_methods_print_the_same_points(kahanmaps, extra):
 def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
     line = f"{system} --at 0,3,30 --format jsonl --arithmetic {arithmetic}"
     assert points(kahanmaps(f"{line} --method doubling")) == points(kahanmaps(f"{line} --method generic"))
-
-
-@pytest.mark.parametrize(
-    ("line", "method"),
-    [
-        (f"{MEMBER} --steps 20", "normal-form"),
-        (f"{MEMBER} --steps 2", "generic"),  # looking for a structure costs more
-        (f"{MEMBER} --at 30", "doubling"),
-        (f"{IRREDUCIBLE} --steps 20", "normal-form"),
-        (f"{IRREDUCIBLE} --at 30", "doubling"),
-        (f"{MEMBER} --steps 20 --arithmetic mod:10007", "generic"),
-        (f"{MEMBER} --at 100000 --arithmetic mod:10007", "doubling"),
-        (f"{MEMBER} --steps 20 --arithmetic ball:200", "normal-form"),
-        (f"{MEMBER} --steps 20 --arithmetic float", "normal-form"),
-        ("orbit lotka_volterra --start 1,2 --eps 1/10 --steps 8", "generic"),
-    ],
-)
-def test_the_method_is_chosen_from_what_is_asked_for(kahanmaps, line, method):
-    run = kahanmaps(f"{line} --format jsonl -v")
-    assert run.records[0]["method"] == method
-    assert f"method {method}: " in run.err
 
 
 def test_an_iterate_modulo_p_may_have_a_number_of_thirty_digits(kahanmaps):
@@ -470,14 +318,7 @@ def test_steps_beyond_machine_integers_are_written_in_every_format(kahanmaps, tm
     assert path.stat().st_size > 0
 
 
-def test_an_iterate_that_would_be_too_long_is_not_begun(kahanmaps):
-    run = kahanmaps(f"{MEMBER} --at 5,100000 --format jsonl")
-    assert run.status == 3
-    assert [point["step"] for point in points(run)] == [5]
-    assert run.records[-1]["status"] == "budget"
-
-
-@pytest.mark.parametrize("line", ["--steps 60", "--at 60", "--at 1000"])
+@pytest.mark.parametrize("line", ["--steps 60", "--at 1000"])
 def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
     run = kahanmaps(f"{MEMBER} {line} --arithmetic ball:auto --accuracy 40 --format jsonl")
     assert run.status == 0
@@ -489,19 +330,11 @@ def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
         assert len(middle) >= 40
 
 
-def test_automatic_balls_work_without_a_normal_form(kahanmaps):
-    start = "--start 1/10,1/10,1/10,1/10 --eps 1/10 --steps 100 --every 100"
-    run = kahanmaps(f"orbit henon_heiles {start} --arithmetic ball:auto --format jsonl")
-    assert (run.status, run.records[-1]["status"]) == (0, "completed")
-    assert run.records[0]["arithmetic"].startswith("ball:")
-
-
 # Float orbits in .npy files, and what their end says.
 
 
-@pytest.mark.parametrize("every", [1, 7])
-def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path, every):
-    command = f"{MEMBER} --steps 30 --every {every} --arithmetic float"
+def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path):
+    command = f"{MEMBER} --steps 30 --every 7 --arithmetic float"
     outcome = kahanmaps(f"{command} -o", tmp_path / "x.npy")
     points = [
         [float(entry) for entry in record["x"]] for record in kahanmaps(f"{command} --format jsonl").records[1:-1]
@@ -511,19 +344,6 @@ def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path, every):
     assert outcome.err.startswith(f"{tmp_path / 'x.npy'}: completed: 30 steps; block integrals moved by at most ")
 
 
-def test_an_interrupted_npy_file_is_valid(tmp_path):
-    path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**10} --arithmetic float --every 10 --kernel numpy -o {path}"
-    process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
-    while not path.exists() or path.stat().st_size < 2000:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    err = process.communicate(timeout=60)[1]
-    assert process.returncode == 130
-    step = int(err.rpartition("interrupted after step ")[2])
-    assert np.load(path).shape == (step // 10 + 1, 3)
-
-
 def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singular_steps(kahanmaps):
     end = kahanmaps(f"{MEMBER} --steps 30 --arithmetic float --format jsonl").records[-1]
     assert list(end["drift"]) == [f"h/(1 + eps^2 D) at t = {root}" for root in (1, 2, 3)]
@@ -531,13 +351,6 @@ def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singul
     assert f"moved by at most {max(end['drift'].values()):.3g}" in end["message"]
     end = kahanmaps(f"{TOP} --steps 5 --arithmetic float --format jsonl").records[-1]
     assert (end["near_singular"], end["message"], "drift" in end) == (0, "5 steps", False)
-
-
-def test_balls_that_no_precision_makes_accurate_end_with_that_status(kahanmaps):
-    # x~ = (1 - 1) x / (1 + 1): zero, but no ball around it is
-    run = kahanmaps("orbit --vars x --rhs=-3*x --start 1 --eps 1/3 --steps 3 --arithmetic ball:auto --format jsonl")
-    assert (run.status, run.records[-1]["status"]) == (3, "precision")
-    assert "give 15 digits at every point" in run.records[-1]["message"]
 
 
 @pytest.mark.parametrize("method", ["generic", "normal-form", "doubling"])

@@ -1,7 +1,5 @@
 """Where pictures go and how they are remade: colours in a terminal, `plot recipe`."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps_cli.pictures.output import _seen_on_both_grounds
@@ -29,10 +27,3 @@ def test_a_picture_tells_the_command_and_the_system(kahanmaps, tmp_path, monkeyp
     assert (
         kahanmaps("plot recipe d.svg --json").json["command"] == "kahanmaps plot degrees harmonic -o d.svg -q --size 6"
     )
-
-
-def test_a_file_without_a_recipe_is_refused(kahanmaps, tmp_path):
-    (tmp_path / "x.png").write_bytes(b"no picture")
-    refused = kahanmaps("plot recipe", tmp_path / "x.png")
-    assert refused.status == 2
-    assert "expected a picture that kahanmaps wrote" in refused.err

@@ -1,7 +1,5 @@
 """kahanmaps plot portrait: what is drawn from which words, what is said, exit statuses, stored orbits, wrong use."""
 
-from __future__ import annotations
-
 import signal
 
 import numpy as np
@@ -11,8 +9,6 @@ import kahanmaps as km
 from kahanmaps.documents.catalog import load
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.portraits import draw_portrait as drawing
-from kahanmaps.plots.recipe import read_recipe
-from kahanmaps_cli.pictures.stored import read_orbits
 from kahanmaps_cli.screen.progress import Progress
 
 LV = "plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 30"
@@ -42,19 +38,6 @@ def test_a_portrait_is_drawn_in_the_terminal_unless_a_file_is_named(kahanmaps):
     assert outcome.err == "lotka_volterra: 1 orbit, 30 steps, eps = 1/20 (time step 2 eps = 1/10)\n"
 
 
-def test_lines_between_steps_are_told_where_orbits_fill_no_curve(kahanmaps):
-    said = "fill no curve that could be followed: lines join each point"
-    assert said in kahanmaps("plot portrait paper_m2 --eps 1/20 --start 1,2,3,4 --steps 50 --lines").err
-    assert said not in kahanmaps("plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 900 --lines").err
-
-
-def test_a_file_carries_its_recipe(kahanmaps, tmp_path):
-    assert kahanmaps(LV + " --size 4 -q -o", tmp_path / "lv.svg").status == 0
-    recipe = read_recipe(str(tmp_path / "lv.svg"))
-    assert recipe.command.startswith(f"kahanmaps {LV}")
-    assert 'rhs = ["x*(a - b*y)"' in recipe.system
-
-
 def test_a_long_title_is_set_in_lines_and_no_formula(kahanmaps, monkeypatch):
     titles = []
     monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda figure, *_: titles.append(figure) or b"")
@@ -62,12 +45,6 @@ def test_a_long_title_is_set_in_lines_and_no_formula(kahanmaps, monkeypatch):
     first, _, third = titles[0].get_suptitle().split("\n")
     assert first.startswith(r"costs \$5 costs \$5")
     assert third
-
-
-def test_starts_are_chosen_where_none_are_given(kahanmaps, drawn):
-    outcome = kahanmaps("plot portrait lotka_volterra --eps 1/20 --steps 20")
-    assert outcome.err.startswith("lotka_volterra: 16 orbits from chosen starts, 20 steps")
-    assert drawn[0][0].points.shape == (21, 16, 2)
 
 
 def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn):
@@ -80,10 +57,9 @@ def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn)
     assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
     top = "plot portrait euler_top --eps 1/10 --start 1,1,1 --levels a1*x1+eps*x2 --axes x1,x2 -p"
     assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
-    assert "may be" in kahanmaps(line, "'a=root of t^2 - 2'", "-o -").err
 
 
-@pytest.mark.parametrize("ending", [".csv", ".jsonl", ".npz"])
+@pytest.mark.parametrize("ending", [".csv", ".npz"])
 def test_stored_points_over_a_number_field_are_drawn_at_the_root_that_is_meant(kahanmaps, drawn, tmp_path, ending):
     line = "orbit euler_top --eps 1/4 --start 1,1,1 --steps 6 -p"
     for k, a in enumerate(("root of t^2 - 2 near 1.4", "root of t^2 - 2 near -1.4", "root of t^2 - 2")):
@@ -127,22 +103,9 @@ def test_of_more_than_two_variables_the_axes_are_chosen_and_said(kahanmaps, draw
     assert len(drawn[0][0].labels) == 2
 
 
-def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
-    assert "1 orbit, 100 steps" in kahanmaps("plot portrait riccati --eps 1/10 --start 0").err
-    assert drawn[0][0].labels == ("step", "$x$")
-
-
 def test_a_plane_over_the_step_has_no_arrows(kahanmaps, drawn):
     assert kahanmaps(LV + " --axes x,y,step").status == kahanmaps(LV).status == 0
     assert [len(portrait.flow.places) > 0 for portrait, _ in drawn] == [False, True]
-
-
-@pytest.mark.parametrize("word", ["--colour-by", "--color-by"])
-def test_points_are_coloured_by_an_integral(kahanmaps, drawn, word):
-    kahanmaps(f"plot portrait weierstrass --eps 1/10 --start=-1/2,0 --steps 40 {word} modified_H")
-    values = drawn[0][0].values
-    np.testing.assert_allclose(values, values[0, 0], atol=1e-13)  # conserved, up to rounding
-    assert drawn[0][0].value_label == "modified_H"
 
 
 def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, drawn):
@@ -159,15 +122,6 @@ def test_points_outside_are_counted_on_standard_error_and_in_the_picture(kahanma
     outcome = kahanmaps("plot portrait --vars x,y --rhs x --rhs y --eps 1/4 --start 1,1 --steps 40")
     assert "points lie outside the window" in outcome.err
     assert drawn[0][1]["note"] == f"{drawn[0][0].left_out} points outside"
-
-
-def test_an_orbit_that_ends_early_is_drawn_and_the_status_is_3(kahanmaps, tmp_path):
-    outcome = kahanmaps(
-        "plot portrait --vars x --rhs x^2 --eps 1 --start 1/2 --start 3 --steps 5 -o", tmp_path / "a.png"
-    )
-    assert outcome.status == 3
-    assert "1 of 2 orbits ended early: met a singular matrix I - eps f'" in outcome.err
-    assert (tmp_path / "a.png").exists()
 
 
 def test_a_density_counts_every_point(kahanmaps, drawn):
@@ -195,9 +149,7 @@ def test_an_interrupted_density_is_a_picture_of_what_was_counted(kahanmaps, draw
     ("name", "how"),
     [
         ("o.npy", "--arithmetic float --kernel numpy"),
-        ("o.npz", "--arithmetic float --kernel numpy"),
         ("exact.npz", ""),
-        ("o.jsonl", "--integral x*y"),
         ("o.csv", "--integral x*y --format csv"),
         ("balls.jsonl", "--arithmetic ball:100"),
     ],
@@ -239,45 +191,7 @@ def test_the_steps_of_a_file_are_kept_and_those_of_npy_are_records(kahanmaps, dr
     assert [found.points[:, 0, 0].tolist() for found, _ in drawn] == [[0, 4, 8], [0, 1, 2]]
 
 
-def test_exact_numbers_of_any_length_are_read(tmp_path):
-    (tmp_path / "long.csv").write_text(f"step,x\n0,1{'0' * 9000}/3{'0' * 9000}\n")
-    assert read_orbits(str(tmp_path / "long.csv"), None).points.tolist() == [[[1 / 3]]]
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.txt", "1,2", "found .txt, expected a file of kahanmaps orbit or ensemble"),
-        ("a.npy", "nothing", "found no orbit that kahanmaps wrote"),
-        ("a.npz", "nothing", "found no orbit that kahanmaps wrote"),
-        ("a.csv", "x,y\n1,2\n", "found no orbit that kahanmaps wrote"),
-        ("a.csv", "step,x\n", "found no point in it"),
-        ("a.csv", "step,x\n0,1e999\n", "expected one in the range of machine floats"),
-        ("a.csv", "step,x\n0,1/0\n", "found no orbit that kahanmaps wrote"),
-        ("a.jsonl", "{}", "found no orbit that kahanmaps wrote (no 'record' in it)"),
-        ("a.jsonl", "", "found no orbit that kahanmaps wrote"),
-        (
-            "a.jsonl",
-            '{"record": "header", "variables": ["-1", "y"], "eps": "1"}\n{"record": "point", "step": 0, "x": [1, 2]}',
-            "a.jsonl: found no orbit that kahanmaps wrote (found '-1', expected a name",
-        ),
-        (
-            "a.jsonl",
-            '{"record": "header", "variables": ["x", "y"], "eps": "1/0"}\n{"record": "point", "step": 0, "x": [1, 2]}',
-            "a.jsonl: found the denominator 0",
-        ),
-        ("a.jsonl", "[1, 2]", "found no orbit that kahanmaps wrote"),
-    ],
-)
-def test_files_that_hold_no_orbit_are_refused(kahanmaps, tmp_path, name, content, message):
-    (tmp_path / name).write_text(content)
-    outcome = kahanmaps("plot portrait --from", tmp_path / name)
-    assert outcome.status == 2
-    assert message in outcome.err
-
-
 def test_a_file_of_another_system_is_refused(kahanmaps, tmp_path):
     np.save(tmp_path / "o.npy", np.ones((3, 2)))
     outcome = kahanmaps("plot portrait euler_top --from", tmp_path / "o.npy")
-    assert outcome.status == 2
-    assert "found points of dimension 2, expected 3" in outcome.err
+    assert (outcome.status, "found points of dimension 2, expected 3" in outcome.err) == (2, True)

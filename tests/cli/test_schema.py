@@ -1,13 +1,10 @@
 """`kahanmaps schema`, and the schemas themselves: complete, closed, described, in the words of the code."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import click
 import pytest
-from cli_helpers import Outcome
 from jsonschema import Draft202012Validator
 
 from kahanmaps.checks.claims import Verdict
@@ -20,8 +17,6 @@ from kahanmaps.maps.normal_form.periods import Kind
 from kahanmaps_cli.main import cli
 from kahanmaps_cli.schema_files import ALIASES, schema, schema_titles
 
-Run = Callable[..., Outcome]
-
 
 def json_commands(group: click.Group, context: click.Context, path: str = "") -> Iterator[str]:
     """The commands that have an option --json."""
@@ -33,14 +28,14 @@ def json_commands(group: click.Group, context: click.Context, path: str = "") ->
             yield f"{path}{name}"
 
 
-def test_every_command_that_prints_json_has_a_schema() -> None:
+def test_every_command_that_prints_json_has_a_schema():
     commands = set(json_commands(cli, click.Context(cli)))
     assert {name for name in commands if ALIASES.get(name, name) not in schema_titles()} == set()
     assert len(commands) > 25
 
 
 @pytest.mark.parametrize("name", schema_titles())
-def test_a_schema_is_one_complete_in_itself_and_in_words(name: str) -> None:
+def test_a_schema_is_one_complete_in_itself_and_in_words(name):
     found = schema(name)
     Draft202012Validator.check_schema(found)
     assert list(found)[:3] == ["$schema", "$comment", "title"]
@@ -49,7 +44,7 @@ def test_a_schema_is_one_complete_in_itself_and_in_words(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", schema_titles())
-def test_every_object_of_a_schema_is_closed(name: str) -> None:
+def test_every_object_of_a_schema_is_closed(name):
     found = schema(name)
     closed_elsewhere = {
         part["$ref"].rpartition("/")[2] for part in _parts(found) if part.get("unevaluatedProperties") is False
@@ -95,11 +90,11 @@ def _description(part: Any, found: dict[str, Any]) -> str:
         ("growth_class", OF_DEGREES),
     ],
 )
-def test_the_words_of_a_schema_are_those_of_the_code(part: str, words: list[str]) -> None:
+def test_the_words_of_a_schema_are_those_of_the_code(part, words):
     assert schema("analyze")["$defs"][part]["enum"] == [str(word) for word in words]
 
 
-def test_further_words_are_those_of_the_code() -> None:
+def test_further_words_are_those_of_the_code():
     planes = schema("period")["properties"]["planes"]["items"]["properties"]
     assert planes["kind"]["enum"] == [kind.name.lower() for kind in Kind]
     assert schema("batch-run")["$defs"]["outcome"]["enum"] == [str(outcome) for outcome in KEPT]
@@ -110,17 +105,17 @@ def test_further_words_are_those_of_the_code() -> None:
     assert facts["verdict"]["enum"] == list(VERDICTS)
 
 
-def test_the_list_has_a_line_for_each_schema(kahanmaps: Run) -> None:
+def test_the_list_has_a_line_for_each_schema(kahanmaps):
     rows = kahanmaps("schema").out.splitlines()
     assert [row.split()[0] for row in rows] == list(schema_titles())
     assert {"system-file", "batch-spec", "check", "orbit", "family-show"} <= {row.split()[0] for row in rows}
 
 
 @pytest.mark.parametrize("name", ["family-show", "family show"])
-def test_a_schema_is_printed_by_its_name_or_that_of_its_command(kahanmaps: Run, name: str) -> None:
+def test_a_schema_is_printed_by_its_name_or_that_of_its_command(kahanmaps, name):
     assert kahanmaps(f"schema {name}").json == schema("family-show")
 
 
 @pytest.mark.parametrize("command", CHECKS)
-def test_the_checks_share_a_schema(kahanmaps: Run, command: str) -> None:
+def test_the_checks_share_a_schema(kahanmaps, command):
     assert kahanmaps(f"schema {command}").json == schema("check")

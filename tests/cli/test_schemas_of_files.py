@@ -1,13 +1,9 @@
 """System files and batch specs satisfy their schemas, and what a schema refuses the reader refuses, too."""
 
-from __future__ import annotations
-
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cli_helpers import Outcome
 from schema_helpers import mistakes
 
 from kahanmaps.documents import reader
@@ -17,12 +13,11 @@ from kahanmaps.experiments.registry import task_kinds
 from kahanmaps.experiments.spec import SpecError, parse_spec
 from kahanmaps_cli.schema_files import schema
 
-Run = Callable[..., Outcome]
 ROOT = Path(__file__).parents[2]
 CATALOG = ROOT / "kahanmaps" / "documents" / "catalog"
 
 
-def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> None:
+def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader():
     parts = schema("system-file")["$defs"]
     found = {"": parts["system_file"], "catalog": parts["catalog_section"]}
     found |= {key: parts["system_file"]["properties"][key] for key in (*reader.KINDS, "density")}
@@ -31,47 +26,39 @@ def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> 
 
 
 @pytest.mark.parametrize("path", sorted(CATALOG.glob("*.toml")), ids=lambda path: path.stem)
-def test_a_file_of_the_catalogue_satisfies_the_schema(path: Path) -> None:
+def test_a_file_of_the_catalogue_satisfies_the_schema(path):
     assert mistakes("system-file", tomllib.loads(path.read_text())) == []
 
 
 @pytest.mark.parametrize("options", ["--m 2 --seed 3 --signs 1,-1", "--m 1 --generic", "--chi t^2-2"])
-def test_what_family_new_writes_satisfies_the_schema(kahanmaps: Run, options: str) -> None:
+def test_what_family_new_writes_satisfies_the_schema(kahanmaps, options):
     assert mistakes("system-file", tomllib.loads(kahanmaps(f"family new {options} -q").out)) == []
 
 
 BAD_FILES = [
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[hamiltonian]\nH = "x"\nJ = "standard"',
-    'variables = ["x"]',
-    '[system]\nrhs = ["x"]',
     'variables = ["1x"]\n[system]\nrhs = ["x"]',
     'variables = ["eps"]\n[system]\nrhs = ["1"]',
-    'variables = []\n[system]\nrhs = ["x"]',
-    'variables = ["x"]\n[system]\nrhs = 1',
     'variables = ["x"]\n[system]\nrsh = ["x"]',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\neps = 1',
-    'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = [1]',
     'variables = ["x"]\n[system]\nrhs = [" "]',
-    'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = ""',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = "1+1"',
     'variables = ["x", "y"]\n[hamiltonian]\nH = "x"\nJ = "Standard"',
-    '[family]\nA = [["1"]]',
     '[family]\nA = [["1", "0"], ["0", "1"]]\nH = "x1^3"\nsigns = [0]',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[density]\npsi = "1"',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[catalog]\ngrowth = "cubic"',
-    'variables = ["x"]\n[system]\nrhs = ["x"]\n[integral]\nI = "x"',
 ]
 
 
 @pytest.mark.parametrize("text", BAD_FILES)
-def test_what_the_schema_refuses_in_a_system_file_is_refused_by_the_reader_as_well(text: str) -> None:
+def test_what_the_schema_refuses_in_a_system_file_is_refused_by_the_reader_as_well(text):
     assert mistakes("system-file", tomllib.loads(text))
     with pytest.raises(SystemFileError):
         parse_system(text)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").rglob("*.toml")), ids=lambda path: path.stem)
-def test_a_file_of_the_examples_satisfies_its_schema(path: Path) -> None:
+def test_a_file_of_the_examples_satisfies_its_schema(path):
     found = tomllib.loads(path.read_text(encoding="utf-8"))
     assert mistakes("batch-spec" if "experiments" in found else "system-file", found) == []
 
@@ -84,7 +71,6 @@ GOOD_SPECS = [
 ]
 BAD_SPECS = [
     'name = "empty"',
-    "[experiments]",
     EXPERIMENT.replace("orbit", "orbot"),
     EXPERIMENT + 'option = { eps = "1" }',
     EXPERIMENT + 'options = { epss = "1" }',
@@ -98,19 +84,19 @@ BAD_SPECS = [
 
 
 @pytest.mark.parametrize("text", GOOD_SPECS)
-def test_a_spec_that_is_read_satisfies_the_schema(text: str) -> None:
+def test_a_spec_that_is_read_satisfies_the_schema(text):
     assert parse_spec(text).size > 0
     assert mistakes("batch-spec", tomllib.loads(text)) == []
 
 
 @pytest.mark.parametrize("text", BAD_SPECS)
-def test_what_the_schema_refuses_in_a_spec_is_refused_by_the_reader_as_well(text: str) -> None:
+def test_what_the_schema_refuses_in_a_spec_is_refused_by_the_reader_as_well(text):
     assert mistakes("batch-spec", tomllib.loads(text))
     with pytest.raises(SpecError):
         parse_spec(text)
 
 
-def test_the_schema_of_specs_knows_every_task_and_option() -> None:
+def test_the_schema_of_specs_knows_every_task_and_option():
     experiment = schema("batch-spec")["$defs"]["experiment"]["properties"]
     assert set(experiment["task"]["enum"]) == set(task_kinds())
     known = {*VOCABULARY, *FAMILY, "time_step", "parameters"}

@@ -4,33 +4,18 @@ In a pipe every statement stands with its verdict, formula and evidence; --json 
 shape of the other checks and with the place of each statement in the paper. On a terminal there is a table a section.
 """
 
-from __future__ import annotations
-
 import json
 import re
-from collections import Counter
 
 import pytest
 from cli_helpers import terminal
 
-from kahanmaps.paper.registry import SECTIONS, claims
+from kahanmaps.paper.registry import claims
 from kahanmaps.version import __version__
 
 QUICK = "verify --m 2 --section 6"
-COMMON = {
-    "command",
-    "check",
-    "verdict",
-    "holds",
-    "version",
-    "system",
-    "eps",
-    "time_step",
-    "convention",
-    "arithmetic",
-    "seed",
-}
-COMMON |= {"error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
+COMMON = {"command", "check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic"}
+COMMON |= {"seed", "error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
 
 
 def keys(report):
@@ -70,41 +55,6 @@ def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, tmp_pat
     assert again["claims"] == first["claims"]
 
 
-def test_the_seed_draws_the_member(kahanmaps):
-    first, second = (kahanmaps(f"{QUICK} --seed {seed} --json").json for seed in (1, 2))
-    assert first["chi"] != second["chi"]
-    assert (first["seed"], second["seed"]) == (1, 2)
-
-
-# Which member
-
-
-def test_a_file_of_kind_family_is_verified(kahanmaps, pair):
-    report = kahanmaps("verify", pair, "--section 6 --json").json
-    assert report["chi"] == "t^2 + t - 2"
-    assert report["verdict"] == "proved"
-
-
-@pytest.mark.parametrize(
-    ("options", "m", "chi"),
-    [
-        ("--eigenvalues 1,-2", 2, "t^2 + t - 2"),
-        ("--eigenvalues=-1/2,3 --m 2", 2, "t^2 - 5/2*t - 3/2"),
-        ("--chi t^2+1", 2, "t^2 + 1"),
-        ("--chi '(t-1)*(t^2+1)'", 3, "t^3 - t^2 + t - 1"),
-    ],
-)
-def test_the_spectrum_is_that_asked_for(kahanmaps, options, m, chi):
-    report = kahanmaps(f"verify {options} --section 4 --json").json
-    assert (report["m"], report["chi"], report["verdict"]) == (m, chi, "proved")
-
-
-def test_a_generic_member_has_integer_chi(kahanmaps):
-    report = kahanmaps("verify --m 3 --generic --section 4 --json").json
-    assert report["m"] == 3
-    assert "/" not in report["chi"]
-
-
 # What to verify
 
 
@@ -116,13 +66,6 @@ def test_controls_are_refuted_and_that_is_success(once):
     assert all(claim["control"] and claim["expected"] == "refuted" for claim in found)
     assert {claim["key"] for claim in found} == set(expected(2))
     assert last["verdict"] == "proved"
-
-
-def test_the_member_in_general_is_verified(once):
-    outcome = once("verify --universal --m 1 --json")
-    assert outcome.status == 0
-    assert outcome.json["verdict"] in ("proved", "supported")
-    assert keys(outcome.json) == expected(1)
 
 
 def test_balls_enclose_the_complex_roots(kahanmaps):
@@ -150,17 +93,6 @@ def test_in_a_pipe_the_statements_are_those_of_json(once):
         assert claim["formula"] in text
 
 
-def test_misprints_are_marked(kahanmaps):
-    lines = kahanmaps("verify --m 3 --section 9").out.splitlines()
-    assert [line for line in lines if "(misprint)" in line] == [
-        "refuted (as expected)\tLemma 16, proof: The linear system for P_0 and Q_i, as printed (misprint)"
-    ]
-
-
-def test_a_quiet_command_says_nothing_on_standard_error(kahanmaps, slow_clock):
-    assert kahanmaps(f"{QUICK} -q").err == ""
-
-
 def test_progress_names_the_statement_and_counts(kahanmaps, slow_clock):
     err = kahanmaps(QUICK).err
     assert "Theorem 9 (2 of" in err
@@ -180,15 +112,6 @@ def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
     assert outcome.json["holds"] is False
 
 
-def test_a_member_that_is_not_generic_gives_3(kahanmaps):
-    outcome = kahanmaps("verify --chi '(t-1)^2*(t+2)' --section 9 --json")
-    assert outcome.status == 3
-    assert outcome.json["holds"] is None
-    undecided = [claim for claim in outcome.json["claims"] if claim["verdict"] == "undecided"]
-    assert undecided
-    assert all("repeated roots" in claim["evidence"]["summary"] for claim in undecided)
-
-
 # A terminal
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
@@ -196,26 +119,6 @@ COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 def plain(outcome):
     return COLOUR.sub("", outcome.out)
-
-
-@pytest.fixture(scope="module")
-def shown():
-    """All that is said of m = 1, in 100 columns."""
-    return plain(terminal("verify", "--m", "1", columns=100))
-
-
-def test_on_a_terminal_every_section_has_its_table(shown):
-    for number, (title, _) in SECTIONS.items():
-        assert (title if number == 10 else f"Section {number}. {title}") in shown
-
-
-def test_the_last_line_on_a_terminal_counts_verdicts(once, shown):
-    last = shown.splitlines()[-1]
-    report = once("verify --m 1 --json").json
-    for verdict, count in Counter(c["verdict"] for c in report["claims"] if "misprint" not in c).items():
-        assert f"{count} {verdict}" in last
-    assert last.startswith(f"verdict  {report['verdict']}  (")
-    assert f"{sum('misprint' in c for c in report['claims'])} misprints" in last
 
 
 def test_misprints_are_explained_on_a_terminal():
@@ -236,12 +139,6 @@ def test_what_is_outside_the_hypotheses_is_told_on_a_terminal():
     assert "repeated roots" in plain(outcome)
 
 
-def test_parameters_without_a_system_are_refused(kahanmaps):
-    refused = kahanmaps("verify --m 1 -p a=1")
-    assert refused.status == 2
-    assert "found -p without SYSTEM" in refused.err
-
-
 # What survives
 
 
@@ -251,12 +148,3 @@ def test_what_survives_of_variations_is_a_table(kahanmaps):
     assert answer.status == 0
     assert "| `dx/det(I - eps f') is invariant for f` | proved | proved | proved | | proved | proved |" in answer.out
     assert "fails for m = 1, H = u1^3 + v1 at x = (0, 0)" in answer.out
-
-
-def test_the_controls_of_variations_are_all_refuted(kahanmaps):
-    assert "all refuted" in kahanmaps("verify --beyond --controls --m 3 -q").out
-
-
-def test_the_table_is_for_every_member(kahanmaps):
-    answer = kahanmaps("verify paper_m2 --beyond")
-    assert (answer.status, "found --beyond and SYSTEM" in answer.err) == (2, True)

@@ -1,27 +1,30 @@
 """Wrong use of every command: status 2, a sentence on standard error, nothing on standard output, and no file made.
 
-The table is tests/cli/wrong_use.txt: a command, and behind ` => ` words of what is said. What
-lists the checks is made of their table.
+The table is tests/cli/wrong_use.txt: a command, and behind ` => ` words of what is said; behind ` => not: ` words that
+are not said. Behind ` <= ` stands what is in the file that the command names, with \\n for a new line. What lists the
+checks is made of their table.
 """
-
-from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+from cli_helpers import with_its_file
 from helpers import table
 
 from kahanmaps.checks.table import CHECKS
 
 TABLE = table(Path(__file__).with_name("wrong_use.txt"))
-CASES = [tuple(line.split(" => ", 1)) for lines in TABLE.values() for line in lines]
+CASES = [tuple(line.split(" => ")) for lines in TABLE.values() for line in lines]
 CASES.append(("check euler_top", f"Did you mean {' or '.join(CHECKS)}?"))
 
 
-@pytest.mark.parametrize(("command", "words"), CASES, ids=[command[:70] for command, _ in CASES])
-def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, command, words):
+@pytest.mark.parametrize("case", CASES, ids=[command[:70] for command, *_ in CASES])
+def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, case):
     monkeypatch.chdir(tmp_path)
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out, list(tmp_path.iterdir())) == (2, "", [])
-    assert words in " ".join(outcome.err.split())
+    command, *expected = case
+    outcome = kahanmaps(with_its_file(command))
+    assert (outcome.status, outcome.out, len(list(tmp_path.iterdir()))) == (2, "", " <= " in command)
+    said = " ".join(outcome.err.split())
+    for words in expected:
+        assert (words.removeprefix("not: ") in said) is not words.startswith("not: ")
     assert "Traceback" not in outcome.err

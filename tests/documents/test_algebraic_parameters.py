@@ -1,7 +1,5 @@
 """Parameters that are algebraic numbers: exact over Q[t]/g, modulo primes where g has a root, rounded for floats."""
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpq_poly
 
@@ -38,11 +36,6 @@ def test_claims_are_proved_or_refuted_over_the_number_field(integral, expected):
     assert verdict(integral) is expected
 
 
-def test_what_holds_for_this_root_fails_for_another_number():
-    integral = "(1 + eps^2*x^2)/(1 - 2/a*eps^2*y^2)"
-    assert verdict(integral, "root of t^2 - 3") is verdict(integral, "3/2") is Verdict.REFUTED
-
-
 def test_a_density_that_is_zero_at_the_root_is_refused():
     file = km.System("x' = a*y; y' = -x", a=ROOT)
 
@@ -53,14 +46,6 @@ def test_a_density_that_is_zero_at_the_root_is_refused():
     for phi in ("a^2 - 2", "(a^4 - 4)*x"):
         with pytest.raises(InputError, match="identically 0 at a root of t"):
             measure(phi)
-
-
-def test_an_integral_that_is_a_constant_at_the_root_is_called_one():
-    file = km.System(TOP, a=ROOT)
-    for text, is_constant in (("(a^2 - 2)*x + 5", True), ("(a*x + 2)/(x + a)", True), ("y^2 + z^2 + a^2 - 2", False)):
-        claimed = km.parse_rational_function(text, file.claim_names, file.parameters)
-        (finding,) = km.check_integrals(file, extra={"I": claimed}).findings
-        assert ("being a constant" in finding.claim) is is_constant
 
 
 def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
@@ -118,26 +103,6 @@ def test_the_points_of_an_orbit_agree_in_all_arithmetics():
     ]
 
 
-def test_the_digit_budget_ends_orbits_over_a_number_field_too():
-    walk = km.orbit(km.System("x' = a*x^2 + y; y' = x*y", a=ROOT), [1, 2], "1/10", steps=30, max_digits=50)
-    assert len(list(walk)) < 12
-    assert walk.end.status == "budget"
-
-
-def test_degrees_are_those_of_another_value():
-    assert (
-        km.degrees(km.System(TOP, a=ROOT), max_terms=8).degrees == km.degrees(km.System(TOP, a=2), max_terms=8).degrees
-    )
-
-
-def test_degrees_that_grow_exponentially_in_the_plane_have_no_bounds_over_a_number_field():
-    file = km.load("lotka_volterra", {"a": ROOT})
-    found, rational = (km.degrees(one, max_terms=5) for one in (file, km.load("lotka_volterra", {"a": 2})))
-    assert found.degrees == rational.degrees
-    assert found.enclosure is None
-    assert rational.enclosure is not None
-
-
 def test_a_file_reads_back_equal():
     file = km.load("euler_top", {"a1": "root of 2*t^2 - 4"})
     assert 'a1 = "root of t^2 - 2"' in file.to_toml()
@@ -168,22 +133,6 @@ def test_a_file_is_rounded_with_all_that_it_claims():
 
 def test_a_root_of_degree_one_is_a_rational_number():
     assert km.load("euler_top", {"a1": "root of 2*t - 3"}) == km.load("euler_top", {"a1": "3/2"})
-
-
-@pytest.mark.parametrize(
-    ("value", "words"),
-    [
-        ("root of t^2 - 4", "expected an irreducible polynomial: its factors are t - 2, t [+] 2"),
-        ("root of t^2 - s", "expected a polynomial in one variable"),
-        ("root of 3", "one variable"),
-        ("root of t^13 - 2", "expected a degree from 1 to 12"),
-        ("root of t^2 - 2 near x", "found 'x'"),
-        ("root of t^2 - ", "t"),
-    ],
-)
-def test_what_names_no_root_is_refused(value, words):
-    with pytest.raises(InputError, match=words):
-        km.System(TOP, a=value)
 
 
 def test_what_needs_rational_numbers_refuses_in_a_sentence():
@@ -226,10 +175,3 @@ def test_the_bound_is_one_for_all_conjugates():
     sizes = [abs(complex(z)) for z, _ in root.polynomial.complex_roots()]
     assert all(bound.scale * size <= 2**bound.above.bits for size in sizes)
     assert root.number_field == EtaleAlgebra(root.polynomial)
-
-
-@pytest.mark.parametrize(("value", "is_hinted"), [("1 + sqrt(2)", True), ("2,5", False)])
-def test_other_expressions_with_a_square_root_are_told_how_to_be_given(value, is_hinted):
-    with pytest.raises(InputError) as refused:
-        km.System("x' = a*x", a=value)
-    assert ("root of t^2 - 2" in str(refused.value)) is is_hinted

@@ -1,7 +1,5 @@
 """Maps of other files one after the other: read, written out whole, and refused with all that is wrong."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -73,11 +71,9 @@ def test_variables_may_be_named_anew(tmp_path):
     ("of", "sentence"),
     [
         ("", "found [], expected a list of maps"),
-        ("3", "found 3, expected a table"),
         ('{ file = "none.toml" }', "No such file"),
         ('{ file = "word.toml" }', "as a part of itself"),
         ('{ system = "eul" }', "found the unknown system 'eul'"),
-        ('{ system = "../catalog/euler_top" }', "found the unknown system"),
         ('{ file = "field.toml", power = 0 }', "expected an integer other than 0"),
         ('{ file = "field.toml", power = 65 }', "more than 64 steps"),
         ('{ file = "field.toml", inverse = 1 }', "expected true or false"),
@@ -86,7 +82,6 @@ def test_variables_may_be_named_anew(tmp_path):
         ('{ file = "./word.toml" }', "as a part of itself"),
         ('{ file = "field.toml", system = "riccati" }', "expected exactly one"),
         ('{ file = "field.toml", involution = true }', "whose square is not the identity"),
-        ('{ file = "field.toml", parameters = { b = 1 } }', "unknown parameter 'b'"),
         ('{ file = "field.toml", parameters = { a = "1/0" } }', "division by 0"),
         ('{ file = "field.toml" }, { system = "euler_top" }', "dimensions 2, 3"),
         ('{ file = "field.toml" }, { map = { variables = ["y", "x"], map = { image = ["x", "y"] } } }', "two orders"),
@@ -109,13 +104,6 @@ def test_parameters_of_one_file_are_none_of_a_part_that_comes_from_another(tmp_p
         again = parse_system(file.to_toml(), file.name)
         assert again == file
         assert again.map.at(EPS).step(START[: file.dim]) == file.map.at(EPS).step(START[: file.dim])
-
-
-def test_files_are_looked_for_beside_the_file_that_names_them(tmp_path):
-    (tmp_path / "sub").mkdir()
-    written(tmp_path / "sub", '{ file = "swap.toml" }', name="word.toml")
-    (tmp_path / "sub" / "swap.toml").write_text('variables = ["x", "y"]\n[map]\nimage = ["y", "x"]')
-    assert read_system(written(tmp_path, '{ file = "sub/word.toml" }')).map.at(1).step(START) == START[::-1]
 
 
 def test_steps_that_undo_each_other_are_left_out(tmp_path):
@@ -146,7 +134,7 @@ SHARED = (
 )
 
 
-@pytest.mark.parametrize("of", [*WITHOUT, *SHARED, ", ".join(WITHOUT + SHARED)])
+@pytest.mark.parametrize("of", [*WITHOUT, ", ".join(WITHOUT + SHARED)])
 def test_parts_share_a_symbol_and_are_given_functions_of_it(tmp_path, of):
     part = '{ map = { variables = ["x", "y"], map = { image = ["d*y", "x + c*d"] } } }'
     written(tmp_path, part, "[parameters]\nc = 3\nd = 1", name="inner.toml")
@@ -175,11 +163,3 @@ def test_a_symbol_that_a_part_cannot_have_is_refused(tmp_path):
     map_ = map_with_symbols(read_system(written(tmp_path, of, "parameters.b = 5")), ["b"])
     with pytest.raises(InputError, match="no value where the symbols have these"):
         map_.at(1, values=[fmpq(0)])
-
-
-def test_a_map_is_no_involution_by_chance():
-    from kahanmaps.maps.composed import is_involution
-
-    text = 'variables = ["x", "y"]\n[map]\nimage = ["{}", "y"]'
-    assert is_involution(parse_system(text.format("(y^2 + 3)/x")).map)
-    assert not is_involution(parse_system(text.format("(y^2 + 3)/(x + 1)")).map)

@@ -1,7 +1,5 @@
 """Maps that are not Kahan's, from files: read, refused with all mistakes, and put to the test by the commands."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from kahanmaps.checks.preserve import check_measure, check_poisson, density_iden
 from kahanmaps.checks.settings import Settings, eps_words
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
@@ -26,7 +24,6 @@ from kahanmaps.maps.orbits.orbit import orbit
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]
-HEAD = 'variables = ["x", "y"]\n'
 
 
 def example(name):
@@ -81,12 +78,6 @@ def test_degrees_and_singularities_of_a_qrt_map_are_those_of_an_elliptic_fibrati
     assert symbolic_denominator(map_) == [("y - 1", 1), ("y + 1", 1)]
 
 
-def test_a_change_of_time_changes_no_degree():
-    top = parse_system('variables = ["x", "y", "z"]\n[system]\nrhs = ["y*z", "-2*z*x", "x*y"]')
-    assert degree_growth(example("rescaled-top").map, max_terms=5).degrees == (1, 3, 9, 19, 33, 51)
-    assert degree_growth(top.system, max_terms=5).degrees == (1, 3, 9, 19, 33, 51)
-
-
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "rescaled-top"])
 def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
     file = example(name)
@@ -95,11 +86,6 @@ def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
             ask()
     with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
         check_poisson(file)
-
-
-def test_a_system_with_eps_in_it_is_no_quadratic_system_of_its_own():
-    with pytest.raises(InputError, match="rescaled-top has eps in its coefficients"):
-        _ = example("rescaled-top").system
 
 
 def test_a_record_of_a_map_without_time_step_does_not_speak_of_one():
@@ -122,62 +108,6 @@ def test_the_new_point_may_have_any_names():
     assert parse_system(plain, "same").map.subject == parse_system(named, "same").map.subject
 
 
-WRONG = [
-    ('[bilinear]\nequations = ["X = x"]', "bilinear.equations", "found 1 equation, expected 2"),
-    ('[bilinear]\nequations = ["X = x", "Y + y"]', "bilinear.equations[2]", "expected LEFT = RIGHT"),
-    ('[bilinear]\nequations = ["X = x", "Y = y = 1"]', "bilinear.equations[2]", "expected LEFT = RIGHT"),
-    ('[bilinear]\nequations = ["X = x^2", "Y = y"]', "bilinear.equations[1]", "degree 2, expected at most 1"),
-    ('[bilinear]\nequations = ["X = x", "Y = X*Y"]', "bilinear", "found the term -X*Y"),
-    ('[bilinear]\nequations = ["X = x", "X = y"]', "bilinear", "no value at random points"),
-    ('[bilinear]\nequations = ["X = x", "Z = y"]', "bilinear.equations[2]", "unknown name 'Z'"),
-    ('[bilinear]\nnew = ["a", "x"]\nequations = ["a = x", "x = y"]', "bilinear.new", "x"),
-    ('[bilinear]\nnew = ["a"]\nequations = ["a = x", "b = y"]', "bilinear.new", "found 1 name, expected 2"),
-    ('[bilinear]\nnew = ["a", "2"]\nequations = ["a = x", "b = y"]', "bilinear.new", "2"),
-    ("[bilinear]", "bilinear.equations", "missing"),
-    ('[map]\nimage = ["x"]', "map.image", "found 1 function, expected 2"),
-    ('[map]\nimage = ["x", "1/0"]', "map.image[2]", "division"),
-    ('[map]\nimage = ["x", "y"]\ninverse = ["x", "-y"]', "map", "does not lead back"),
-    ('[map]\nimage = ["x", "y + x^2"]\ninverse = ["x", "y - x^3"]', "map", "does not lead back"),
-    ('[map]\ninverse = ["x", "y"]', "map.image", "missing"),
-    ('[map]\nimage = "x"', "map.image", "expected a list of rational functions"),
-    ('[map]\nimage = ["x", "y"]\nback = ["x", "y"]', "map.back", "unknown key"),
-    ('[system]\nrhs = ["x", "y^3"]', "system.rhs[2]", "degree 3, expected at most 2"),
-    ('[system]\nrhs = ["x", "y^4"]\ndiscretization = "polarised"', "system.rhs[2]", "degree 4, expected at most 3"),
-    (
-        '[system]\nrhs = ["x", "y"]\ndiscretization = "euler"',
-        "system.discretization",
-        'expected one of "kahan", "polarised"',
-    ),
-    ('[system]\nrhs = ["x", "y"]\ndegree = 3', "system.degree", "from 2 to 2"),
-    ('[system]\nrhs = ["x", "y"]\ndiscretization = "polarised"\ndegree = 9', "system.degree", "from 2 to 6"),
-    ('[system]\nrhs = ["x", "y"]\ndiscretization = "polarised"\ndegree = "3"', "system.degree", "from 2 to 6"),
-    ('[system]\nrhs = ["x", "y"]\n[map]\nimage = ["x", "y"]', "file", "found [system], [map]"),
-]
-
-
-@pytest.mark.parametrize(("text", "key", "words"), WRONG, ids=range(len(WRONG)))
-def test_a_mistake_is_told_with_its_key(text, key, words):
-    with pytest.raises(SystemFileError) as caught:
-        parse_system(HEAD + text)
-    assert [what for where, what in caught.value.mistakes if where == key and words in what], caught.value.mistakes
-
-
-def test_the_polarised_map_of_a_system_of_two_names_that_clash_is_refused():
-    with pytest.raises(SystemFileError, match="x_1"):
-        parse_system('variables = ["x", "x_1"]\n[system]\nrhs = ["x^3", "1"]\ndiscretization = "polarised"')
-
-
-def test_a_parameter_that_a_polarised_map_calls_a_variable_is_refused():
-    text = 'variables = ["x"]\n[parameters]\nx_1 = "2"\n[system]\nrhs = ["x^3"]\ndiscretization = "polarised"'
-    with pytest.raises(SystemFileError, match=r"parameters\.x_1: is a variable of the map as well"):
-        parse_system(text)
-
-
-def test_capitals_that_are_taken_ask_for_other_names():
-    with pytest.raises(SystemFileError, match=r"give new = \["):
-        parse_system('variables = ["X"]\n[bilinear]\nequations = ["X = X"]')
-
-
 LOST = 'variables = ["x", "y"]\n[map]\nimage = ["x + y/eps", "y/(eps - 1) + (x + y/eps)^2/(eps^2 - 1/4)"]'
 
 
@@ -197,8 +127,3 @@ def test_an_image_of_lower_dimension_is_told_where_no_measure_makes_sense():
     assert str(finding.verdict) == "undecided"
     assert "no inverse" in finding.evidence.summary
     assert "the map is not dominant" in patterns(map_, None).running
-
-
-def test_a_file_of_any_kind_shows_itself_in_a_notebook():
-    for name in NAMES:
-        assert example(name)._repr_html_()

@@ -3,12 +3,11 @@
 Lemmas are identities of polynomials, or hold at rational points with ==; each has a system for which it fails.
 """
 
-from __future__ import annotations
-
 import random
 
 import pytest
 from flint import fmpq
+from helpers import quick
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate, gradient, monomials
@@ -17,7 +16,6 @@ from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.lotka_volterra import degree
-from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.recipes import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -25,7 +23,6 @@ from kahanmaps.laboratory.modular_points import null_space
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 EPS = fmpq(3, 17)
-ALL = [(n, k) for n in range(2, 8) for k in range((n + 1) // 2)]
 NO_SKEW = """
 variables = ["x1", "x2", "x3"]
 [system]
@@ -60,32 +57,6 @@ def test_a_member_is_the_system_that_one_would_write():
     assert load("lv(5,1)").system == QuadraticSystem.from_text([f"x{i}" for i in range(1, 6)], rhs)
 
 
-def test_the_name_is_written_without_spaces():
-    assert load(" lv( 6, 2 )").name == "lv(6,2)"
-
-
-@pytest.mark.parametrize(
-    ("reference", "words"),
-    [
-        ("lv", "expected lv(n,k) with integers, e.g. lv(7,3)"),
-        ("lv()", "expected lv(n,k) with integers"),
-        ("lv(7)", "expected lv(n,k) with integers"),
-        ("lv(7,3,1)", "expected lv(n,k) with integers"),
-        ("lv(7,1/2)", "expected lv(n,k) with integers"),
-        ("lv(1,0)", "found lv(1,0), expected lv(n,k) with 2 <= n <= 40, 0 <= k and 2k + 1 <= n"),
-        ("lv(6,3)", "2k + 1 <= n"),
-        ("lv(6,-1)", "0 <= k"),
-        ("lv(999,1)", "n <= 40"),
-        ("vl(7,3)", "found the unknown system"),
-    ],
-)
-def test_other_arguments_are_refused_in_one_line(reference, words):
-    with pytest.raises(InputError) as caught:
-        load(reference)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):
     twice = parse_system('[composition]\nof = [{ system = "lv(3,1)", power = 2 }]', "twice")
     start = (fmpq(1), fmpq(2), fmpq(5))
@@ -98,7 +69,7 @@ def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):
 # the measure
 
 
-@pytest.mark.parametrize(("n", "k"), ALL)
+@pytest.mark.parametrize(("n", "k"), [(2, 0), (5, 1), (7, 3)])
 def test_the_measure_of_a_skew_system_is_invariant(n, k):
     file = load(f"lv({n},{k})")
     assert str(check_measure(file).verdict) == "proved"
@@ -122,7 +93,7 @@ def test_without_skewness_the_lemma_says_nothing_and_the_measure_is_not_invarian
 # n = 2k + 1
 
 
-@pytest.mark.parametrize("k", [1, 2, 3, 4])
+@pytest.mark.parametrize("k", [1, 2, 3])
 def test_a_cubic_and_a_constant_matrix_make_lv_of_2k_plus_1(k):
     n = 2 * k + 1
     system = load(f"lv({n},{k})").system
@@ -142,7 +113,7 @@ def test_a_cubic_and_a_constant_matrix_make_lv_of_2k_plus_1(k):
     assert all(f == slopes[(r - k) % n] - slopes[(r + k) % n] for r, f in enumerate(system.rhs))
 
 
-@pytest.mark.parametrize("k", [1, 2, 3, 4])
+@pytest.mark.parametrize("k", [1, 2, 3])
 def test_the_product_over_the_determinant_is_conserved(k):
     file = load(f"lv({2 * k + 1},{k})")
     assert len({product_over_determinant(file, x) for x in orbit_of(file, 3)}) == 1
@@ -195,7 +166,7 @@ def test_over_the_determinant_there_are_k_plus_1_integrals(k):
 # n > 2k + 1
 
 
-@pytest.mark.parametrize(("n", "k"), [(4, 1), (7, 1), (6, 2), (9, 3), (5, 0)])
+@pytest.mark.parametrize(("n", "k"), [(4, 1), (6, 2), (5, 0)])
 def test_the_map_projects_to_the_one_with_the_sum_of_the_middle_species(n, k):
     file, image = load(f"lv({n},{k})"), load(f"lv({2 * k + 1},{k})") if k else None  # LV(1, 0) does not move
 
@@ -206,13 +177,7 @@ def test_the_map_projects_to_the_one_with_the_sum_of_the_middle_species(n, k):
     assert there == (image.map.at(EPS).step(here) if image else here)
 
 
-@pytest.mark.parametrize(("n", "k"), [(4, 1), (6, 1), (9, 2)])
-def test_a_sum_of_other_species_has_no_such_image(n, k):
-    here, there = ((*x[: n - 2], x[n - 2] + x[n - 1]) for x in orbit_of(load(f"lv({n},{k})"), 2))
-    assert load(f"lv({n - 1},{k})").map.at(EPS).step(here) != there
-
-
-@pytest.mark.parametrize(("n", "k"), [(5, 1), (6, 1), (9, 2), (9, 0), (12, 3)])
+@pytest.mark.parametrize(("n", "k"), [(6, 1), (9, 0), (12, 3)])
 def test_cross_ratios_are_conserved(n, k):
     file = load(f"lv({n},{k})")
     assert len(file.integrals) == 1 + n - 2 * k - 2 + (k == 1)
@@ -231,7 +196,9 @@ def measured(file, seconds=20):
     return degree_growth(file.map, seconds=seconds)
 
 
-@pytest.mark.parametrize(("n", "k"), [pair for pair in ALL if pair[0] <= 5])
+@pytest.mark.parametrize(
+    ("n", "k"), quick([(n, k) for n in (2, 3, 4, 5) for k in range((n + 1) // 2)], [(2, 0), (3, 1)])
+)
 def test_the_singularities_give_the_formula_for_the_degrees(n, k):
     growth = measured(load(f"lv({n},{k})"))
     assert growth.explained is not None
@@ -243,7 +210,7 @@ def test_the_singularities_give_the_formula_for_the_degrees(n, k):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("n", "k"), [pair for pair in ALL if pair[0] > 5])
+@pytest.mark.parametrize(("n", "k"), [(n, k) for n in (6, 7) for k in range((n + 1) // 2)])
 def test_measured_degrees_have_the_formula(n, k):
     degrees = measured(load(f"lv({n},{k})"), 10).degrees
     assert len(degrees) >= 8
@@ -251,7 +218,5 @@ def test_measured_degrees_have_the_formula(n, k):
 
 
 def test_a_sign_changed_changes_the_degrees():
-    file = load("lv(5,2)")
-    rhs = ["x1*(x2 + x3 - x4 + x5)", *map(str, file.system.rhs[1:4]), "x5*(-x1 + x2 - x3 - x4)"]
-    other = parse_system(f"variables = {[*file.variables]}\n[system]\nrhs = {rhs}".replace("'", '"'), "other")
-    assert list(measured(other, 5).degrees)[:5] != [degree(5, 2, m) for m in range(5)]
+    other = parse_system("[system]\nrhs = \"x' = x*(y + z); y' = y*(x + z); z' = z*(x - y)\"", "other")
+    assert list(measured(other, 5).degrees)[:4] != [degree(3, 1, m) for m in range(4)]

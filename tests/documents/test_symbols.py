@@ -1,13 +1,9 @@
 """Systems with symbols are the systems with numbers, wherever the symbols get these numbers."""
 
-from __future__ import annotations
-
 import random
 
 import pytest
 from flint import fmpq
-from helpers import systems
-from hypothesis import given
 from search_helpers import PRIME, system
 
 from kahanmaps.algebra.fields import GF
@@ -38,11 +34,6 @@ def test_symbols_at_the_numbers_of_the_file_give_its_system(name):
     same_maps(over, file.system.over(FIELD))
 
 
-@given(systems())
-def test_without_symbols_nothing_changes(drawn):
-    same_maps(drawn.over(FIELD), drawn.over(FIELD))
-
-
 def test_a_poisson_matrix_may_contain_symbols():
     text = (
         'variables = ["x", "y"]\n[parameters]\na = "2"\n[hamiltonian]\nH = "a*x^3 + y^2"\nJ = [["0", "a"], ["-a", "0"]]'
@@ -60,10 +51,6 @@ def test_the_jacobian_in_polynomials_is_that_over_a_field():
     rows = found.jacobian([*found.variables, "b1", "b2", "eps"])
     numbers = [[evaluate(entry, FIELD, [*x, *b, FIELD.one]) for entry in row] for row in rows]
     assert numbers == found.over(FIELD, b).jacobian(x).tolist()
-
-
-def test_a_symbol_given_twice_counts_once():
-    assert with_symbols(load("euler_top"), ["a1", "a1"]).symbols == ("a1",)
 
 
 @pytest.mark.parametrize(

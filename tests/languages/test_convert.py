@@ -1,14 +1,9 @@
 """The function `convert`: what it refuses, and that the same input gives the same text."""
 
-from __future__ import annotations
-
 import pytest
 
 import kahanmaps as km
 from kahanmaps.languages.convert import LANGUAGES, convert
-
-CALL = "import kahanmaps as km; from kahanmaps.languages.convert import convert, PARTS; "
-CALL += "print(convert(km.load('weierstrass'), 'julia', PARTS), end='')"
 
 
 @pytest.mark.parametrize(
@@ -31,13 +26,6 @@ def test_wrong_arguments_are_refused(language, what, more, told):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_sources_are_cited_in_the_comment_on_top(language):
     assert "Hirota, K. Kimura. Discretization of the Euler top" in convert(km.load("euler_top"), language)
-
-
-def test_integrals_and_density_of_a_hamiltonian_system_come_from_theorems():
-    hamiltonian = km.CubicHamiltonian(km.parse_polynomial("x^3 + y^2", ["x", "y"]), km.standard_structure(2))
-    text = convert(km.SystemFile.from_hamiltonian(hamiltonian), "sage")
-    assert "def modified_hamiltonian(point, eps):" in text
-    assert "def density(point, eps):" in text
 
 
 def test_an_algebraic_parameter_is_an_argument_of_the_functions():

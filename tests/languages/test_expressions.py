@@ -1,14 +1,11 @@
 """Expressions in the languages that are not run here, read back by the library's own parser, token by token."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
 from language_helpers import converted, systems
 
 import kahanmaps as km
-from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.languages.convert import convert
 from kahanmaps.languages.language import LANGUAGES, Language
 
@@ -111,13 +108,3 @@ def test_a_large_closed_form_is_refused_with_what_to_do_instead():
     linear = km.SystemFile.from_system(km.QuadraticSystem.from_text(names, names))
     with pytest.raises(km.InputError, match="found dimension 9"):
         convert(linear, "pari", ["map-formulas"])
-
-
-def test_the_closed_form_is_in_lowest_terms():
-    from kahanmaps.languages.formulas import Formulas
-
-    (function,) = Formulas.of(km.load("riccati")).closed_form()
-    expected = km.parse_rational_function("((1 + eps)*x - 2*eps)/(1 - eps - 2*eps*x)", ["x", "eps"])
-    assert function == expected
-    assert len(function.denominator) == len(expected.denominator)
-    assert isinstance(function, RationalFunction)

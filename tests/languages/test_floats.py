@@ -4,8 +4,6 @@ Numbers are floats there, and the points of small numerators and denominators: 1
 linear equations in six dimensions, and is far below what a wrong sign or factor changes.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -83,9 +81,7 @@ def agree(found: list[float], asked: list[Question]) -> bool:
 
 
 @each
-@pytest.mark.parametrize(
-    "name", ["euler_top", "riccati", "planar_cubic_hamiltonian", "family-3", "nasty-capitals", "constant"]
-)
+@pytest.mark.parametrize("name", ["euler_top", "planar_cubic_hamiltonian", "nasty-capitals", "constant"])
 def test_the_program_gives_the_values_of_the_library(language, answers, name, tmp_path):
     at_hand(language)
     text, asked = converted(language, SYSTEMS[name])

@@ -4,8 +4,6 @@
 with GOLDEN=write in the environment and read the difference against the manual of the program.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

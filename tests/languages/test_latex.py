@@ -1,7 +1,5 @@
 """What `convert` writes as LaTeX: whole documents, in which everything that opens is closed and nothing is left out."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -73,13 +71,6 @@ def test_the_lines_of_a_right_hand_side_together_are_all_of_it(name):
         from kahanmaps.display.latex import latex_name
 
         assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in whole
-
-
-def test_long_quotients_have_numerators_and_denominators_of_their_own():
-    document = DOCUMENTS["planar_cubic_hamiltonian"]
-    assert "P_{\\mathrm{modified\\_H}} &= " in document
-    assert "Q_{\\mathrm{modified\\_H}} &= -" not in document
-    assert max(len(line) for line in document.splitlines() if not line.startswith("%")) < 300
 
 
 def test_matrices_of_more_than_ten_columns_are_announced():

@@ -1,7 +1,5 @@
 """Maps that are not Kahan's, written for other programs: what runs gives the values of the library."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

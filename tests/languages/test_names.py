@@ -1,7 +1,5 @@
 """Names that a language reserves or cannot spell are replaced, and different names stay different."""
 
-from __future__ import annotations
-
 import pytest
 from language_helpers import HAS_GP, gp_prints
 

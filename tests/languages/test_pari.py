@@ -1,13 +1,10 @@
 """What `convert` writes for PARI/GP is read by gp as it stands and gives the same exact values as the library."""
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpq
-from language_helpers import HAS_GP, ask_gp, converted, gp_prints, questions, systems
+from language_helpers import CATALOGUE, HAS_GP, ask_gp, converted, gp_prints, questions, systems
 
 import kahanmaps as km
-from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.languages.convert import convert
 
@@ -38,25 +35,6 @@ def test_a_wrong_formula_would_be_noticed(right, wrong, tmp_path):
     assert answers != [question.expected for question in asked]
 
 
-def test_what_gp_prints_of_an_integral_is_read_back_as_the_same_function(tmp_path):
-    for name in ("euler_top", "weierstrass", "volterra_periodic_4", "zhukovski_volterra_1"):
-        file = km.load(name)
-        text = convert(file, "pari", ["integrals"])
-        point = ", ".join(f"'{variable}" for variable in file.variables)
-        lines = [f"print(integral_{claim}([{point}]~, 'eps));" for claim in file.integrals]
-        names = (*file.variables, "eps")
-        printed = [km.parse_rational_function(line, names) for line in gp_prints(text, lines, tmp_path)]
-        assert printed == list(file.integrals.values())
-
-
-def test_the_map_of_symbols_is_the_closed_form(tmp_path):
-    file = km.load("lotka_volterra")
-    text = convert(file, "pari", ["map", "map-formulas"])
-    point = "[" + ", ".join(f"'{variable}" for variable in file.variables) + "]~"
-    line = f"print(kahan_map({point}, 'eps) == kahan_map_formula({point}, 'eps));"
-    assert gp_prints(text, [line], tmp_path) == ["1"]
-
-
 def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themselves(tmp_path):
     file = km.load("euler_top")
     text = convert(file, "pari", symbols=["a1", "a2", "a3"])
@@ -73,7 +51,7 @@ def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themsel
     assert found == [parse_polynomial(piece, names) for piece in ("-3/2*a1", "-3*a2", "a3/2")]
 
 
-WITH_PARAMETERS = [name for name in km.names() if SYSTEMS[name].parameters and SYSTEMS[name].kind != "family"]
+WITH_PARAMETERS = [name for name in CATALOGUE if SYSTEMS[name].parameters and SYSTEMS[name].kind != "family"]
 
 
 @pytest.mark.parametrize("name", WITH_PARAMETERS)
@@ -84,31 +62,3 @@ def test_symbols_get_any_values_afterwards(name, tmp_path):
     text = convert(SYSTEMS[name], "pari", parts, symbols=symbols)
     answers = ask_gp(text, asked, tmp_path, more="".join(f", {value}" for value in values.values()))
     assert answers == [question.expected for question in asked]
-
-
-def test_an_integer_point_and_a_row_are_taken_as_well(tmp_path):
-    text = convert(km.load("euler_top"), "pari")
-    lines = ["print(kahan_map([1, 2, 3], 1/10));", "print(kahan_map([1, 2, 3]~, 1/10));"]
-    row, column = gp_prints(text, lines, tmp_path)
-    assert row == column
-
-
-def test_two_systems_fit_into_one_session_under_different_names(tmp_path):
-    text = convert(km.load("euler_top"), "pari", name="euler") + convert(km.load("lorenz"), "pari", name="lorenz")
-    lines = ["print(euler_vector_field([1, 2, 3]~));", "print(lorenz_vector_field([1, 2, 3]~));"]
-    expected = [km.load(name).system.over(km.QQ).value((fmpq(1), fmpq(2), fmpq(3))) for name in ("euler_top", "lorenz")]
-    assert gp_prints(text, lines, tmp_path) == [f"[{', '.join(map(str, value))}]~" for value in expected]
-
-
-def test_a_dense_polynomial_of_many_terms_is_written_in_full(tmp_path):
-    names = [f"x{k}" for k in range(1, 5)]
-    above = parse_polynomial("(1 + x1 + 2*x2 + x3/3 - x4)^11", names)
-    text = (
-        'variables = ["x1", "x2", "x3", "x4"]\n[system]\nrhs = ["x1", "x2", "x3", "x4"]\n'
-        '[integrals]\nbig = "(1 + x1 + 2*x2 + x3/3 - x4)^11"'
-    )
-    assert len(above) > 1000
-    file = km.parse_system(text, "big")
-    line = "print(integral_big([1/2, 1/3, 2, 5]~, 1) == (1 + 1/2 + 2/3 + 2/3 - 5)^11);"
-    assert gp_prints(convert(file, "pari", ["integrals"]), [line], tmp_path) == ["1"]
-    assert isinstance(file.integrals["big"], RationalFunction)

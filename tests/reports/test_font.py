@@ -1,7 +1,5 @@
 """The font of formulas: it comes with its licence, is part of a page with formulas, and has their letters."""
 
-from __future__ import annotations
-
 import re
 import string
 from importlib import resources

@@ -1,0 +1,200 @@
+"""The commands find-...: what they print is accepted by the checks and can be pasted, JSON has all that is needed to
+search again, and what stays open gives 3.
+"""
+
+import shlex
+
+import pytest
+from schema_helpers import mistakes
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.version import __version__
+
+
+def without_claims(name):
+    """The file of the catalogue without its sections [integrals] and [density]."""
+    kept, skips = [], False
+    for line in load(name).to_toml().splitlines():
+        if line.startswith("["):
+            skips = line.strip() in ("[integrals]", "[density]")
+        if not skips:
+            kept.append(line)
+    return "\n".join(kept) + "\n"
+
+
+# What is found is accepted
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "check"),
+    [
+        ("euler_top", "--symbolic a1,a2,a3", "-p a1=3/2 -p a2=5"),
+        ("euler_top", "--eps 1/3", "--eps 1/3"),
+        ("volterra_periodic_4", "", ""),
+        pytest.param("henon_heiles", "", "", marks=pytest.mark.slow),
+        pytest.param("three_wave", "", "--steps 2", marks=pytest.mark.slow),
+    ],
+)
+def test_integrals_are_accepted_by_check_integrals(kahanmaps, tmp_path, name, options, check):
+    section = kahanmaps(f"find-integrals {name} --toml", options)
+    assert section.status == 0
+    path = tmp_path / "system.toml"
+    path.write_text(without_claims(name) + section.out)
+    report = kahanmaps("check-integrals", path, "--json", check)
+    assert report.status == 0
+    found = [line.split(" = ")[0] for line in section.out.splitlines() if line[0] == "I"]
+    verdicts = {finding["claim"]: finding["verdict"] for finding in report.json["claims"]}
+    assert len(found) == load(name).catalog["codimension"]
+    assert all(verdicts[f"{one} is conserved"] in ("proved", "supported") for one in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "check"),
+    [
+        ("dressing_chain_3", "--symbolic b1,b2,b3", "-p b1=7"),
+        ("euler_top", "--eps 1/3", "--eps 1/3"),
+        ("henon_heiles", "", "--steps 3"),
+    ],
+)
+def test_densities_are_accepted_by_check_measure(kahanmaps, tmp_path, name, options, check):
+    section = kahanmaps(f"find-density {name} --toml", options)
+    assert (section.status, section.out.count("[density]\nphi = ")) == (0, 1)
+    path = tmp_path / "system.toml"
+    path.write_text(without_claims(name) + section.out)
+    report = kahanmaps("check-measure", path, "--json", check)
+    assert report.status == 0
+    assert {finding["verdict"] for finding in report.json["claims"]} <= {"proved", "supported"}
+
+
+@pytest.mark.parametrize(("find", "check"), [("integrals", "integrals"), ("density", "measure")])
+def test_what_is_for_one_eps_is_refuted_at_another(kahanmaps, tmp_path, find, check):
+    section = kahanmaps(f"find-{find} euler_top --eps 1/3 --toml").out
+    assert section.startswith("# for eps = 1/3 only (time step 2 eps = 2/3): check with --eps 1/3\n[")
+    path = tmp_path / "system.toml"
+    path.write_text(without_claims("euler_top") + section)
+    assert kahanmaps(f"check-{check}", path, "--eps 1/4").status == 1
+
+
+@pytest.mark.parametrize("options", ["--eps 1/3", "--degree 3 --denominator x"])
+def test_tensors_are_accepted_by_check_poisson_for_their_system_only(kahanmaps, tmp_path, options):
+    section = kahanmaps("find-poisson lotka_volterra --toml", options)
+    path = tmp_path / "p.toml"
+    path.write_text(section.out)
+    eps = options if "eps" in options else ""
+    report = kahanmaps("check-poisson lotka_volterra --json --tensor", path, eps)
+    assert (section.status, report.status, report.json["verdict"]) == (0, 0, "proved")
+    assert kahanmaps("check-poisson weierstrass --json --tensor", path, eps).status == 1
+
+
+def test_variables_with_the_names_of_integrals(kahanmaps, tmp_path):
+    path = tmp_path / "system.toml"
+    path.write_text('variables = ["I1", "I2", "x"]\n[system]\nrhs = ["I2", "-I1", "0"]\n')
+    section = kahanmaps("find-integrals", path, "--toml").out
+    assert section == '[integrals]\nI1 = "x"\nI2 = "I1^2 + I2^2"\n'
+    path.write_text(path.read_text() + section)
+    assert kahanmaps("check-integrals", path).status == 0
+
+
+def test_the_commuting_systems_of_a_member_that_does_not_say_so_can_be_pasted(kahanmaps):
+    rhs = " ".join(f"--rhs='{text}'" for text in kahanmaps("systems paper_m2 --json").json["rhs"])
+    out = kahanmaps(f"find-commuting --vars x1,x2,x3,x4 {rhs}").out.splitlines()
+    kind = "fields g = B f (B a constant rational matrix)"
+    assert out[0] == f"# find-commuting: inline, {kind}, every eps (the time step is 2 eps)"
+    assert out[1] == "bracket\tthe g with [f, g] = 0 have dimension 2"
+    assert not any("trivial" in line for line in out)
+    found = [line.split("\t")[2] for line in out if line.startswith("proved\tg and -g")]
+    assert len(found) == 3  # 9 solutions: 0, f, -f and three pairs
+    assert any("B = [[-5, 6, 0, 0], [-4, 5, 0, 0], [0, 4, -5, -4], [-4, 0, 6, 5]]" in line for line in out)
+    assert out[-1] == f"# complete: among the {kind} only these, 0, f and -f commute with f"
+    outcome = kahanmaps("check-commute", *(f"'{word}'" for word in shlex.split(found[0])), "paper_m2 --json")
+    assert (outcome.status, outcome.json["holds"]) == (0, True)
+
+
+# JSON
+
+
+def test_json_is_one_object_with_all_that_is_needed_to_search_again(kahanmaps):
+    command = "find-integrals euler_top --symbolic a1 --seed 5 --json -q"
+    outcome = kahanmaps(command)
+    found = outcome.json
+    assert (outcome.status, outcome.err) == (0, "")
+    assert [found[key] for key in ("command", "version", "system", "symbols", "eps", "time_step", "seed")] == [
+        "find-integrals", __version__, "euler_top", ["a1"], "every", "every", 5
+    ]  # fmt: skip
+    assert found["parameters"] == {"a1": "1", "a2": "-2", "a3": "1"}
+    assert found["convention"] == "eps is the paper's epsilon, the time step is 2 eps"
+    assert (found["found"], found["codimension"], found["reason"], found["note"]) == (2, 2, "", "")
+    assert found["relations"]["nullities"] == [0, 2]
+    assert [one["verdict"] for one in found["integrals"]] == ["proved", "proved"]
+    assert all(prime.isdigit() for prime in found["primes"])
+    assert found["document"]["variables"] == ["x1", "x2", "x3"]
+    assert kahanmaps(command).json == found
+
+
+def test_integrals_of_the_flow(kahanmaps):
+    lines = kahanmaps("find-integrals henon_heiles --flow --max-degree 3 -q").out.splitlines()
+    assert lines[0] == "find-integrals: henon_heiles, the flow x' = f(x)"
+    assert lines[1].startswith("F1\tproved\t6*q1^2*q2 - 2*q2^3")
+    record = kahanmaps("find-integrals euler_top --flow --json -q").json
+    assert record["flow"] is True
+    assert [one["combination"] for one in record["beside_map"]["limits"]] == ["(I1 + 1)/eps^2", "(-I2/2 + 1/2)/eps^2"]
+    assert mistakes("find-integrals", record) == []
+
+
+def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps):
+    words = "find-integrals lorenz -p b=20 --flow --darboux 2"
+    assert kahanmaps(words).out.splitlines() == [
+        "Darboux polynomials: lorenz, the flow x' = f(x)",
+        "P' = K P, irreducible; integrals left out",
+        "K = -20",
+        "\tproved\tx^2 - 20*z",
+    ]
+    data = kahanmaps(f"{words} --json").json
+    assert (data["flow"], data["cofactors"], data["reason"]) == (True, [], "")
+    assert mistakes("find-integrals", data) == []
+    assert [one["cofactor"] for one in data["spaces"]] == ["-20"]
+    beside = "find-integrals lorenz -p b=20 --flow --max-degree 2 -q"
+    assert "T1\tproved\texp(20*t)*(x^2 - 20*z)\n\tdepends on time\n" in kahanmaps(beside).out
+    data = kahanmaps(f"{beside} --json").json
+    assert data["beside_map"]["polynomials_degree"] == 3
+    assert mistakes("find-integrals", data) == []
+
+
+# What stays open
+
+
+def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.LIFTS", ())
+    outcome = kahanmaps("find-integrals clebsch_first_flow --max-degree 2 --json")
+    assert (outcome.status, outcome.json["found"], outcome.json["codimension"]) == (3, 1, 4)
+    assert "3 of the 4 independent integrals have no closed form P/Q" in outcome.json["reason"]
+
+
+def test_integrals_in_iterates_are_shown_with_the_others(kahanmaps):
+    outcome = kahanmaps("find-integrals lagrange_top --max-degree 2 --json")
+    assert (outcome.status, outcome.json["found"], len(outcome.json["in_iterates"])) == (0, 4, 1)
+    [one] = outcome.json["in_iterates"]
+    assert one["name"] == "I4"
+    assert "p1*m1~*eps^2" in one["integral"]
+    assert r"\tilde{p_1}" in one["latex"]
+    assert f"# I4: {one['integral']}" in kahanmaps("find-integrals lagrange_top --max-degree 2 --toml").out
+
+
+def test_commuting_systems_that_stay_open_give_3(kahanmaps):
+    command = "find-commuting --vars a,b,c,d --rhs a^2 --rhs 0 --rhs 0 --rhs 0 --shape quadratic"
+    outcome = kahanmaps(command)
+    assert outcome.status == 3
+    assert "# undecided: there may be more; the fields g with [f, g] = 0 have dimension 31" in outcome.out
+    assert "undecided: the fields g with [f, g] = 0 have dimension 31" in outcome.err
+    quiet = kahanmaps(command, "-q --json")
+    assert (quiet.status, quiet.err, quiet.json["status"], quiet.json["verdict"]) == (3, "", "undecided", "undecided")
+
+
+def test_a_search_for_symmetries_that_is_too_large_gives_3(kahanmaps):
+    names = [f"x{i}" for i in range(17)]
+    command = f"find-symmetry --vars {','.join(names)} {' '.join(f'--rhs={name}^2' for name in names)}"
+    outcome = kahanmaps(command)
+    assert outcome.status == 3
+    assert "# undecided: infinitesimal symmetries are computed up to dimension 16, found 17\n" in outcome.out
+    assert "undecided: signed permutations are tried up to dimension 12, found 17" in outcome.err
+    assert kahanmaps(command, "-q").err == ""
