@@ -71,7 +71,6 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
         "symbols": ["a2"],
         "eps": "every",
         "time_step": "every",
-        "arithmetic": "exact formulas, from residues modulo primes",
         "convention": "eps is the paper's epsilon, the time step is 2 eps",
         "seed": 5,
         "seconds": 20.0,
