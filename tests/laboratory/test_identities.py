@@ -1,7 +1,5 @@
 """Formulas that were found are put to the proof: what is expanded decides, and what has no value is undecided."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import pytest
@@ -9,7 +7,6 @@ from flint import fmpq
 
 from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
-from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
@@ -20,7 +17,6 @@ from kahanmaps.laboratory.preserve import identities
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
@@ -83,14 +79,6 @@ def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
     assert found.evidence.summary.endswith("for every eps and every a")
 
 
-def test_an_integral_with_symbols_is_for_those_at_which_it_has_values():
-    system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
-    I = parse_rational_function("(x^2 + y^2)/((a^2 - 1)*eps)", ["x", "y", "a", "eps"])
-    verdict, evidence = integral_verdict(system, I, None)
-    assert verdict is Verdict.PROVED
-    assert evidence.summary.endswith("for every eps and every a where a^2 - 1 is not 0")
-
-
 def test_a_constant_with_symbols_is_told_as_such_where_it_has_values():
     system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
     for text, told in (("3", ", being a constant"), ("x/(a*x - x)", " where a - 1 is not 0, being a constant")):
@@ -109,14 +97,6 @@ def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_boun
     # A symbol is drawn like a coordinate: what holds for a = 1 alone is refuted.
     wrong = parse_rational_function("x^2 + a*y^2", ["x", "y", "a", "eps"])
     assert integral_verdict(system, wrong, None)[0] is Verdict.REFUTED
-
-
-def test_what_check_integrals_proves_is_proved_where_it_is_found():
-    """Of the repaired icosahedral map, whose denominator has degree 6 and eps^18: some 93 million products of terms."""
-    file = load("repaired_icosahedral")
-    [one] = find_integrals(file).integrals
-    [finding] = check_integrals(file).findings
-    assert one.verdict is finding.verdict is Verdict.PROVED
 
 
 def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
