@@ -339,15 +339,6 @@ def test_a_singular_end_leaves_the_decision_to_what_is_there_and_is_told_where_t
     assert near.reason.endswith(near.end.message)
 
 
-def test_a_start_above_the_budget_is_the_only_height():
-    structure, system = structure_and_system("m = 2")
-    start = [fmpq(1, 10**50 + k) for k in range(1, 5)]
-    for every in (1, 20):
-        found = growth(system, start, 100, structure=structure, every=every, max_digits=10)
-        assert found.heights == (height(start),)
-        assert (found.kind, found.end.status, found.ratio) == (U, "budget", None)
-
-
 def test_a_period_is_seen_in_jumps_too():
     structure, system = structure_and_system("m = 2")
     found = growth(system, [0] * 4, 500, structure=structure, every=100)

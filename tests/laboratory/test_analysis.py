@@ -3,7 +3,6 @@
 import json
 import time
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +10,7 @@ from flint import fmpq
 from search_helpers import system
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system, read_system
+from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis as module
@@ -23,7 +22,6 @@ from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
-FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (
     "hamiltonian structure",
     "the commuting family",
@@ -63,10 +61,6 @@ relations = [{monomials = "degree <= 2", dimension = 0}]
 FOUR = ("x y", "y", "-x + x^2")  # q'' = -q + q^2: at eps = 1 the fourth iterate is the identity
 
 
-def text_of(found):
-    return "\n".join(line.text for _, lines in found.sections for line in lines)
-
-
 def results(found):
     """Everything but the file itself."""
     return {key: value for key, value in found.to_json().items() if key != "document"}
@@ -98,19 +92,6 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     assert generic.conclusion.growth == "quadratic"
     assert "only" not in generic.conclusion.sentence
     assert generic.integrals.profile.period is None
-
-
-def test_no_density_is_measured_where_degrees_were_searched_and_undecided_where_they_were_not():
-    found = analyze(system("x", "1 + x^2"))
-
-    def status(cut):
-        none = replace(found, densities=replace(found.densities, densities=(), degree=4, cut=cut))
-        (line,) = dict(none.sections)["measure"]
-        return line.status, line.text
-
-    searched, stopped = "no polynomial of degree at most 4", "the time was over"
-    assert status("") == ("measured", f"{searched}, and no product of powers of known ones, is a density")
-    assert status(stopped) == ("undecided", stopped)
 
 
 # Integrals and growth are two findings
@@ -177,29 +158,6 @@ def test_where_an_iterate_is_constant():
 
 
 # Form
-
-
-def test_relations_of_several_degrees_do_not_share_names():
-    found = analyze(read_system(FURTHER / "volterra_open_3.toml"))
-    assert [one.text for one in found.relations] == [
-        "x1 + x2 + x3 + c1 = 0",
-        "x2^2 + c2*x2*x3 + c2*x3^2 + c3*x3 - 1/eps^2 = 0",
-    ]
-    lines = text_of(found)
-    assert "c1, c2, c3 are constant on each orbit and differ between orbits, so they are integrals" in lines
-    assert "on eps only" not in lines
-    assert "depend on eps only" in text_of(analyze(load("planar_cubic_hamiltonian")))
-
-
-def test_the_same_seed_gives_the_same_and_another_the_same_verdict():
-    one, again, other = (analyze(load("nahm_octahedral"), seed=seed).to_json() for seed in (3, 3, 4))
-    assert one == again
-    assert one["seed"] == 3
-    assert other["verdict"] == one["verdict"]
-    assert [each["integral"] for each in other["integrals"]["integrals"]] == [
-        each["integral"] for each in one["integrals"]["integrals"]
-    ]
-    assert other["integrals"]["primes"] != one["integrals"]["primes"]
 
 
 LIE = "generic orbits lie on varieties of codimension "
@@ -290,12 +248,6 @@ def test_singularities_come_before_degrees_and_help_them_up_to_a_dimension(most,
     parts = [part for part in dict.fromkeys(told) if part in PARTS]
     assert parts.index("singularities") == (3 if first else len(PARTS) - 1)
     assert [patterns is not None for patterns in given] == [first]
-
-
-@pytest.mark.parametrize(("most", "looked_for"), [(1, True), (0, False)])
-def test_constant_structures_are_looked_for_up_to_a_dimension(most, looked_for, monkeypatch):
-    monkeypatch.setattr(module, "MAX_HAMILTONIAN_DIMENSION", most)
-    assert (analyze(load("riccati")).hamiltonian is not None) == looked_for
 
 
 def test_linear_families_of_commuting_systems_are_written_out(monkeypatch):

@@ -183,15 +183,6 @@ def test_solutions_that_are_refuted_are_counted(monkeypatch):
     assert (found.solutions, found.discarded) == ([], 3)  # 0, f and -f
 
 
-def test_all_quadratic_g_are_tried_by_default_in_small_dimensions():
-    """(y, x^2, x) commutes with fields that are no B f, (0, 0, 1) one of them."""
-    found = commuting_systems(system("x y z", "y", "x^2", "x"))
-    assert (found.shape, found.complete) == ("quadratic", True)
-    assert "0, 0, 1" in {texts(g) for family in found.families for g in family.directions}
-    assert commuting_systems(system("x y", "x^2", "x*y")).shape == "linear"  # where these are not found in a second
-    assert commuting_systems(load("henon_heiles").system).shape == "linear"
-
-
 def test_of_many_equations_that_were_not_solved_six_are_told():
     search = _Search(system("x", "x^2"), "quadratic", Settings(), 0.0)
     gens = ring([f"b{k}" for k in range(1, 10)]).gens()

@@ -39,16 +39,6 @@ def test_the_pencils_of_the_periodic_volterra_lattice() -> None:
     assert found["1"][0] == "x1 + x2 + x3 + x4"
 
 
-def test_symbols_and_a_given_eps() -> None:
-    with_symbols = darboux_polynomials(load("euler_top"), 4, symbols=("a1", "a2", "a3"))
-    (space,) = with_symbols.spaces
-    assert len(space.polynomials) == 6
-    assert space.verdict is Verdict.PROVED
-    at_eps = darboux_polynomials(load("weierstrass"), 3, eps="1/3")
-    assert all("eps" not in format_polynomial(P) for space in at_eps.spaces for P in space.polynomials)
-    assert at_eps.spaces
-
-
 @pytest.mark.parametrize("name", ["nahm_octahedral", "dressing_chain_3"])
 def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None:
     file = load(name)

@@ -61,14 +61,6 @@ def test_multiples_of_what_is_known_are_not_found_again():
     assert gradient_rank(map_, known) == 2
 
 
-def test_spaces_that_share_a_sum_with_known_ones_are_left_to_cofactors():
-    # x1 x3 and x2 x4 have different denominators, but (x2 - x4)^2 + 4 x2 x4 and so on are not independent of s^2
-    map_ = first_map(load("volterra_periodic_4"))
-    affine = DarbouxSpace.spanned_by(4, 1, [[1, 0, 0, 0, 0], [0, 1, 1, 1, 1]], map_.prime)
-    assert is_common(map_, affine)
-    assert darboux_spaces(map_, 2, [affine]) == []
-
-
 def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
     rng = random.Random(1)
     for size in (2, 3):

@@ -164,15 +164,6 @@ def test_lines_in_special_position_are_replaced(monkeypatch):
     assert any("was replaced by another" in note for note in found.notes)
 
 
-def test_the_same_seed_gives_the_same_and_progress_is_told():
-    told: list[str] = []
-    system = load("weierstrass").system
-    first = degree_growth(system, max_terms=5, seed=3, progress=told.append)
-    assert first == degree_growth(system, max_terms=5, seed=3)
-    assert first.primes != degree_growth(system, max_terms=5, seed=4).primes
-    assert told[-1] == "degrees: iterate 5, degree 7 before it"
-
-
 @pytest.mark.parametrize(
     ("degrees", "n", "steps", "expected"),
     [

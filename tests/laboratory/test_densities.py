@@ -109,14 +109,6 @@ def test_simple_systems(file, texts):
     assert [one.text for one in find_densities(file).densities] == texts
 
 
-def test_maps_that_are_periodic_at_an_eps_are_told():
-    found = find_densities(load("henon_heiles"), eps=1)
-    assert (found.period, found.to_json()["period"]) == (4, 4)
-    assert found.note.endswith("at eps = 1 the map is periodic (measured); nothing follows for other eps")
-    assert found.toml_section().startswith("# for eps = 1 only")
-    assert find_densities(load("henon_heiles"), eps="1/2").note == ""
-
-
 def test_too_little_time_is_told():
     found = find_densities(load("lorenz"), seconds=1e-9)
     assert (found.densities, found.reason) == ((), "the time was over at degree 0")

@@ -3,16 +3,16 @@
 import random
 
 import pytest
-from flint import arb, fmpq, nmod_poly
+from flint import arb, fmpq
 from helpers import quick
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, map_names, names
-from kahanmaps.laboratory.growth.curves import Line, reduced
+from kahanmaps.laboratory.growth.curves import reduced
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.enclosure import _tangents, degree_above, enclose, is_birational, lower_bound
+from kahanmaps.laboratory.growth.enclosure import degree_above, enclose, is_birational, lower_bound
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -51,38 +51,12 @@ def test_the_lower_bound_is_that_of_the_distances():
     assert not lower_bound(39, 10, 1) > 1
 
 
-def test_lines_that_touch_a_conic_meet_in_different_points():
-    """No three through one point: the determinant of any three is not 0."""
-    lines = _tangents(PRIME, random.Random(2))[:8]
-    rows = []
-    for line in lines:
-        a, b = ([int(entry[k]) for entry in line] for k in (0, 1))
-        rows.append([(a[i] * b[j] - a[j] * b[i]) % PRIME for i, j in ((1, 2), (2, 0), (0, 1))])
-    for i in range(8):
-        for j in range(i):
-            for k in range(j):
-                (a, b, c), (d, e, f), (g, h, m) = rows[i], rows[j], rows[k]
-                assert (a * (e * m - f * h) - b * (d * m - f * g) + c * (d * h - e * g)) % PRIME
-
-
 def test_a_map_that_is_not_birational_is_refused():
     rng = random.Random(1)
     good = reduced(load("mcmillan").map, None, rng)
     assert is_birational(good, rng)
     kahan = as_map(QuadraticSystem.from_text(["x", "y"], ["x", "y^2"]))
     assert not is_birational(kahan.at(GF(PRIME).convert(fmpq(-1)), GF(PRIME)), rng)  # into a line
-
-
-def test_along_a_line_of_choice_degrees_are_those_of_a_line_in_special_position():
-    """x y = const is no line, but x = 0 is invariant for Lotka-Volterra: the degree there is 1 for ever."""
-    over = reduced(load("lotka_volterra").map, None, random.Random(4))
-    p = over.field.characteristic
-    axis = Line(over, random.Random(1), 1e18, 100, [nmod_poly([], p), nmod_poly([0, 1], p), nmod_poly([1], p)])
-    generic = Line(over, random.Random(1), 1e18, 100)
-    for _ in range(4):
-        axis.step(0)
-        generic.step(0)
-    assert (axis.degree, generic.degree) == (1, 16)
 
 
 def test_dimension_3_has_no_bounds():

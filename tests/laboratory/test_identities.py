@@ -79,14 +79,6 @@ def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
     assert found.evidence.summary.endswith("for every eps and every a")
 
 
-def test_a_constant_with_symbols_is_told_as_such_where_it_has_values():
-    system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
-    for text, told in (("3", ", being a constant"), ("x/(a*x - x)", " where a - 1 is not 0, being a constant")):
-        verdict, evidence = integral_verdict(system, parse_rational_function(text, ["x", "y", "a", "eps"]), None)
-        assert verdict is Verdict.PROVED
-        assert evidence.summary.endswith(f"for every eps and every a{told}")
-
-
 def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_bound(monkeypatch):
     monkeypatch.setattr(identities, "_BUDGET", 10)
     system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])

@@ -4,10 +4,9 @@ import random
 
 import pytest
 from flint import fmpq
-from search_helpers import random_system, ranks, system
+from search_helpers import random_system, system
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
@@ -85,16 +84,6 @@ def test_no_search_tells_of_fewer_integrals_than_theorems_give(file, products):
     as_json = found.to_json()
     assert (as_json["codimension"], as_json["by_theorems"]) == (found.codimension, found.by_theorems)
     assert as_json["codimension_is_exact"] is False
-
-
-def test_theorems_and_relations_count_together():
-    """u' = z u and v' = -z v give u v/(1 - eps^2 z^2), a relation of degree 2; x and y are Hamiltonian."""
-    file = system("u v x y z", "u*z", "-v*z", "y + x^2", "-2*x*y + 3*x^2", "x + u*y")
-    found = find_integrals(file, max_degree=2)
-    assert (found.by_theorems, found.profile.codimension, found.codimension) == (1, 1, 2)
-    functions = [parse_rational_function("u*v/(1 - eps^2*z^2)", (*file.variables, "eps"))]
-    known = [one.function for one in found.integrals]
-    assert ranks(known, functions, Laboratory(file).maps[0]) == (2, 1, 2)
 
 
 def test_with_symbols_theorems_are_asked_at_random_values():

@@ -197,11 +197,6 @@ def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_fo
         assert _is_affine_integral(laboratory.system, function) is expected
 
 
-def test_on_the_line_orbits_that_show_nothing_show_that_there_is_no_integral():
-    found = IntegralSearch(None, (), None, 0, (), (), Profile(1, (0,), (0,), None, True, True), "")
-    assert found.count_text == "there is no integral (measured, relations of degree up to 1 along orbits)"
-
-
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.search.repeat", lambda *_: None)
     found = find_integrals(load("euler_top"))

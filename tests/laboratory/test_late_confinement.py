@@ -22,7 +22,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
+from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.singular.following import Course, Range
@@ -266,15 +266,6 @@ def test_what_excludes_each_other_is_undecided():
     ]
 
 
-@pytest.mark.parametrize(
-    ("dim", "integrals", "expected"),
-    [(1, None, False), (2, 0, False), (2, 1, True), (3, 1, False), (3, 2, True)],
-)
-def test_orbits_lie_on_curves_where_one_integral_less_than_the_dimension_is_known(dim, integrals, expected):
-    known = None if integrals is None else SimpleNamespace(integrals=(0,) * integrals)
-    assert orbits_lie_on_curves(SimpleNamespace(dim=dim, integrals=known)) == expected
-
-
 def beside(kind, growth, lengths=None, heights=(21, 5)):
     """The doubt of heights of this kind, of orbits with so many heights, beside degrees with such patterns."""
     orbits = [SimpleNamespace(growth=SimpleNamespace(heights=(0,) * count)) for count in heights]
@@ -341,11 +332,6 @@ def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
     found = degree_growth(top, eps, seconds=20)
     assert (found.patterns.lengths, found.patterns.running) == ((3,), "")
     assert [found.recurrence.predict(n) for n in (5, 50)] == [51, 5001]
-
-
-def test_what_still_runs_is_said_before_what_was_found():
-    assert Patterns((3,), None, True).text == "nothing new after step 3"
-    assert Patterns((3,), None, True, "x = 0 is undecided").text == "x = 0 is undecided"
 
 
 def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():

@@ -9,7 +9,6 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.documents.inline import System
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -96,12 +95,6 @@ def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
     assert ("undecided", "what the map makes of F1, F2: its integrals were not counted") in uncounted.lines()
 
 
-def test_integrals_that_depend_on_time_are_told_from_others():
-    found = flow_and_map(find_integrals(parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x", "2*y"]')))
-    assert [one.text for one in found.others] == ["x^2/y"]
-    assert ("measured", "F1 is lost up to degree 14: the map shows no integral free of n") in found.lines()
-
-
 def test_integrals_of_the_flow_without_a_formula_are_counted():
     search = find_integrals(load("zander_120"))
     flow = replace(find_integrals(load("zander_120"), flow=True), integrals=())
@@ -142,13 +135,6 @@ def test_the_density_of_the_map_tends_to_one_of_the_flow():
         assert flow_and_map(search, densities).density.text == phi
         assert find_densities(load(name), flow=True).densities[0].text == phi
     assert flow_and_map(find_integrals(load("lorenz"))).density is None
-
-
-def test_members_of_the_pencil_of_an_integral_are_not_told_as_darboux_polynomials():
-    may_leonard = System("x' = x - x*(x + y/2 + 3/2*z); y' = y - y*(3/2*x + y + z/2); z' = z - z*(x/2 + 3/2*y + z)")
-    found = flow_and_map(find_integrals(may_leonard))
-    assert [one.name for one in found.others] == ["F1"]  # (x + y + z)^3/(x*y*z), up to a number
-    assert found.polynomials == ()
 
 
 def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():

@@ -22,7 +22,6 @@ from kahanmaps.laboratory.modular_points import (
     null_space,
     rank,
 )
-from kahanmaps.maps.kahan import KahanMap
 
 SMALL = 101
 residues = st.integers(0, SMALL - 1)
@@ -77,16 +76,6 @@ def test_nothing_gives_nothing():
     assert null_space([], 2, SMALL) == [[1, 0], [0, 1]]
     assert echelon([], SMALL) == combine([], [[1]], SMALL) == combine([[1]], [], SMALL) == []
     assert rank([], SMALL) == rank([[]], SMALL) == 0
-
-
-def test_the_determinants_are_those_of_the_derivative():
-    map_, x = modular(load("lorenz")), (3, 1, 4)
-    image = map_.step(x)
-    field = GF(PRIME)
-    kahan = KahanMap(load("lorenz").system, 7, field)
-    derivative = kahan.jacobian([field.convert(c) for c in x])
-    above, below = map_.determinant(x, image)
-    assert above == int(derivative.det() * below)
 
 
 def test_an_orbit_that_closes_has_each_of_its_points_once():

@@ -69,14 +69,6 @@ def test_factors_without_variables_are_taken_out_over_the_field():
     assert primitive_over(root, x + a * y, 2) != primitive_over(root, x - a * y, 2)
 
 
-def test_heights_over_a_number_field_grow_as_over_q():
-    assert km.heights(km.System(TOP, a="root of t^2 - 2"), starts=1, seconds=20, steps=24).kind == "quadratic"
-    chaotic = km.System("x' = a*y + x^2; y' = -x + x*y - y^2", a="root of t^2 - 2")
-    found = km.heights(chaotic, "1/10", starts=[[1, 2]], seconds=20)
-    assert found.kind == "exponential"
-    assert "of points over QQ[t]/(t^2 - 2)" in found.text
-
-
 def test_commuting_systems_over_a_number_field_are_found_and_commute():
     def found(equations: str, a: str, **options) -> km.CommutingSystems:
         return km.find_commuting(km.System(equations, a=a), **options)

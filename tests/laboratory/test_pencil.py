@@ -12,7 +12,6 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.consistency import contradictions
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.preserve.poisson import pencil as module
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
@@ -116,15 +115,6 @@ def test_a_point_that_is_double_on_one_curve_only_is_refused():
 def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
     monkeypatch.setattr(module._Reduced, "_add_simple", lambda *_, **__: None)
     assert pencil_of("I", integral("x*y"), None, seconds=0.3) is None
-
-
-@pytest.mark.parametrize("name", ["nahm_icosahedral", "somos_5"])
-def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
-    found = analyze(load(name), seconds=30)
-    assert found.pencil is not None
-    assert (found.pencil.genus, found.degrees.growth) == (1, GrowthClass.QUADRATIC)
-    assert "the map is a translation" in found.to_json()["invariant_curves"]["motion"]
-    assert not contradictions(found)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import fmpq
 from helpers import random_point
 from search_helpers import random_system, system
 
@@ -142,27 +142,6 @@ def test_a_function_that_is_said_to_be_a_casimir_is_put_to_the_proof(monkeypatch
     wrong = [("I1*I2", parse_rational_function(f"{ALONG}*{SQUARE}", names))]
     monkeypatch.setattr(poisson_tensors, "casimir_candidates", lambda *given: iter(wrong))
     assert casimirs_of_lie_poisson(ALONG, f"{SQUARE} + {ALONG}") == ()
-
-
-def test_the_tensor_of_the_paper_is_among_those_of_its_member():
-    # Pi = J - eps^2 f'^2 J has degree 2: at eps = 0 it is J, which the two tensors span there
-    file = load("paper_m2")
-    found = find_poisson(file, eps="1/5")
-    kahan, x = file.map.at("1/5"), random_point(4, 3)
-    slope = kahan.vector_field_jacobian(x)
-    J = file.hamiltonian.J
-    Pi = J - slope * slope * J * fmpq(1, 25)
-    values = [one.tensor.value(QQ, kahan.eps, x) for one in found.tensors]
-    assert len(values) == 2
-    assert fmpq_mat([value.entries() for value in (*values, Pi)]).rank() == 2
-
-
-def test_a_denominator_divides_all_entries():
-    # for Lotka and Volterra {x,y} = x y alone: over x the numerator has degree 3
-    over = parse_rational_function("x*(1 + eps)", ["x", "y", "eps"])
-    assert brackets(find_poisson(load("lotka_volterra"), 2, denominator=over, integrals=())) == []
-    found = find_poisson(load("lotka_volterra"), 3, denominator=over, integrals=())
-    assert [(one.text, one.verdict) for one in found.tensors] == [("{x,y} = x*y/(eps + 1)", PROVED)]
 
 
 def test_the_factors_of_a_density_are_tried_as_a_denominator():

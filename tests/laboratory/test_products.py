@@ -117,14 +117,6 @@ def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
     assert find_densities(load("lotka_volterra")).turning is None
 
 
-def test_a_sign_is_taken_away_by_a_square():
-    found = found_in(a_map("x y", ["-x", "y + x^2"], ["-x", "y - x^2"]))
-    assert [one.text for one in found.integrals] == ["x^2"]
-    assert [(one.text, str(one.constant.numerator)) for one in found.in_time] == [("x", "-1")]
-    assert found.density is not None  # det dPhi = -1: x
-    assert found.density.text == "x"
-
-
 @pytest.mark.parametrize("file", [random_system(2, 0), load("henon_heiles")])
 def test_maps_without_structure_have_no_products(file):
     found = found_in(file)

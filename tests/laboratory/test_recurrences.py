@@ -49,16 +49,6 @@ def test_the_growth_rate_is_an_algebraic_number_with_certain_digits():
     assert found.to_json()["rate"]["minimal_polynomial"] == ["-1", "-2", "1"]
 
 
-def test_a_polynomial_factor_of_exponential_growth_is_a_multiplicity():
-    found = find_recurrence([n * 2**n for n in range(8)])
-    assert (found.rate.text, found.rate.multiplicity, found.power) == ("2", 2, 1)
-
-
-def test_no_rate_where_no_positive_root_is_the_largest():
-    found = find_recurrence([(-2) ** n for n in range(6)])
-    assert (found.growth, found.rate, found.closed_form) == (GrowthClass.EXPONENTIAL, None, None)
-
-
 def test_first_terms_may_be_exempt():
     found = find_recurrence([7, 5, *(2**n for n in range(10))])
     assert (found.preperiod, found.order, found.rate.text) == (2, 3, "2")

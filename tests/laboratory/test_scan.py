@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
@@ -299,14 +298,6 @@ def test_a_reflection_that_moves_points_is_found():
     [system]
     rhs = ["y", "x^2 + (a - 1)*(a - 4)*y"]"""
     assert scan(parse_system(text), ["a"], terms=6, primes=(101, 103, 107)).symmetric == (("-a + 5",),)
-
-
-def test_points_over_number_fields_are_told_by_their_polynomials():
-    """Of one parameter, where primes at which a polynomial splits show all its zeros."""
-    text = 'variables = ["x", "y"]\nparameters.a = 0\n[system]\nrhs = ["y", "x^2 + (a^3 - 2)*y"]'
-    found = scan(parse_system(text), ["a"])
-    assert {format_polynomial(equation) for one in found.components for equation in one.equations} == {"a^3 - 2"}
-    assert not any(found.left)
 
 
 def test_points_of_a_plane_over_number_fields_are_found():

@@ -9,7 +9,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.laboratory.scan.conjugates import lifted_conjugates
-from kahanmaps.laboratory.scan.lift import height_bound, lifted_flats, lifted_forms
+from kahanmaps.laboratory.scan.lift import lifted_flats, lifted_forms
 from kahanmaps.laboratory.scan.members import point_on
 from kahanmaps.laboratory.scan.pieces import pieces
 
@@ -114,11 +114,6 @@ def test_points_over_number_fields_have_to_be_there_modulo_all_primes_but_one():
     there = [p for p in FIELD_PRIMES if found[p]]
     assert lifted_conjugates({**found, there[0]: []}, "a", random.Random(1))  # one is let off
     assert not lifted_conjugates({**found, there[0]: [], there[1]: []}, "a", random.Random(1))
-
-
-def test_the_height_bound_is_that_of_two_primes():
-    assert height_bound((53, 59, 61)) == 39
-    assert 2 * 39**2 < 53 * 59 <= 2 * 40**2
 
 
 @pytest.mark.parametrize("spoilt", [False, True])

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import pytest
 from flint import nmod
-from search_helpers import system
 
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.documents.catalog import load
@@ -15,22 +14,13 @@ from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.closed_forms import closed_forms
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
-from kahanmaps.laboratory.preserve.search import affine_space, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search
 
 
 def searched(file, eps=None, seconds=30.0):
     laboratory = Laboratory(file, (), eps)
     known = laboratory.cofactors()
     return laboratory, known, search(laboratory.maps[0], orbit_profile(laboratory.maps), known, seconds)
-
-
-@pytest.mark.parametrize(
-    ("file", "dimension"),
-    [(load("dressing_chain_3"), 2), (system("x y z", "0", "0", "0"), 4), (load("lorenz"), None)],
-)
-def test_affine_integrals(file, dimension):
-    found = affine_space(Laboratory(file).maps[0])
-    assert (found and len(found.basis)) == dimension
 
 
 @pytest.mark.parametrize(
@@ -53,14 +43,6 @@ def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
         [len(space.basis) for space in group] for group in found.spaces
     ]
     assert gradient_rank(second, again.all_spaces) == independent
-
-
-@pytest.mark.parametrize("count", [0, 1, 3])
-def test_so_many_further_maps_are_given_as_are_asked_for(count):
-    laboratory = Laboratory(load("euler_top"))
-    maps = list(laboratory.other_maps(count))
-    assert len(maps) == count
-    assert len({map_.prime for map_ in maps} | set(laboratory.primes)) == count + len(laboratory.primes)
 
 
 def test_cofactors_alone_give_the_three_integrals_of_lyness_of_order_five():

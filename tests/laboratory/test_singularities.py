@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import islice
 
 import pytest
-from flint import fmpq, nmod_poly
+from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
@@ -18,10 +18,8 @@ from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.jets import (
     NotGeneric,
-    PrecisionTooLow,
     form_order,
     image_of,
-    valuation,
     walk,
 )
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED
@@ -100,13 +98,6 @@ def test_singular_everywhere_is_a_value():
     assert run.verdict == "singular everywhere"
 
 
-def test_where_the_determinant_is_too_large_random_points_tell():
-    """The three-wave system has all the integrals it needs (petrera-pfadler-suris-2011)."""
-    run = singularities(load("three_wave").system, "1/7", steps=5)
-    assert (run.critical_degree, run.verdict) == (None, "confined")
-    assert [h.degree for h in run.hypersurfaces if h.polynomial == "?"] == [15, 10]
-
-
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass", "lotka_volterra"])
 def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     system = load(name).system
@@ -158,18 +149,6 @@ def follow(equation, point, direction, tangents, steps, precision):
     return list(islice(walk([equation], point, direction, precision, tangents), steps))
 
 
-def test_series_too_short_say_so_and_special_points_too():
-    """On the pole of the Weierstrass map four steps divide by t twice; a direction along it never leaves it."""
-    system = load("weierstrass").system
-    forms = KahanMap(system, "1/2", GF(PRIME)).equation
-    third = pow(3, -1, PRIME)
-    with pytest.raises(PrecisionTooLow):
-        follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], 12, 2)
-    assert [s.rank for s in follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], 4, 16)] == [0, 0, 0, 1]
-    with pytest.raises((PrecisionTooLow, NotGeneric)):
-        follow(forms, [third, 5, 1], [0, 1, 0], [[1, 0, 0]], 4, 16)
-
-
 def power_of(number: fmpq, prime: int) -> int | None:
     """The exponent of the prime in a rational number, None for 0."""
     power = 0
@@ -214,12 +193,6 @@ def test_a_point_has_the_image_of_the_map_and_none_where_all_minors_vanish():
     special = KahanMap(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]), 1, GF(PRIME)).equation
     assert [image_of([special], [1, y, 1]) for y in (0, 5)] == [None, None]
     assert image_of([special], [0, 5, 1]) is not None
-
-
-def test_the_order_of_a_series_is_seen_below_its_precision():
-    t = nmod_poly([0, 1], 7)
-    assert [valuation(3 * t**2, n) for n in (1, 2, 3, 9)] == [None, None, 2, 2]
-    assert valuation(nmod_poly([], 7), 4) is None
 
 
 @pytest.mark.parametrize("name", ["euler_top", "volterra_periodic_4"])

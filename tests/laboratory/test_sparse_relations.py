@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 from check_helpers import kahan_step, rank_by_elimination, solve_by_elimination
 from helpers import fraction
-from search_helpers import system, value_of
+from search_helpers import value_of
 
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, read_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import NoPoint
 from kahanmaps.laboratory.preserve import sparse_relations as module
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -133,14 +132,6 @@ def test_a_common_number_that_is_not_simple_is_taken_for_an_accident(monkeypatch
     monkeypatch.setattr(module, "_SIMPLE", 2)
     (found,) = relations("zhukovski_volterra_2", 2)
     assert found.text == "x1^2 + e1*x2^2 + c1*x3^2 - x1 + e2*x2 + c2 = 0"
-
-
-def test_degenerate_systems():
-    assert [one.text for one in relations(system("x y", "0", "0"), 1)] == ["x + c1 = 0", "y + c2 = 0"]
-    assert [one.text for one in relations(system("x y", "1", "2"), 1)] == ["x - 1/2*y + c1 = 0"]
-    assert relations(system("x", "x"), 2) == ()
-    with pytest.raises(NoPoint):
-        relations(system("x", "x"), 2, eps=1)
 
 
 @pytest.mark.parametrize(

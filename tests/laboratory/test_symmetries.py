@@ -133,13 +133,6 @@ def test_scalings_change_eps():
     assert linear_symmetries(load("euler_top", {}).system).scaling.rhs == ["x1", "x2", "x3"]
 
 
-@pytest.mark.parametrize("names", ["x", "x y"])
-def test_the_zero_system(names):
-    n = len(names.split())
-    found = linear_symmetries(system(names, *["0"] * n))
-    assert (len(found.infinitesimal), found.order, found.complete) == (n * n + n, [0, 2, 8][n], True)
-
-
 def test_too_large_is_undecided_with_a_reason():
     many = linear_symmetries(QuadraticSystem.from_text([*"abcdefg"], [f"{v}^2" for v in "abcdefg"]))
     assert (many.order, many.complete) == (None, False)
@@ -161,11 +154,6 @@ def test_no_time():
         "signed permutations, with a translation: all",
         "rational matrices S, without a translation: all",
     ]
-
-
-@pytest.mark.parametrize("entries", [["a", "b", "b", "a"], ["a", "b", "0", "a"], ["0", "a", "b", "0"]])
-def test_a_family_with_an_invertible_matrix_is_not_singular(entries):
-    assert not is_singular(family(entries), 2)
 
 
 @pytest.mark.parametrize(
@@ -193,14 +181,6 @@ def test_equations_with_long_coefficients_are_not_set_up_and_nothing_is_called_c
     assert commuting.undecided == ["other g are searched for coefficients of up to 2000 digits only"]
     assert (symmetries.complete, commuting.complete, darboux.complete) == (False, False, False)
     assert [one.trivial for one in commuting.solutions] == ["0", "f", "-f"]
-
-
-@pytest.mark.parametrize(("rhs", "shift"), [(("2*x - 1", "2*y - 1"), 1), (("2*x + 1", "2*y + 1"), -1)])
-def test_symmetries_without_a_translation_come_first(rhs, shift):
-    found = [t for t in linear_symmetries(system("x y", *rhs)).signed if not t.reversing]
-    assert [bool(any(t.r)) for t in found] == [False] * 2 + [True] * 6
-    (both,) = [t.r for t in found if t.S == fmpq_mat([[-1, 0], [0, -1]])]
-    assert both == (shift, shift)
 
 
 def test_signed_permutations_that_were_not_judged_in_time_are_told(monkeypatch):

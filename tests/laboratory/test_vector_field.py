@@ -86,16 +86,6 @@ def test_a_system_is_known_again_after_any_affine_change(name):
     assert holds(file, found)
 
 
-@pytest.mark.parametrize("name", ["euler_top", "lorenz", "zhukovski_volterra_1"])
-def test_a_system_is_known_again_after_a_change_of_scales_and_places(name):
-    n = load(name).dim
-    P = fmpq_mat(n, n, [(k + 2) * (-1) ** k if j == (k + 1) % n else 0 for k in range(n) for j in range(n)])
-    file = elsewhere(name, P, [fmpq(k, 2) for k in range(n)], -2)
-    found = equivalent_system(file, seconds=60)
-    assert found is not None
-    assert holds(file, found)
-
-
 def test_lines_of_fixed_points_are_a_frame():
     """An Euler top with its axes turned: three lines of fixed points lead back to them."""
     P = fmpq_mat([[1, 1, 0], [0, 1, 1], [1, 0, 3]])
