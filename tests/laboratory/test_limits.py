@@ -104,6 +104,16 @@ def test_integrals_of_the_flow_without_a_formula_are_counted():
     )
 
 
+def test_a_transcendental_integral_is_neither_seen_nor_lost():
+    found = beside("lotka_volterra")
+    assert (found.limits, found.others, found.lost) == ((), (), 0)
+    assert not any("lost" in text for _, text in found.lines())
+    assert found.lines()[0] == (
+        "measured",
+        "no rational integral of the flow shows in relations along solutions up to degree 10",
+    )
+
+
 @pytest.mark.parametrize(
     "second",
     [f"{SUM}^2 + 3*{SUM} + eps^3*{PRODUCT}", f"5 + eps*{SUM} + eps^2*{SUM}^2 + eps^4*{PRODUCT}"],
