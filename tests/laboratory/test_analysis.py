@@ -3,6 +3,7 @@
 import json
 import time
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,7 +11,7 @@ from flint import fmpq
 from search_helpers import system
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis as module
@@ -307,3 +308,43 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     both = replace(integrable, degrees=found.degrees)
     assert both.conclusion.kind == "undecided"
     assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence
+
+
+def test_poisson_tensors_are_told_in_dimensions_three_and_four():
+    found = analyze(load("euler_top"), seconds=30)
+    lines = dict(found.sections)["Poisson tensors"]
+    assert [line.status for line in lines] == ["proved"] * 3 + ["note"]
+    assert lines[0].text.startswith("P1: {x1,x3} = 2*x1^2*x2*eps^2 + x2")
+    assert found.to_json()["poisson"]["pencil"] == "proved"
+    planar = analyze(load("nahm_tetrahedral"))
+    assert planar.poisson is None
+    assert "Poisson tensors" not in dict(planar.sections)
+
+
+def test_quadratic_growth_without_integrals():
+    found = analyze(read_system(Path(__file__).parent / "further_systems" / "painleve_1.toml"))
+    assert (found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth) == (
+        "integrable",
+        0,
+        "quadratic",
+    )
+    assert found.conclusion.sentence.endswith(
+        "(explained); no integral in dimension 3 up to degree 10 (relations along orbits)."
+    )
+
+
+def test_a_system_of_the_commuting_family_is_recognised():
+    found = analyze(load("nahm_tetrahedral"))
+    assert any("belongs to the commuting family" in line.text for _, lines in found.sections for line in lines)
+    assert ("proved", "1 independent integral, as a member of the commuting family") in [
+        (line.status, line.text) for line in dict(found.sections)["integrals"]
+    ]
+
+
+def test_a_hamiltonian_and_a_member_of_the_family_are_not_read_either():
+    for name in ("weierstrass", "harmonic"):
+        file = load(name)
+        one, other = (results(analyze(each)) for each in (file, SystemFile.from_system(file.system, file.name)))
+        assert one.pop("parameters") == {key: str(value) for key, value in file.parameters.items()}
+        assert other.pop("parameters") == {}
+        assert one == other

@@ -253,3 +253,16 @@ def test_affine_maps_are_looked_at_at_more_values_of_eps_than_their_symmetries_h
     f = system("x y z"[: 2 * len(rhs) - 1], *rhs)
     first, second = affine(f, [f]).data["hypotheses"]
     assert (first, second.rpartition(", at ")[2]) == ("f is affine", f"{values} values of eps")
+
+
+def test_too_large_is_undecided_with_a_reason():
+    n = 12
+    names = [f"x{i}" for i in range(n)]
+    free = QuadraticSystem.from_text(names, [f"{names[0]}^2", *["0"] * (n - 1)])
+    found = commuting_systems(free, "quadratic")
+    assert (found.complete, str(found.verdict), [g.trivial for g in found.solutions]) == (False, "undecided", TRIVIAL)
+    assert "unknown coefficients" in found.undecided[0]
+    found = commuting_systems(system("a b c d", "a^2", "0", "0", "0"), "quadratic")
+    assert (found.dimension, found.complete) == (31, False)
+    found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
+    assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)

@@ -370,3 +370,16 @@ def test_the_share_on_short_cycles_is_one_of_points_which_samples_are(complete, 
 )
 def test_cycles_on_up_to_nine_rational_curves_have_multiples_of_orders_as_lengths(passes, lengths):
     assert {_passes_components(length, 101) for length in lengths} == {passes}
+
+
+@pytest.mark.parametrize("samples", [0, 100_001])
+def test_a_wrong_number_of_samples_is_refused(samples):
+    with pytest.raises(InputError, match="expected 1 to 100000"):
+        cycle_census(load("lorenz").system, "1/7", 101, samples=samples)
+
+
+def test_the_mean_length_is_that_of_all_cycles():
+    found = cycle_census(load("weierstrass").system, "1/10", 7)
+    lengths = [length for length, n in found.lengths.items() for _ in range(n)]
+    assert len(set(lengths)) > 1
+    assert (found.cycles, found.mean) == (len(lengths), sum(lengths) / len(lengths))

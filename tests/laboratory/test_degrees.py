@@ -121,6 +121,11 @@ def test_a_single_eps_may_be_special():
     assert degree_growth(system).growth is GrowthClass.QUADRATIC
 
 
+def test_eps_as_a_rational_number():
+    found = degree_growth(load("lorenz").system, "1/7", max_terms=3)
+    assert (found.degrees, found.to_json()["eps"]) == ((1, 3, 9, 27), "1/7")
+
+
 @pytest.mark.parametrize(
     ("rhs", "eps", "degrees", "ended"),
     [

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from flint import fmpq, fmpq_mat
 from helpers import quick
-from search_helpers import system, value_of
+from search_helpers import random_system, system, value_of
 
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
@@ -164,3 +164,10 @@ def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched():
     assert [(one.degree(6), one.verdict) for one in found.densities] == [(8, Verdict.PROVED)]
     assert found.degree == 8
     assert find_densities(tops, integrals=()).densities == ()
+
+
+@pytest.mark.parametrize(("dim", "seed"), [(2, 0), (3, 1)])
+def test_random_systems_have_none(dim, seed):
+    found = find_densities(random_system(dim, seed), max_degree=5)
+    assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
+    assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"

@@ -7,6 +7,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
@@ -17,6 +18,7 @@ from kahanmaps.laboratory.preserve import identities
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
@@ -104,3 +106,11 @@ def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
     found = darboux_polynomials(load("lotka_volterra"), 1)
     assert found.spaces == ()
     assert "did not pass as an identity" in found.reason
+
+
+def test_what_check_integrals_proves_is_proved_where_it_is_found():
+    """Of the repaired icosahedral map, whose denominator has degree 6 and eps^18: some 93 million products of terms."""
+    file = load("repaired_icosahedral")
+    [one] = find_integrals(file).integrals
+    [finding] = check_integrals(file).findings
+    assert one.verdict is finding.verdict is Verdict.PROVED

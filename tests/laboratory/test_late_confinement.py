@@ -156,6 +156,15 @@ def test_a_hypersurface_that_is_followed_as_a_point_comes_back():
     assert (late.confined_at, [step.common for step in late.steps[:50]]) == (51, [0] * 50)
 
 
+@pytest.mark.parametrize(
+    ("name", "lengths", "searched"),
+    [("euler_top", (3,), None), ("lotka_volterra", (2,), 400), ("zander_120", (1, 4), 400), ("riccati", (), None)],
+)
+def test_the_lengths_of_patterns_in_the_catalogue(name, lengths, searched):
+    found = patterns(load(name).system, None)
+    assert (found.lengths, found.searched, found.running) == (lengths, searched, "")
+
+
 @pytest.mark.parametrize("name", ["weierstrass", "volterra_periodic_4"])
 def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
     system = load(name).system
@@ -419,3 +428,15 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
     limits = Range(0, 0, 0, options.get("end", math.inf))
     run, whole = Course((), (), (), limits).steps(steps, most=options.get("most", 4096))
     assert ([step.name for step in run], whole, tried) == found
+
+
+def test_steps_too_few_for_a_pattern_are_named_with_what_they_missed():
+    """With 10 steps nothing is seen of what comes after 20, and nothing else is claimed."""
+    found = degree_growth(resonant(20), steps=10, max_terms=15)
+    assert found.basis == "explained: no confinement within 10 steps"
+    assert degree_growth(resonant(20), max_terms=15).recurrence.closed_form_text == "20 for n >= 19"
+
+
+def test_what_still_runs_is_said_before_what_was_found():
+    assert Patterns((3,), None, True).text == "nothing new after step 3"
+    assert Patterns((3,), None, True, "x = 0 is undecided").text == "x = 0 is undecided"

@@ -139,6 +139,12 @@ def test_a_function_that_is_no_integral_has_no_limit_among_those_of_the_flow():
     assert found.without_limit == 1
 
 
+def test_symbols_stay_in_the_limits():
+    [one, two] = beside("euler_top", symbols=["a1", "a2", "a3"]).limits
+    assert format_rational_function(one.leading) == "x2^2*a1*a3 - x1^2*a2*a3"
+    assert format_rational_function(two.leading) == "x3^2*a1*a2 - x1^2*a2*a3"
+
+
 def test_the_density_of_the_map_tends_to_one_of_the_flow():
     for name, phi in (("zander_120", "x*y*(x + 2*y)"), ("euler_top", "1"), ("lotka_volterra", "x*y")):
         search, densities = find_integrals(load(name)), find_densities(load(name))

@@ -190,3 +190,17 @@ def test_a_pencil_is_one_of_at_least_two_tensors_and_of_not_too_many(monkeypatch
         found = find_poisson(load("euler_top"), 3, integrals=())
         assert (len(found.tensors), found.pencil) == (3, verdict)
     assert find_poisson(load("weierstrass"), integrals=()).pencil is None
+
+
+def test_a_denominator_divides_all_entries():
+    # for Lotka and Volterra {x,y} = x y alone: over x the numerator has degree 3
+    over = parse_rational_function("x*(1 + eps)", ["x", "y", "eps"])
+    assert brackets(find_poisson(load("lotka_volterra"), 2, denominator=over, integrals=())) == []
+    found = find_poisson(load("lotka_volterra"), 3, denominator=over, integrals=())
+    assert [(one.text, one.verdict) for one in found.tensors] == [("{x,y} = x*y/(eps + 1)", PROVED)]
+
+
+def test_a_tensor_for_one_eps_is_told_as_such():
+    found = find_poisson(load("weierstrass"), eps="1/3")
+    assert brackets(found) == ["{x,y} = 4*x - 3"]
+    assert found.toml_section().startswith("# for eps = 1/3 only")

@@ -127,3 +127,8 @@ def test_closed_forms_powers_and_rates(values, expected):
 )
 def test_equations_leave_out_what_is_zero_or_one(values, text):
     assert find_recurrence(values).text == text
+
+
+@pytest.mark.parametrize(("values", "power"), [([0] * 4, 0), ([1] * 5, 0), ([n**3 - n for n in range(12)], 3)])
+def test_the_power_of_growth_is_that_of_n(values, power):
+    assert find_recurrence(values).power == power

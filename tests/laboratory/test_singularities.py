@@ -93,6 +93,10 @@ def test_simple_systems(rhs, verdict, degrees):
     assert {h.polynomial for h in run.hypersurfaces} == ({"Z"} if degrees[1] else set())
 
 
+def test_one_dimension_has_nothing_to_contract():
+    assert singularities(load("riccati").system, "1/7").verdict == "nothing contracted"
+
+
 def test_singular_everywhere_is_a_value():
     run = singularities(QuadraticSystem.from_text(["x", "y"], ["x", "y"]), 1)
     assert run.verdict == "singular everywhere"
