@@ -348,3 +348,10 @@ def test_a_hamiltonian_and_a_member_of_the_family_are_not_read_either():
         assert one.pop("parameters") == {key: str(value) for key, value in file.parameters.items()}
         assert other.pop("parameters") == {}
         assert one == other
+
+
+def test_symbols_enter_formulas_and_the_json_says_which():
+    found = analyze(parse_system(PLANE), symbols=("a", "eps", "b"))
+    assert found.symbols == ("a", "b")
+    assert found.to_json()["symbols"] == ["a", "b"]
+    assert {"a", "b", "eps"} <= set(found.integrals.integrals[0].function.names)
