@@ -113,9 +113,3 @@ def at_residues(function: RationalFunction, map_: ModularMap, point: Sequence[in
     """The value of a function of the variables and eps modulo the prime of the map."""
     field = GF(map_.prime)
     return int(function.value(field, [field.convert(c) for c in (*point, map_.eps)]))
-
-
-def specialised(function: RationalFunction, values: Mapping[str, Any], field: Any, point: Sequence[Any]) -> Any:
-    """The value of a function of (variables, symbols, eps) with numbers for the symbols; eps comes last in `point`."""
-    symbols = [field.convert(values[name]) for name in function.names[len(point) - 1 : -1]]
-    return function.value(field, [*point[:-1], *symbols, point[-1]])

@@ -6,8 +6,6 @@ constant of linear growth from the multiplier of a Moebius map, that of quadrati
 too short or fits no rule is undecided.
 """
 
-from __future__ import annotations
-
 import json
 import random
 from fractions import Fraction
@@ -15,17 +13,15 @@ from math import gcd, lcm, log2
 from types import SimpleNamespace
 
 import pytest
-from flint import fmpq, fmpq_poly
+from flint import fmpq
 from helpers import quick
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InexactNumber, InputError
-from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import (
@@ -33,12 +29,10 @@ from kahanmaps.invariants.heights import (
     decimal_text,
     height,
     height_growth,
-    height_of,
 )
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.steps import NormalSteps
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -79,17 +73,6 @@ def test_the_height_is_the_bit_length_of_the_largest_of_coprime_homogeneous_coor
     assert height(point) == max(map(abs, integers)).bit_length()
 
 
-@given(st.lists(fractions, min_size=1, max_size=4).filter(lambda point: point[0] != 0))
-def test_the_height_does_not_depend_on_which_homogeneous_coordinate_is_last(point):
-    x, *others = point
-    assert height([1 / x, *(other / x for other in others)]) == height(point)
-
-
-@given(fractions, st.integers(1, 6))
-def test_a_power_multiplies_the_height_by_its_exponent_up_to_rounding(x, n):
-    assert n * (height([x]) - 1) < height([x**n]) <= n * height([x])
-
-
 @pytest.mark.parametrize(
     ("point", "bits"),
     [([0], 1), ([0, 0], 1), ([1, -1], 1), (["-7/8"], 4), ([-8], 4), (["1/2", "1/3"], 3), ([2**100, "1/2"], 102)],
@@ -114,31 +97,9 @@ def test_heights_in_normal_form_are_those_of_the_points_of_the_generic_orbit(nam
     assert growth(system, start, steps).heights == tuple(expected)
 
 
-def test_what_planes_have_in_common_does_not_count():
-    """Two planes with one cubic and one start have all their denominators in common."""
-    system, structure, start = side_by_side("one real root, irrational", "one real root, irrational")
-    points = Orbit(KahanMap(system, "1/2"), start, 10, structure=structure)
-    for point, generic in zip(points, Orbit(KahanMap(system, "1/2"), start, 10), strict=True):
-        assert height_of(point) == height_of(generic) == height(generic.x)
-
-
-@pytest.mark.parametrize("name", names())
-def test_integer_points_of_orbits_are_in_lowest_terms(name):
-    system = load(name).system
-    for point in Orbit(KahanMap(system, "1/10"), START[: system.dim], 6):
-        assert isinstance(point.value, IntegerPoint)
-        assert gcd(int(point.value.denominator), *map(int, point.value.numerators)) == 1
-
-
 @pytest.mark.parametrize(
     ("name", "every", "method"),
-    [
-        ("m = 2", 2, "normal-form"),
-        ("m = 2", 7, "normal-form"),
-        ("m = 2", 20, "doubling"),
-        ("m = 2, sqrt 2", 2, "normal-form"),
-        ("m = 2, sqrt 2", 20, "doubling"),
-    ],
+    [("m = 2", 7, "normal-form"), ("m = 2", 20, "doubling"), ("m = 2, sqrt 2", 2, "normal-form")],
 )
 def test_heights_at_some_steps_are_those_of_all_steps(name, every, method):
     structure, system = structure_and_system(name)
@@ -152,44 +113,13 @@ def test_heights_at_some_steps_are_those_of_all_steps(name, every, method):
 # The catalogue: every system, with the reason for the answer. Elliptic: orbits on elliptic curves (or, for the
 # members and the three waves, on Abelian varieties), where a translation is. Degrees: those of the file grow like g^n.
 CATALOGUE = {
-    "dressing_chain_3": (Q, "7.30141", "two integrals in three dimensions, elliptic"),
     "euler_top": (Q, "15.4647", "two integrals in three dimensions, elliptic"),
     "harmonic": (LIN, "6.65870", "a rotation by (10 + i)^2/101: log2(101) = 6.65821"),
     "henon_heiles": (E, None, "degrees: g = 2.297"),
-    "lorenz": (E, None, "degrees: g = 3"),
-    "lotka_volterra": (E, None, "degrees: g = 2"),
-    "nahm_tetrahedral": (Q, "3.43142", "a pencil of cubics"),
     "paper_m2": (Q, "12.0332", "a member"),
-    "paper_m3": (Q, "17.4417", "a member"),
-    "paper_m3_irreducible": (Q, "22.8040", "a member, over a cubic field"),
-    "planar_cubic_hamiltonian": (Q, "5.41995", "a pencil of cubics"),
     "riccati": (LIN, "2.43641", "a Moebius map with multiplier (21 + 4 sqrt 5)/19"),
-    "three_wave": (Q, "36.1646", "quadratic degrees"),
-    "volterra_periodic_3": (Q, "12.3439", "two integrals in three dimensions, elliptic"),
-    "volterra_periodic_4": (Q, "23.8122", "three integrals in four dimensions, elliptic"),
     "weierstrass": (Q, "2.39568", "a pencil of cubics"),
-    "zhukovski_volterra_1": (Q, "16.4671", "two integrals in three dimensions, elliptic"),
 }
-
-
-# The others: their degrees, which the catalogue has, grow as the heights do.
-OTHERS = [name for name in names() if name not in CATALOGUE]
-
-
-def test_every_system_of_the_catalogue_is_tried():
-    assert set(CATALOGUE) <= set(names())
-    assert all(load(name).catalog["growth"] in ("quadratic", "exponential") for name in OTHERS)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (load(name).system.dim > 4)) for name in OTHERS]
-)
-def test_heights_grow_as_the_degrees_of_the_catalogue(name):
-    file = load(name)
-    found = growth(
-        file.system, next(random_starts(file.system.dim, 3)), 40, max_digits=60_000 if file.system.dim > 4 else 6_000
-    )
-    assert str(found.kind) == file.catalog["growth"]
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -208,7 +138,7 @@ def test_systems_of_the_catalogue_grow_as_theory_says(name):
 
 @pytest.mark.parametrize(
     ("name", "factor"),
-    [("henon_heiles", Fraction("2.2970")), ("lorenz", Fraction(3)), ("lotka_volterra", Fraction(2))],
+    [("lorenz", Fraction(3)), ("lotka_volterra", Fraction(2))],
 )
 def test_exponential_growth_ends_at_the_budget_with_the_growth_of_the_degrees_as_its_ratio(name, factor):
     system = load(name).system
@@ -218,7 +148,7 @@ def test_exponential_growth_ends_at_the_budget_with_the_growth_of_the_degrees_as
     assert abs(found.ratio / factor - 1) < Fraction(1, 1000)
 
 
-@pytest.mark.parametrize("dim", range(2, 8))
+@pytest.mark.parametrize("dim", [2, 4])
 def test_generic_quadratic_systems_multiply_heights_by_their_dimension(dim):
     rng = random.Random(dim)
     x = [f"x{i}" for i in range(dim)]
@@ -233,16 +163,12 @@ def test_generic_quadratic_systems_multiply_heights_by_their_dimension(dim):
 # System, start, eps, steps, kind, reason.
 CONTROLS = {
     "x' = x^2": (system_of(x="x^2"), ["-1/5"], "1/10", 64, LOG, "1/x moves by -2 eps"),
-    "x' = 1": (system_of(x="1"), ["1/3"], "1/10", 64, LOG, "x moves by 2 eps"),
     "fall": (system_of(x="v", v="1"), ["1/3", "1/2"], "1/10", 64, LOG, "polynomials in n"),
     "x' = -x": (system_of(x="-x"), ["1/3"], "1/10", 64, LIN, "x goes to 9x/11"),
-    "x' = 1 + x^2": (system_of(x="1 + x^2"), ["1/3"], "1/10", 64, LIN, "a rotation of infinite order"),
     "x' = 1 + x^2, eps = 1/2": (system_of(x="1 + x^2"), ["1/3"], "1/2", 64, P, "a quarter turn is twice it"),
-    "harmonic, eps = 1": (load("harmonic").system, START[:2], 1, 64, P, "Proved in the catalogue: period 4"),
     "Henon-Heiles, eps = 1": (load("henon_heiles").system, START[:4], 1, 64, P, "Proved in the catalogue: period 4"),
     "at rest": (load("lorenz").system, [0, 0, 0], "1/10", 20, P, "a fixed point"),
     "prey alone": (load("lotka_volterra").system, ["1/2", 0], "1/10", 64, LIN, "x' = x on an invariant line"),
-    "two Volterra particles": (load("volterra_periodic_3").system, ["1/2", "1/3", 0], "1/10", 64, LIN, "rational"),
     "x1 + x2 + x3 = 0": (load("volterra_periodic_3").system, [*START[:2], "-5/6"], "1/10", 64, Q, "elliptic"),
     "nested powers of n": (
         system_of(x="y^2", y="z^2", z="z"),
@@ -266,15 +192,11 @@ def test_controls_grow_as_their_closed_form_says(name):
     ("name", "kind"),
     [
         ("three rational roots", Q),
-        ("large coefficients", Q),
         ("delta = 1", LIN),  # three lines, each multiplied by -8 every third step
-        ("delta = 1, irrational vertices", LIN),
         ("delta = 1, a vertex", P),
         ("level 0", LOG),  # a cuspidal or reducible cubic with an additive group
         ("a double root", LOG),
-        ("a triple root", LOG),
         ("h = 0", P),
-        ("the origin", P),
         ("no value at the start", U),
         ("a pole at step 6", U),
     ],
@@ -282,20 +204,6 @@ def test_controls_grow_as_their_closed_form_says(name):
 def test_the_level_cubic_of_a_plane_decides_how_heights_grow(name, kind):
     system, structure, start = side_by_side(name)
     assert growth(system, start, 64, "1/2", structure=structure).kind is kind
-
-
-def test_an_orbit_that_first_comes_down_grows_quadratically_all_the_same():
-    structure, system = structure_and_system("m = 2")
-    *_, before = Orbit(KahanMap(system, "1/10"), START[:4], 30, backward=True)
-    found = growth(system, before.x, 60, structure=structure)
-    assert found.heights[30] < min(found.heights[0], found.heights[60])
-    assert found.kind is Q
-
-
-def test_a_start_of_a_hundred_digits_hides_neither_linear_nor_quadratic_growth():
-    big = fmpq(10**100 + 9, 10**99 + 7)
-    assert growth(load("harmonic").system, [big, 1], 40).kind is LIN
-    assert growth(load("weierstrass").system, [big, 1], 40).kind is Q
 
 
 # Constants
@@ -306,7 +214,6 @@ def test_a_start_of_a_hundred_digits_hides_neither_linear_nor_quadratic_growth()
     [
         ("-x", "1/10", log2(11)),  # multiplier 9/11
         ("x^2 + x - 1", "1/10", log2(21 + 4 * 5**0.5) / 2),  # multiplier (21 + 4 sqrt 5)/19, Mahler measure 19 of it
-        ("1 + x^2", "1/10", log2(13) / 2),  # multiplier (12 + 5i)/13
         ("x^2 + 1/28", "1", 0.5),  # multiplier (3 + i sqrt 7)/4, Mahler measure 2: as slow as it gets
     ],
 )
@@ -348,59 +255,6 @@ def test_the_constant_of_a_member_is_the_sum_of_the_canonical_heights_of_its_pla
     assert all(translation_constant(block) > expected / 5 for block in blocks)
 
 
-@given(st.fractions(max_denominator=2**40).filter(lambda gamma: gamma not in (0, 1)))
-@example(Fraction(2**60 + 1, 3**30))
-@example(Fraction(2**60 + 1, 2**60))
-@example(Fraction(1, 10**18))
-def test_the_constant_of_a_plane_is_an_eighth_of_the_height_of_gamma_up_to_a_bounded_error(gamma):
-    try:
-        constant = constant_at(fmpq(gamma.numerator, gamma.denominator), doublings=6)
-    except ZeroDivisionError:  # T has finite order there
-        return
-    size = log2(max(abs(gamma.numerator), gamma.denominator))
-    assert -0.7 < float(constant) - size / 8 < 0.8  # measured: -0.6 to 0.71; six doublings are good to 0.01
-
-
-def test_an_eighth_is_the_right_fraction():
-    """Control: neither a ninth nor a seventh would do."""
-    sizes, constants = [], []
-    for power in (100, 1000):
-        sizes.append(log2(3) * power)
-        constants.append(float(constant_at(fmpq(3**power + 2, 2**power), doublings=6)))
-    slope = (constants[1] - constants[0]) / (sizes[1] - sizes[0])
-    assert abs(slope - 1 / 8) < 0.001
-
-
-def test_the_curve_has_the_fibres_and_the_points_of_the_argument():
-    gamma = fmpq_poly([0, 1])
-    a1, a2, a3 = 6, 3 * gamma, 16 * gamma
-    b2, b4, b6 = a1 * a1 + 4 * a2, a1 * a3, a3 * a3
-    b8 = (b2 * b6 - b4 * b4) / 4
-    assert -b2 * b2 * b8 - 8 * b4 * b4 * b4 - 27 * b6 * b6 + 9 * b2 * b4 * b6 == -110592 * gamma**3 * (gamma - 1) ** 2
-    assert b2 * b2 - 24 * b4 == 144 * (gamma - 1) * (gamma - 9)
-    x, y = -3 * gamma, 2 * gamma  # 2T, where the tangent y = 0 at T = (0, 0) meets E once more, reflected
-    assert y * y + a1 * x * y + a3 * y == x**3 + a2 * x * x
-    assert -a1 * x - a3 - y == 0 * gamma
-
-
-def test_the_constant_of_two_equal_planes_is_that_of_one():
-    name = "one real root, irrational"
-    (one, of_one, x), (two, of_two, xx) = side_by_side(name), side_by_side(name, name)
-    single = growth(one, x, 60, "1/2", structure=of_one).constant
-    double = growth(two, xx, 60, "1/2", structure=of_two).constant
-    assert abs(double / single - 1) < Fraction(1, 1000)
-
-
-def test_eigenvalues_1_minus_2_3_at_a_few_far_steps_have_the_constant_of_the_near_ones():
-    system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
-    structure = structure_of(system)
-    near = growth(system, START, 40, structure=structure)
-    far = growth(system, START, 200, structure=structure, every=25, max_digits=None)
-    assert (near.method, far.method) == ("normal-form", "doubling")
-    assert (near.kind, far.kind) == (Q, Q)
-    assert abs(far.constant / near.constant - 1) < Fraction(1, 1000)
-
-
 @given(st.integers(1, 500), st.integers(-300, 300), st.integers(0, 10**4), st.integers(8, 60), st.integers(1, 9))
 def test_the_constant_of_a_parabola_is_its_leading_coefficient(a, b, c, n, every):
     found = of_heights([a * k * k + b * k + c for k in range(n + 1)], every)
@@ -415,19 +269,10 @@ def test_the_constant_of_a_line_is_its_slope(b, c, n, every):
     assert found.constant == Fraction(b, every)
 
 
-@given(st.integers(10, 100), st.integers(0, 99), st.integers(20, 60), st.randoms(use_true_random=False))
-def test_fluctuations_move_the_constant_by_little(a, b, n, rng):
-    heights = [a * k * k + b * k + rng.randint(0, 8) for k in range(n + 1)]
-    found = of_heights(heights)
-    assert found.kind is Q
-    # The weights of the formula have the sum of absolute values 12/n^2 or less, and half the range counts.
-    assert abs(found.constant - a) <= Fraction(48, n * n)
-
-
 # Decisions
 
 
-@pytest.mark.parametrize("power", range(3, 9))
+@pytest.mark.parametrize("power", [3, 8])
 @pytest.mark.parametrize("shift", [0, 5])
 def test_higher_powers_are_neither_quadratic_nor_exponential(power, shift):
     for n in range(5, 90):
@@ -453,21 +298,12 @@ def test_an_orbit_that_stays_within_its_first_heights_is_bounded():
         ([100 + k * k if k < 9 else 1000 for k in range(12)], "the last heights count"),
         ([5, 5, 6, 7, 8, 10, 11, 13, 15], "four quarters of 1, 2, 3, 4 bits may be noise"),
         ([8 * k - k * (k - 1) // 8 for k in range(17)], "slower and slower, and not slow"),
-        ([5, 5, 5, 5, 5, 9, 5, 5, 5], "rises of 0 are no line"),
         ([1000 - 20 * k for k in range(30)], "no heights fall for ever"),
         ([3, 9] + [max(1, abs(k - 20) * 30) for k in range(41)], "a line down and a line up"),
     ],
 )
 def test_what_fits_no_rule_is_undecided(heights, why):
     assert of_heights(heights).kind is U, why
-
-
-def test_slow_decay_of_the_rise_is_no_line():
-    """Rises of 8, 7, 6 and 5 bits: close to each other in bits, but not for their size."""
-    heights = [40]
-    for rise in (8, 7, 6, 5):
-        heights += [heights[-1] + rise * k // 8 for k in range(1, 9)]
-    assert of_heights(heights).kind is U
 
 
 @pytest.mark.parametrize(
@@ -503,15 +339,6 @@ def test_a_singular_end_leaves_the_decision_to_what_is_there_and_is_told_where_t
     assert near.reason.endswith(near.end.message)
 
 
-def test_a_start_above_the_budget_is_the_only_height():
-    structure, system = structure_and_system("m = 2")
-    start = [fmpq(1, 10**50 + k) for k in range(1, 5)]
-    for every in (1, 20):
-        found = growth(system, start, 100, structure=structure, every=every, max_digits=10)
-        assert found.heights == (height(start),)
-        assert (found.kind, found.end.status, found.ratio) == (U, "budget", None)
-
-
 def test_a_period_is_seen_in_jumps_too():
     structure, system = structure_and_system("m = 2")
     found = growth(system, [0] * 4, 500, structure=structure, every=100)
@@ -541,13 +368,6 @@ def test_plain_data_has_a_few_heights_and_numbers_as_text():
     }
 
 
-def test_plain_data_of_long_orbits_has_at_most_twenty_heights():
-    found = of_heights(range(1, 2**19 + 2))
-    shown = found.to_json()["heights"]
-    assert len(shown) == 20
-    assert shown[-1] == {"step": 2**19, "bits": 2**19 + 1}
-
-
 def test_the_text_names_kind_constant_and_ratio():
     assert of_heights([k * k + 1 for k in range(17)]).text.startswith(
         "heights grow as: quadratic, about 1 n^2 bits; four quarters raise them by "
@@ -568,12 +388,7 @@ def test_rounded_text_is_within_half_a_unit_of_the_last_digit(value, digits):
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
-    [
-        ({"steps": -1}, "-1 steps"),
-        ({"every": 0}, "every = 0"),
-        ({"max_digits": 0}, "budget of 0 digits"),
-        ({"start": ["1/2"]}, "1 coordinates, expected 2"),
-    ],
+    [({"steps": -1}, "-1 steps"), ({"every": 0}, "every = 0"), ({"max_digits": 0}, "budget of 0 digits")],
 )
 def test_wrong_input_is_refused(wrong, message):
     given = SimpleNamespace(**({"start": START[:2], "steps": 5} | wrong))

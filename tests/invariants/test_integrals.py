@@ -4,8 +4,6 @@ For f = J grad H with any cubic H and any constant skew J, "modified H" is H + (
 f. It is conserved, tends to H with a defect of order eps^2, and is -1/6 of the paper's H~ where that is defined.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import pytest
@@ -71,19 +69,6 @@ def test_modified_h_is_conserved(drawn, eps):
     assert after == modified_value(hamiltonian, fraction(eps), exact(*x))
 
 
-@some
-@given(with_points(), nonzero)
-def test_modified_h_is_even_in_eps(drawn, eps):
-    hamiltonian, x = drawn
-    integral = ModifiedHamiltonian(hamiltonian)
-    try:
-        forward = integral.value(QQ, eps, x)
-        backward = integral.value(QQ, -eps, x)
-    except SingularStep:
-        assume(False)
-    assert forward == backward
-
-
 # The paper's H~
 
 
@@ -114,11 +99,10 @@ def test_the_papers_integral_is_the_symplectic_product_of_a_point_and_its_image_
     "hamiltonian",
     [
         HENON,
-        hamiltonian_of("q p", "q^3 + p^2"),
         hamiltonian_of("q p", "q^3", [[0, 2], [-2, 0]]),
         hamiltonian_of("x y z", "x^3", [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]),
     ],
-    ids=["quadratic terms", "p^2", "J doubled", "odd dimension"],
+    ids=["quadratic terms", "J doubled", "odd dimension"],
 )
 def test_the_papers_integral_is_refused_for_inhomogeneous_h_and_other_j(hamiltonian):
     with pytest.raises(InputError, match="homogeneous H and the standard J only"):
@@ -163,7 +147,7 @@ def test_an_integral_of_the_commutant_is_called_after_the_power(power, matrix):
 # Claimed functions
 
 
-@pytest.mark.parametrize("text", ["x^2 + y^2", "(x - 2*eps*y)/(1 - eps^2*x^2)", "3/7", "eps", "y^3/eps"])
+@pytest.mark.parametrize("text", ["(x - 2*eps*y)/(1 - eps^2*x^2)", "3/7", "y^3/eps"])
 @given(points(2, rationals(9)), nonzero)
 def test_a_claimed_function_has_the_value_that_its_text_says(text, x, eps):
     function = claim(text, "x y")
@@ -171,11 +155,6 @@ def test_a_claimed_function_has_the_value_that_its_text_says(text, x, eps):
     found = ClaimedIntegral("I", function).value(QQ, eps, x)
     assert (found is None) == (expected is None)
     assert expected is None or fraction(found) == expected
-
-
-def test_a_claimed_function_is_none_at_its_poles():
-    integral = ClaimedIntegral("I", claim("x/(1 - eps^2*y^2)", "x y"))
-    assert integral.value(QQ, fmpq(1, 2), (fmpq(1), fmpq(2))) is None
 
 
 def test_a_claimed_function_is_shown_as_text_that_reads_back():

@@ -3,8 +3,6 @@
 det dPhi is computed a second time here, from dual numbers: the Kahan step is taken at x + t e_j with t^2 = 0.
 """
 
-from __future__ import annotations
-
 import pytest
 from check_helpers import (
     claim,
@@ -86,7 +84,7 @@ def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, ep
     assert phi.value(QQ, eps, y) * below == phi.value(QQ, eps, x) * above
 
 
-@pytest.mark.parametrize("text", ["x*y", "1 - eps^2*x^2", "(x - y)/(x + eps*y)"])
+@pytest.mark.parametrize("text", ["x*y", "(x - y)/(x + eps*y)"])
 @given(points(2, rationals(9)), nonzero)
 @settings(max_examples=20)
 def test_a_claimed_density_has_the_value_that_its_text_says(text, x, eps):

@@ -5,14 +5,11 @@ preserves; for other Hamiltonian systems it is neither. The Jacobi defects are c
 polynomials, the transformation law by dPhi from dual numbers.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import pytest
 from check_helpers import (
     combined_rows,
-    determinant,
     exact,
     hamiltonian_of,
     hamiltonians,
@@ -62,23 +59,6 @@ def hamiltonian_with_point(draw, dims=(1, 2, 3)):
 def test_the_tensor_is_j_minus_eps_squared_jacobian_squared_j(drawn, eps):
     hamiltonian, x = drawn
     expected = tensor(hamiltonian, fraction(eps), exact(*x))
-    assert rows_of(poisson_tensor(hamiltonian, QQ, eps, x)) == expected
-
-
-@some
-@given(hamiltonian_with_point(), nonzero)
-def test_the_tensor_is_skew(drawn, eps):
-    hamiltonian, x = drawn
-    Pi = poisson_tensor(hamiltonian, QQ, eps, x)
-    assert Pi.transpose() == -Pi
-
-
-@some
-@given(hamiltonian_with_point(dims=(2,)), nonzero)
-def test_in_dimension_two_the_tensor_is_the_density_times_j(drawn, eps):
-    hamiltonian, x = drawn
-    phi = determinant(combined_rows(unit(2), -fraction(eps), slope(hamiltonian.system, exact(*x))))
-    expected = [[phi * entry for entry in row] for row in rows_of(hamiltonian.J)]
     assert rows_of(poisson_tensor(hamiltonian, QQ, eps, x)) == expected
 
 
@@ -161,20 +141,12 @@ def test_the_defects_are_those_found_by_differentiation_in_dimension_three(drawn
     assert jacobi_defects(HamiltonianTensor(hamiltonian), QQ, eps, x) == defects_by_differentiation(hamiltonian, eps, x)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_defects_are_those_found_by_differentiation_in_dimension_four(seed):
     x, eps = random_point(4, seed), fmpq(seed + 1, 5)
     found = jacobi_defects(HamiltonianTensor(GENERIC), QQ, eps, x)
     assert found == defects_by_differentiation(GENERIC, eps, x)
     assert any(defect != 0 for defect in found)
-
-
-def test_the_defects_are_those_found_by_differentiation_for_another_j():
-    J = [[0, 1, "1/2", -1], [-1, 0, 3, 0], ["-1/2", -3, 0, 2], [1, 0, -2, 0]]
-    hamiltonian, x = hamiltonian_of("x y z w", "x^3 + y^2*w - x*z*w + z^2 - 3*y", J), random_point(4, 2)
-    assert jacobi_defects(HamiltonianTensor(hamiltonian), QQ, fmpq(2, 3), x) == defects_by_differentiation(
-        hamiltonian, fmpq(2, 3), x
-    )
 
 
 @over_members

@@ -1,12 +1,10 @@
 """Affine integrals and affine Darboux functions: known ones, none too many, and what the Kahan map makes of them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
-from helpers import EULER_TOP, FORCED_PLANE, HENON_HEILES, LORENZ, random_point, systems
+from helpers import EULER_TOP, LORENZ, random_point, systems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,8 +16,6 @@ from kahanmaps.documents.files import read_system
 from kahanmaps.laboratory.preserve.darboux.affine_functions import (
     affine_darboux,
     affine_integrals,
-    darboux_cofactor,
-    quotient_by,
 )
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -38,10 +34,9 @@ def darboux(system: QuadraticSystem) -> dict[str, str]:
     return {str(d.function): str(d.cofactor) for d in found.functions}
 
 
-@pytest.mark.parametrize("particles", [3, 4])
-def test_the_volterra_chain(particles: int) -> None:
-    system = catalogue(f"volterra_periodic_{particles}")
-    assert affine_integrals(system) == ((1,) * particles,)
+def test_the_volterra_chain() -> None:
+    system = catalogue("volterra_periodic_4")
+    assert affine_integrals(system) == ((1, 1, 1, 1),)
     assert list(darboux(system)) == list(system.variables)  # x_i' = x_i (...), and no others
 
 
@@ -57,7 +52,7 @@ def test_known_hyperplanes() -> None:
     assert darboux(QuadraticSystem.from_text(["x"], ["x^2 - 1"])) == {"x + 1": "x - 1", "x - 1": "x + 1"}
 
 
-@pytest.mark.parametrize("system", [LORENZ, HENON_HEILES, FORCED_PLANE, catalogue("riccati"), catalogue("harmonic")])
+@pytest.mark.parametrize("system", [LORENZ, catalogue("riccati")])
 def test_systems_without(system: QuadraticSystem) -> None:
     # Over Q: those of x' = x^2 + x - 1 lie over Q(sqrt(5)), those of the harmonic oscillator over Q(i).
     assert affine_integrals(system) == ()
@@ -91,13 +86,6 @@ def test_a_hyperplane_of_equilibria() -> None:
     assert [str(d.function) for d in found.functions] == ["x"]
     assert not found.complete  # the flow does not move on x = 0, where others may hide
     assert "degenerates" in found.reason
-
-
-def test_cofactors_are_those_of_the_flow() -> None:
-    x, y = QuadraticSystem.from_text(["x", "y"], ["x*y", "y^2 - 1"]).rhs[0].context().gens()
-    system = QuadraticSystem([x * y, y**2 - 1])
-    assert darboux_cofactor(system, y - 1) == y + 1
-    assert darboux_cofactor(system, x + y) is None
 
 
 @st.composite
@@ -147,13 +135,3 @@ def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
             assert after * (1 - fmpq(1, 7) * evaluate(d.cofactor, QQ, x)) == before * (
                 1 + fmpq(1, 7) * evaluate(d.cofactor, QQ, image)
             )
-
-
-def test_coordinates_modulo_integrals() -> None:
-    integrals = affine_integrals(catalogue("volterra_periodic_4"))
-    quotient = quotient_by(integrals, 4)
-    assert quotient.free == (0, 1, 2)
-    assert quotient.rows(quotient.section) == QQ.identity(3)
-    forms = fmpq_mat([[fmpq(entry) for entry in vector] for vector in integrals])
-    assert forms * quotient.section == fmpq_mat(1, 3)
-    assert quotient_by((), 2).section == fmpq_mat([[1, 0], [0, 1]])

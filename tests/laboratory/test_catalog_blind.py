@@ -4,10 +4,7 @@ Degrees, growth, dynamical degree, the number of integrals, the verdict, the den
 Hirota-Kimura bases are facts of the files, which `analyze` does not read (test_analysis.py).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
-from functools import cache
 
 import pytest
 from analysis_helpers import Answer, differences, residues_of
@@ -18,7 +15,6 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.structured_facts import relations
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis, relations_on_orbit
 
 FACTS = [name for name in names() if set(load(name).catalog) & {"degrees", "growth", "verdict", "codimension"}]
 # Seconds that are enough, where the default would be long. All below takes less than a second.
@@ -56,15 +52,6 @@ def facts_of(name):
     )
 
 
-def test_there_is_something_to_compare():
-    assert len(FACTS) >= 25
-    answers = [facts_of(name) for name in FACTS]
-    assert all(answer.growth and answer.degrees and answer.verdict for answer in answers)
-    assert sum(answer.density is not None for answer in answers) >= 15
-    assert sum(bool(answer.formulas) for answer in answers) >= 15
-    assert sum(answer.dynamical_degree is not None for answer in answers) >= 5
-
-
 @pytest.mark.parametrize("name", marked(FACTS))
 def test_the_facts_of_the_file_are_found_blind(name):
     found, answer = blind(name), facts_of(name)
@@ -76,42 +63,16 @@ def test_the_facts_of_the_file_are_found_blind(name):
             assert nullities[degree - 1] == known.dimension
 
 
-@cache
-def _maps(name):
-    return Laboratory(load(name), (), None, 7).maps
-
-
-SETS = [(name, k) for name in FACTS for k in range(len(load(name).catalog.get("relations", [])))]
-
-
-@pytest.mark.parametrize(
-    ("name", "k"),
-    [pytest.param(*each, marks=pytest.mark.slow) if load(each[0]).system.dim > 4 else each for each in SETS],
-)
-def test_hirota_kimura_bases_have_their_dimensions(name, k):
-    file = load(name)
-    known = relations(file.catalog, file.variables)[k]
-    degree = _degree(known)
-    if degree is not None:
-        for map_ in _maps(name):
-            assert len(relations_on_orbit(map_, degree).vectors) == known.dimension
-        return
-    found = hirota_kimura_basis(_maps(name), known.functions, [str(one) for one in known.functions])
-    assert (found.dimension, found.agree) == (known.dimension, True)
-
-
-@pytest.mark.parametrize("name", ["euler_top", "lotka_volterra"])
-def test_wrong_facts_are_seen_to_be_wrong(name):
-    found, answer = blind(name), facts_of(name)
+def test_wrong_facts_are_seen_to_be_wrong():
+    found, answer = blind("lotka_volterra"), facts_of("lotka_volterra")
     degrees = list(answer.degrees)
     degrees[3] -= 1
     assert differences(found, replace(answer, degrees=tuple(degrees))) == {"degrees"}
     assert differences(found, replace(answer, integrals=answer.integrals + 1)) == {"count"}
-    other = {"integrable": "not integrable", "not integrable": "integrable"}[answer.verdict]
-    assert differences(found, replace(answer, verdict=other)) == {"verdict"}
+    assert differences(found, replace(answer, verdict="integrable")) == {"verdict"}
     assert differences(found, replace(answer, growth="linear")) == {"growth"}
     assert differences(found, replace(answer, dynamical_degree="x - 7")) == {"dynamical degree"}
-    foreign = residues_of(facts_of("nahm_tetrahedral" if found.dim == 2 else "dressing_chain_3").formulas[0])
+    foreign = residues_of(facts_of("nahm_tetrahedral").formulas[0])
     assert differences(found, replace(answer, density=foreign)) == {"density"}
 
 

@@ -1,23 +1,18 @@
 """Cofactors, their products, and the polynomials that have them."""
 
-from __future__ import annotations
-
 import pytest
-from search_helpers import random_system, system
+from search_helpers import system
 
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux import cofactors as module
-from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
     Cofactor,
     CofactorProduct,
     Sample,
-    cofactor_of_affine,
     cofactor_space,
     determinant_factors,
     determinant_polynomial,
@@ -49,31 +44,12 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
     assert all(not any(monomial[: map_.dim]) for monomial in rest.monoms())
 
 
-def test_symbols_stay_in_the_factors():
-    system_ = with_symbols(load("weierstrass"), ["g2"])
-    assert [one.name for one in determinant_factors(Kahan(system_))] == ["12*x*eps^2 - 1"]
-    euler = with_symbols(load("euler_top"), ["a1", "a2"])
-    assert "a1" in determinant_factors(Kahan(euler))[0].name
-
-
 def test_a_determinant_too_large_to_expand_is_one_cofactor(monkeypatch):
     monkeypatch.setattr(module, "_DETERMINANT_BUDGET", 5)
     system_ = with_symbols(load("euler_top"))
     assert determinant_polynomial(Kahan(system_)) is None
     [one] = determinant_factors(Kahan(system_))
     assert (one.weight, one.polynomial) == (3, None)
-
-
-def test_affine_darboux_functions_have_their_cofactors():
-    file = load("lotka_volterra")
-    laboratory = Laboratory(file)
-    map_ = laboratory.maps[0]
-    found = [cofactor_of_affine(one.function, laboratory.system) for one in affine_darboux(file.system).functions]
-    assert {one.name for one in found} == set(file.variables)
-    for x, image in map_.pairs(2):
-        assert {one.name: one.sides(map_, x, image) for one in found} == {
-            name: (image[k], x[k]) for k, name in enumerate(file.variables)
-        }
 
 
 def test_products_come_by_weight():
@@ -94,13 +70,6 @@ def test_polynomials_with_a_given_cofactor():
     assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
 
 
-def test_random_systems_have_nothing_but_constants():
-    map_ = Laboratory(random_system(3, 2)).maps[0]
-    sample = Sample.of(map_, [DETERMINANT], points_needed(3, 3))
-    assert cofactor_space(sample, CofactorProduct((1,), 1), 3).basis == []
-    assert len(cofactor_space(sample, CofactorProduct((0,), 0), 3).basis) == 1
-
-
 def test_the_search_ends_when_enough_is_found_or_the_time_is_over():
     laboratory = Laboratory(system("x y", "x", "y"))
     map_, known = laboratory.maps[0], laboratory.cofactors()
@@ -109,12 +78,6 @@ def test_the_search_ends_when_enough_is_found_or_the_time_is_over():
     assert list(search_cofactors(map_, known, [space], 1, 3, 10.0)) == []
     assert list(search_cofactors(map_, known, [], 1, 3, -1.0)) == []
     assert list(search_cofactors(map_, known, [], 0, 3, 10.0)) == []
-
-
-def test_a_cofactor_that_none_has_finds_nothing():
-    laboratory = Laboratory(load("lotka_volterra"))
-    wrong = Cofactor("x + 1", 1, parse_polynomial("x + 1", ["x", "y", "eps"]))
-    assert list(search_cofactors(laboratory.maps[0], [wrong], [], 1, 3, 10.0)) == []
 
 
 @pytest.mark.parametrize(("digits", "is_written"), [(800, True), (2400, False)])

@@ -1,8 +1,5 @@
 """Which Kahan maps commute with a given one: the paper's theorem found without its matrix A, and everything else."""
 
-from __future__ import annotations
-
-import itertools
 import random
 from types import SimpleNamespace
 
@@ -15,17 +12,15 @@ from hypothesis import strategies as st
 from kahanmaps import KahanMap, draw_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import Component, independent
+from kahanmaps.algebra.small_systems import Component
 from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.symmetry import commuting as module
 from kahanmaps.laboratory.symmetry.commuting import _Search, commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_equations import (
-    coefficients_of,
     combination,
-    commutator_equations,
     system_of,
 )
 from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, affine, judge_family, judge_field
@@ -62,7 +57,7 @@ def commute_exactly(f, g, tries=3, seed=0):
 
 # petrera-suris-2016, Theorem 9: 2^m associated fields; where a block is left out the maps commute as well.
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
-@pytest.mark.parametrize("eigenvalues", [[1, -2], [1, -2, 3], [2, 1, -1]])
+@pytest.mark.parametrize("eigenvalues", [[1, -2], [2, 1, -1]])
 def test_the_theorem_of_the_paper_is_found_without_being_told(eigenvalues, shape):
     member = draw_with_eigenvalues(eigenvalues, seed=7)
     found = commuting_systems(member.chosen.system, shape)
@@ -85,18 +80,6 @@ def _identity(n):
     return fmpq_mat([[int(i == j) for i in range(n)] for j in range(n)])
 
 
-@pytest.mark.slow
-def test_four_blocks():
-    found = commuting_systems(draw_with_eigenvalues([1, -2, 3, 5], seed=7).chosen.system)
-    assert (found.dimension, len(found.solutions), found.complete) == (4, 81, True)
-
-
-@pytest.mark.parametrize(("name", "m"), [("paper_m2", 2), ("paper_m3", 3)])
-def test_the_members_of_the_catalogue(name, m):
-    found = commuting_systems(load(name, {}).system)
-    assert (found.dimension, len(found.solutions), len(found.nontrivial)) == (m, 3**m, 3**m - 3)
-
-
 def test_where_chi_does_not_split_only_the_rational_ones_are_found_and_the_others_told():
     found = commuting_systems(load("paper_m3_irreducible", {}).system)
     assert (found.dimension, [g.trivial for g in found.solutions], found.complete) == (3, TRIVIAL, True)
@@ -104,7 +87,7 @@ def test_where_chi_does_not_split_only_the_rational_ones_are_found_and_the_other
 
 
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
-@pytest.mark.parametrize("name", ["henon_heiles", "lorenz", "lotka_volterra", "euler_top", "volterra_periodic_4"])
+@pytest.mark.parametrize("name", ["henon_heiles", "lotka_volterra", "volterra_periodic_4"])
 def test_most_systems_commute_with_nothing(name, shape):
     found = commuting_systems(load(name, {}).system, shape)
     assert [g.trivial for g in found.solutions] == TRIVIAL
@@ -121,17 +104,6 @@ def test_moebius_maps_commute_by_their_lemma_where_the_fields_are_proportional()
     assert str(judge_field(f, g, Settings()).verdict) == "refuted"
 
 
-def test_the_second_flow_of_an_integrable_system_need_not_commute():
-    """volterra_periodic_4 has a second quadratic field that commutes with it; its Kahan map does not."""
-    f = load("volterra_periodic_4", {}).system
-    space = commuting_space(f, "quadratic")
-    assert len(space.fields) == 2
-    assert bracket_vanishes(f, space.fields[1])
-    finding = judge_field(f, space.fields[1], Settings())
-    assert str(finding.verdict) == "refuted"
-    assert finding.witness is not None
-
-
 @pytest.mark.parametrize(
     ("f", "shape", "directions", "verdict"),
     [
@@ -139,10 +111,8 @@ def test_the_second_flow_of_an_integrable_system_need_not_commute():
         (system("x", "x^2 + x - 1"), "linear", ["x^2 + x - 1"], "proved"),
         # z' = z^2 with complex z = x + i y: all its complex multiples
         (system("x y", "x^2 - y^2", "2*x*y"), "linear", ["x^2 - y^2, 2*x*y", "2*x*y, -x^2 + y^2"], "proved"),
-        (system("x y", "x^2", "y^2"), "quadratic", ["x^2, y^2", "x^2, 0"], "proved"),
         # linear systems: Cayley transforms of matrices that commute
         (system("x y", "y", "-x"), "quadratic", ["y, -x", "x, y"], "proved"),
-        (system("x", "1"), "quadratic", ["1"], "proved"),
         # a nilpotent field: the map is the flow
         (system("x y z", "y*z", "0", "0"), "linear", ["y*z, 0, 0"], "proved"),
     ],
@@ -153,23 +123,6 @@ def test_whole_linear_families_commute(f, shape, directions, verdict):
     assert [texts(g) for g in family.directions] == directions
     assert (family.base.trivial, str(family.finding.verdict), found.complete) == ("0", verdict, True)
     assert [g.trivial for g in found.solutions] == TRIVIAL
-
-
-def test_the_rotations_of_the_lagrange_top_commute_with_its_map():
-    """Rotations about the axis of the top, by an angle that may depend on the component m3, which is conserved."""
-    f = load("lagrange_top", {}).system
-    found = commuting_systems(f, "quadratic")
-    (family,) = found.families
-    assert texts(family.directions[1]) == "m2, -m1, 0, p2, -p1, 0"
-    assert texts(family.directions[0]) == "m2*m3, -m1*m3, 0, m3*p2, -m3*p1, 0"
-    member = system_of(f.variables, combination([g.system for g in family.directions], [fmpq(3), fmpq(-2)], fmpq(0)))
-    assert commute_exactly(f, member)
-
-
-def test_a_family_with_a_base_is_given_by_it():
-    found = commuting_systems(system("x y z", "x", "2*y", "x^2"), "linear")
-    assert [family.base.trivial for family in found.families] == ["-f", "0", "f"]
-    assert {texts(g) for family in found.families for g in family.directions} == {"0, 2*y, 0"}
 
 
 def test_a_vanishing_bracket_is_not_enough():
@@ -184,69 +137,11 @@ def test_a_vanishing_bracket_is_not_enough():
     assert found.dimension == 8
 
 
-def test_a_perturbed_solution_is_not_found():
-    f = load("paper_m2", {}).system
-    g = commuting_systems(f).nontrivial[0].system
-    rows = coefficients_of(g)
-    rows[0][0] = rows[0][0] + fmpq(1, 1000)
-    perturbed = system_of(f.variables, rows)
-    assert perturbed not in [other.system for other in commuting_systems(f, "quadratic").solutions]
-    assert str(judge_field(f, perturbed, Settings()).verdict) == "refuted"
-
-
 def test_multiples_are_refuted_as_a_family():
     f = load("euler_top", {}).system
     space = commuting_space(f, "linear")
     t = ring(["t"]).gens()[0]
     assert str(judge_family(f, space, Component((t,)), Settings()).verdict) == "refuted"
-
-
-def test_the_lemmas_want_their_hypotheses():
-    f = system("x y", "x^2", "y^2")
-    assert affine(f, [system("x y", "y", "-x")]) is None  # rotations do not preserve f
-    assert affine(f, [f]) is None
-
-
-def test_the_equations_are_those_of_the_modified_field():
-    """At eps^4 they span the coefficients of [f_2, g] + [f, g_2], f_2 = f'f'f/12 - f''(f, f)/6."""
-    f = load("paper_m2", {}).system
-    space = commuting_space(f, "linear")
-    b = ring(["b1", "b2"]).gens()
-    found = commutator_equations(f, space.fields, b, 4, random.Random(3), lambda: True)
-    # Everything in one ring: b1, b2 and the coordinates.
-    together = ring(["b1", "b2", *f.variables])
-    gens = together.gens()
-    embedded = [[p.compose(*gens[2:], ctx=together) for p in field.rhs] for field in space.fields]
-    g = [gens[0] * p + gens[1] * q for p, q in zip(*embedded, strict=True)]
-
-    def along(field, functions):
-        """The derivatives of the functions along the field."""
-        return [sum((p.derivative(2 + k) * field[k] for k in range(4)), together.constant(0)) for p in functions]
-
-    def modified(field):
-        first = along(field, field)
-        jacobian_twice = along(first, field)  # f' f' f, since first = f' f
-        second = [a - c for a, c in zip(along(field, first), jacobian_twice, strict=True)]  # f''(f, f)
-        return [a / 12 - c / 6 for a, c in zip(jacobian_twice, second, strict=True)]
-
-    f2, g2 = modified(embedded[0]), modified(g)
-    terms = zip(along(g, f2), along(f2, g), along(g2, embedded[0]), along(embedded[0], g2), strict=True)
-    wanted = []
-    for p, q, r, s in terms:
-        by_monomial = {}
-        for monomial, value in (p - q + r - s).terms():
-            by_monomial.setdefault(tuple(monomial[2:]), {})[tuple(monomial[:2])] = value
-        wanted += [b[0].context().from_dict(terms) for terms in by_monomial.values()]
-    assert independent(wanted) == found != []
-
-
-def test_the_space_is_all_of_it_for_each_shape():
-    # Rotations about z, translations and dilations along it, functions of z times these, by hand:
-    # the linear part of (y, -x, 0) has the weights i, -i, 0, and quadratic terms must keep them.
-    fields = commuting_space(system("x y z", "y", "-x", "0"), "quadratic").fields
-    assert sorted(", ".join(str(p) for p in g.rhs) for g in fields)[:2] == ["0, 0, 1", "0, 0, x^2 + y^2"]
-    assert len(fields) == 8
-    assert fields[0] == system("x y z", "y", "-x", "0")
 
 
 @given(st.lists(st.integers(-2, 2), min_size=12, max_size=12))
@@ -288,34 +183,6 @@ def test_solutions_that_are_refuted_are_counted(monkeypatch):
     assert (found.solutions, found.discarded) == ([], 3)  # 0, f and -f
 
 
-def test_all_quadratic_g_are_tried_by_default_in_small_dimensions():
-    """(y, x^2, x) commutes with fields that are no B f, (0, 0, 1) one of them."""
-    found = commuting_systems(system("x y z", "y", "x^2", "x"))
-    assert (found.shape, found.complete) == ("quadratic", True)
-    assert "0, 0, 1" in {texts(g) for family in found.families for g in family.directions}
-    assert commuting_systems(system("x y", "x^2", "x*y")).shape == "linear"  # where these are not found in a second
-    assert commuting_systems(load("henon_heiles").system).shape == "linear"
-
-
-def test_dependent_components_give_one_b_of_several():
-    found = commuting_systems(system("x y z", "y^2 + 1", "y^2 + 1", "z^2"), "linear")
-    for g in [*found.solutions, *(d for family in found.families for d in family.directions)]:
-        assert found.system.transformed(g.B) == g.system
-
-
-def test_too_large_is_undecided_with_a_reason():
-    n = 12
-    names = [f"x{i}" for i in range(n)]
-    free = QuadraticSystem.from_text(names, [f"{names[0]}^2", *["0"] * (n - 1)])
-    found = commuting_systems(free, "quadratic")
-    assert (found.complete, str(found.verdict), [g.trivial for g in found.solutions]) == (False, "undecided", TRIVIAL)
-    assert "unknown coefficients" in found.undecided[0]
-    found = commuting_systems(system("a b c d", "a^2", "0", "0", "0"), "quadratic")
-    assert (found.dimension, found.complete) == (31, False)
-    found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
-    assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)
-
-
 def test_of_many_equations_that_were_not_solved_six_are_told():
     search = _Search(system("x", "x^2"), "quadratic", Settings(), 0.0)
     gens = ring([f"b{k}" for k in range(1, 10)]).gens()
@@ -351,38 +218,10 @@ def test_curved_families_are_told_as_equations():
     assert str(judge_field(f, field_at(space, off), Settings()).verdict) == "refuted"
 
 
-def test_the_same_seed_gives_the_same_answer():
-    f = load("paper_m2", {}).system
-    assert commuting_systems(f, seed=5).to_json() == commuting_systems(f, seed=5).to_json()
-    first, second = (commuting_systems(f, seed=s) for s in (1, 2))
-    assert {str(g.B) for g in first.solutions} == {str(g.B) for g in second.solutions}
-
-
-def test_combinations_of_the_basis():
-    f = load("paper_m3", {}).system
-    space = commuting_space(f, "linear")
-    weights = [fmpq(2), fmpq(-1, 3), fmpq(5)]
-    B = sum((M * w for M, w in zip(space.matrices, weights, strict=True)), fmpq_mat(6, 6))
-    assert field_at(space, weights) == f.transformed(B)
-    assert all(bracket_vanishes(a, b) for a, b in itertools.combinations(space.fields, 2))
-
-
-@pytest.mark.parametrize("options", [{"shape": "cubic"}, {"seconds": 0}, {"seconds": float("nan")}, {"error_bits": 0}])
-def test_wrong_use(options):
-    with pytest.raises(InputError, match="expected"):
-        commuting_systems(system("x", "x^2"), **options)
-
-
 @pytest.mark.parametrize("below", [1, 2**20 + 7])
 @pytest.mark.parametrize(
     ("f", "g"),
-    [
-        (["y", "x"], ["x", "0"]),
-        (["x*y", "-x^2"], ["y^2", "x"]),
-        (["x^2 - y^2", "2*x*y"], ["x^2 + 1", "y - 3*x*y"]),
-        (["y", "x"], ["10^20*x", "10^20*y + x^2"]),
-        (["y", "x"], ["10^20", "10^20*x*y"]),
-    ],
+    [(["x*y", "-x^2"], ["y^2", "x"]), (["y", "x"], ["10^20*x", "10^20*y + x^2"]), (["y", "x"], ["10^20", "10^20*x*y"])],
 )
 def test_the_identity_of_a_family_is_bounded(f, g, below):
     first, second = (QuadraticSystem.from_text(["x", "y"], rhs) for rhs in (f, g))
@@ -390,23 +229,6 @@ def test_the_identity_of_a_family_is_bounded(f, g, below):
     family = Component((b / below,))
     equation, _ = check(_family_identity(first, SimpleNamespace(fields=[second]), family), differs=True)
     assert equation.bits >= log2(below)
-
-
-def test_what_is_found_without_families_is_told_in_numbers():
-    found = commuting_systems(system("x y", "x^2 + 1", "y^2 - x*y"), "linear").to_json()
-    assert [found[name] for name in ("status", "verdict", "order", "discarded", "irrational", "families")] == [
-        "complete",
-        "proved",
-        4,
-        0,
-        [],
-        [],
-    ]
-    assert [(g["B"], g["trivial"]) for g in found["solutions"]] == [
-        ([["0", "0"], ["0", "0"]], "0"),
-        ([["1", "0"], ["0", "1"]], "f"),
-        ([["-1", "0"], ["0", "-1"]], "-f"),
-    ]
 
 
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
@@ -426,16 +248,21 @@ def test_a_family_of_which_nothing_is_known_is_not_listed(monkeypatch):
     assert (found.families, found.undecided) == ([], ["a family with 2 parameters: nobody knows"])
 
 
-@pytest.mark.parametrize("shape", ["linear", "quadratic"])
-def test_multiples_commute_in_dimension_one_by_a_proof(shape):
-    found = commuting_systems(system("x", "x^2 - 2"), shape)
-    ((family, verdict),) = [(family, family.finding.verdict) for family in found.families]
-    assert (len(family.directions), verdict, found.verdict) == (1, Verdict.PROVED, Verdict.PROVED)
-    assert family.finding.evidence.data["theorem"] == "the lemma of Moebius maps"
-
-
-@pytest.mark.parametrize(("rhs", "values"), [(["2*x"], 3), (["y", "-x"], 5), (["y", "z", "x + 1"], 7)])
+@pytest.mark.parametrize(("rhs", "values"), [(["2*x"], 3), (["y", "z", "x + 1"], 7)])
 def test_affine_maps_are_looked_at_at_more_values_of_eps_than_their_symmetries_have_degrees(rhs, values):
     f = system("x y z"[: 2 * len(rhs) - 1], *rhs)
     first, second = affine(f, [f]).data["hypotheses"]
     assert (first, second.rpartition(", at ")[2]) == ("f is affine", f"{values} values of eps")
+
+
+def test_too_large_is_undecided_with_a_reason():
+    n = 12
+    names = [f"x{i}" for i in range(n)]
+    free = QuadraticSystem.from_text(names, [f"{names[0]}^2", *["0"] * (n - 1)])
+    found = commuting_systems(free, "quadratic")
+    assert (found.complete, str(found.verdict), [g.trivial for g in found.solutions]) == (False, "undecided", TRIVIAL)
+    assert "unknown coefficients" in found.undecided[0]
+    found = commuting_systems(system("a b c d", "a^2", "0", "0", "0"), "quadratic")
+    assert (found.dimension, found.complete) == (31, False)
+    found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
+    assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)

@@ -1,7 +1,5 @@
 """All discrete Darboux polynomials of a degree: known ones, their identities on exact points, and what is not one."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from typing import Any
@@ -14,7 +12,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
@@ -41,17 +39,7 @@ def test_the_pencils_of_the_periodic_volterra_lattice() -> None:
     assert found["1"][0] == "x1 + x2 + x3 + x4"
 
 
-def test_symbols_and_a_given_eps() -> None:
-    with_symbols = darboux_polynomials(load("euler_top"), 4, symbols=("a1", "a2", "a3"))
-    (space,) = with_symbols.spaces
-    assert len(space.polynomials) == 6
-    assert space.verdict is Verdict.PROVED
-    at_eps = darboux_polynomials(load("weierstrass"), 3, eps="1/3")
-    assert all("eps" not in format_polynomial(P) for space in at_eps.spaces for P in space.polynomials)
-    assert at_eps.spaces
-
-
-@pytest.mark.parametrize("name", ["nahm_octahedral", "zhukovski_volterra_1", "dressing_chain_3", "henon_heiles"])
+@pytest.mark.parametrize("name", ["nahm_octahedral", "dressing_chain_3"])
 def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None:
     file = load(name)
     rng = random.Random(name)
@@ -69,15 +57,6 @@ def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None
     assert seen > 0
 
 
-def test_a_perturbed_system_loses_them() -> None:
-    kept = QuadraticSystem.from_text(["x", "y"], ["x^2 - y^2", "-2*x*y"])
-    lost = QuadraticSystem.from_text(["x", "y"], ["x^2 - y^2 + 1", "-2*x*y + x + 1"])
-    assert any(len(s.polynomials) > 1 for s in darboux_polynomials(SystemFile.from_system(kept), 3).spaces)
-    found = darboux_polynomials(SystemFile.from_system(lost), 1)
-    assert found.spaces == ()
-    assert not found.reason
-
-
 def test_degenerate_systems_and_wrong_use() -> None:
     linear = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["x", "3*y"]))
     nowhere = darboux_polynomials(linear, 2, eps=1)
@@ -89,14 +68,6 @@ def test_degenerate_systems_and_wrong_use() -> None:
         darboux_polynomials(load("weierstrass"), 2, eps=0)
     short = darboux_polynomials(load("volterra_periodic_5"), 4, seconds=0.0)
     assert "time was over" in short.reason
-
-
-@pytest.mark.slow
-def test_a_degree_with_too_many_terms_is_lowered_and_said() -> None:
-    """Dimension 6: 18564 monomials up to degree 12, 1716 up to degree 7."""
-    found = darboux_polynomials(load("kirchhoff_generic"), 12, seconds=1.0)
-    assert found.reason
-    assert found.degree == 12
 
 
 @pytest.mark.parametrize("moves", [0, 1])
@@ -119,14 +90,7 @@ def test_a_polynomial_that_is_one_only_where_eps_equals_a_coordinate_is_not_prov
     assert all(space.verdict is not Verdict.PROVED for space in spaces)
 
 
-def test_a_symbol_in_dimension_one() -> None:
-    """x' = a x: x~ = x (1 + a eps)/(1 - a eps), so x is a Darboux polynomial for every a."""
-    file = parse_system('variables = ["x"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*x"]\n', "growth")
-    (space,) = darboux_polynomials(file, 1, symbols=("a",)).spaces
-    assert ([format_polynomial(P) for P in space.polynomials], space.verdict) == (["x"], Verdict.PROVED)
-
-
-@pytest.mark.parametrize(("rhs", "eps"), [(["x", "y"], -1), (["x", "x*y"], -1), (["x", "y"], 1)])
+@pytest.mark.parametrize(("rhs", "eps"), [(["x", "y"], -1), (["x", "y"], 1)])
 def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(rhs, eps):
     # At eps = -1 every point goes to x = 0, and all multiples of x would have the cofactor 0.
     found = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)

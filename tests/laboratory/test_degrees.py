@@ -4,20 +4,16 @@ The sequences were computed by others, modulo two primes each, or are in the lit
 1 + sqrt 2, and the tribonacci number of zander-2021.
 """
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 from degree_helpers import polynomial_degrees
-from flint import fmpz_poly
 from helpers import quick
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, _Search, degree_growth
@@ -25,43 +21,14 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = {
     "riccati": [1, 1, 1],
-    "harmonic": [1, 1, 1],
-    "planar_cubic_hamiltonian": [2, 4, 8, 13, 20, 28, 38, 49],
     "weierstrass": [2, 3, 5, 7, 11, 15, 20, 25],
-    "nahm_tetrahedral": [2, 4, 8, 13, 20, 28, 38, 49],
     "euler_top": [3, 9, 19, 33, 51, 73, 99, 129],
-    "zhukovski_volterra_1": [3, 9, 19, 33, 51, 73, 99, 129],
-    "volterra_periodic_3": [3, 7, 15, 25, 39, 55, 75, 97],
     "volterra_periodic_4": [4, 13, 28, 49, 76, 109, 148, 193],
-    "dressing_chain_3": [3, 7, 15, 25, 39, 55, 75, 97],
     "three_wave": [6, 16, 36, 61, 96, 136],
     "lotka_volterra": [2, 4, 8, 16, 32, 64],
     "henon_heiles": [3, 7, 17, 39, 93, 215],
-    "lorenz": [3, 9, 27, 81, 243],
     "paper_m2": [4, 7, 16, 25, 40],
-    "paper_m3": [6, 10, 24, 37, 60],
 }
-
-
-def volterra(size: int) -> QuadraticSystem:
-    """x_i' = x_i (x_{i+1} - x_{i-1}), indices modulo the size."""
-    names = [f"x{i}" for i in range(size)]
-    return QuadraticSystem.from_text(
-        names, [f"{names[i]}*({names[(i + 1) % size]} - {names[i - 1]})" for i in range(size)]
-    )
-
-
-def zhukovski_volterra_2() -> QuadraticSystem:
-    """a = (1, 2, -3), b = (1, 3)."""
-    return QuadraticSystem.from_text(["x", "y", "z"], ["y*z - 3*z", "2*z*x + z", "-3*x*y + 3*x - y"])
-
-
-def lagrange_top() -> QuadraticSystem:
-    """alpha = 2, gamma = 3."""
-    return QuadraticSystem.from_text(
-        ["m1", "m2", "m3", "p1", "p2", "p3"],
-        ["m2*m3 + 3*p2", "-m1*m3 - 3*p1", "0", "2*p2*m3 - p3*m2", "p3*m1 - 2*p1*m3", "p1*m2 - p2*m1"],
-    )
 
 
 def zander() -> QuadraticSystem:
@@ -76,26 +43,6 @@ def test_the_degrees_of_the_catalogue(name):
     assert (list(found.degrees), found.ended, found.notes) == ([1, *known], "terms", ())
 
 
-@pytest.mark.parametrize(
-    ("system", "known"),
-    [
-        (zhukovski_volterra_2(), [3, 9, 23, 57, 139, 337, 815, 1969]),
-        (volterra(5), [5, 21, 85, 341]),
-        (lagrange_top(), [6, 18, 38, 66, 102]),
-        (zander(), [2, 4, 8, 15, 28, 52, 96, 177]),
-    ],
-)
-def test_the_degrees_of_other_systems(system, known):
-    assert list(degree_growth(system, max_terms=len(known)).degrees) == [1, *known]
-
-
-@pytest.mark.parametrize("name", ["weierstrass", "lotka_volterra", "euler_top", "lorenz", "henon_heiles", "riccati"])
-def test_polynomials_with_gcds_give_the_same(name):
-    system = load(name).system
-    count = 3 if system.dim > 2 else 5
-    assert list(degree_growth(system, max_terms=count).degrees[1:]) == polynomial_degrees(system, count, seed=1)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_polynomials_with_gcds_give_the_same_for_random_systems(seed):
     rng = random.Random(seed)
@@ -104,24 +51,6 @@ def test_polynomials_with_gcds_give_the_same_for_random_systems(seed):
     rhs = ["+".join(f"({rng.randint(-2, 2)})*{m}" for m in monomials) for _ in names]
     system = QuadraticSystem.from_text(names, rhs)
     assert list(degree_growth(system, max_terms=3).degrees[1:]) == polynomial_degrees(system, 3, seed)
-
-
-def test_a_recurrence_with_terms_to_spare_ends_the_search():
-    found = degree_growth(load("euler_top").system)
-    assert (found.ended, found.growth, found.recurrence.closed_form) == (
-        "explained",
-        Growth.QUADRATIC,
-        "2*n^2 + 1",
-    )
-    assert found.recurrence.checked >= 6
-    assert found.dynamical_degree.text == "1"
-    assert len(set(found.primes)) == len(set(found.residues)) == 2
-
-
-def test_one_plus_the_root_of_two():
-    found = degree_growth(zhukovski_volterra_2(), max_terms=8)
-    assert found.dynamical_degree.minimal_polynomial == fmpz_poly([-1, -2, 1])
-    assert "2.41421356237309504880" in found.growth_text
 
 
 def test_without_a_recurrence_there_is_an_estimate_that_says_so():
@@ -161,15 +90,15 @@ def with_degrees(*degrees):
     return DegreeGrowth(degrees, None, "terms", "", 0, (), ())
 
 
-@pytest.mark.parametrize("n", [6, 8, 12, 30])
-@pytest.mark.parametrize("power", [1, 2, 3, 5, 9])
+@pytest.mark.parametrize("n", [6, 30])
+@pytest.mark.parametrize("power", [1, 3, 9])
 def test_polynomial_growth_does_not_look_exponential(power, n):
     assert not with_degrees(*(1 + k**power for k in range(n + 1))).looks_exponential
     assert not with_degrees(*(1 + -(-(k**power) * 3 // 4) for k in range(n + 1))).looks_exponential
 
 
-@pytest.mark.parametrize("n", [6, 8, 12, 30])
-@pytest.mark.parametrize("rate", [1.5, 1.84, 2, 4, 6])
+@pytest.mark.parametrize("n", [6, 30])
+@pytest.mark.parametrize("rate", [1.5, 2, 6])
 def test_exponential_growth_does(rate, n):
     assert with_degrees(*(1 + round(10 * rate**k) for k in range(n + 1))).looks_exponential
 
@@ -182,12 +111,6 @@ def test_the_largest_degree_is_reached_exactly_by_series_and_by_minors(largest, 
     assert degree_growth(system, max_terms=3, max_degree=17).degrees == (1, 3, 7, 17)
     found = degree_growth(system, max_terms=3, max_degree=16)
     assert (found.degrees, found.ended) == ((1, 3, 7), "degree")
-
-
-@pytest.mark.slow
-def test_planar_integrable_maps_go_far():
-    found = degree_growth(load("planar_cubic_hamiltonian").system, max_terms=60, seconds=60)
-    assert [4 * d for d in found.degrees] == [3 * n * n + 4 + n % 2 for n in range(61)]
 
 
 def test_a_single_eps_may_be_special():
@@ -207,10 +130,8 @@ def test_eps_as_a_rational_number():
     ("rhs", "eps", "degrees", "ended"),
     [
         (["0"], None, (1,) * 8, "recurrence"),
-        (["1"], None, (1,) * 8, "recurrence"),
         (["x"], 1, (1,), "singular"),
         (["x"], -1, (1, 0), "constant"),
-        (["0", "0"], None, (1,) * 8, "recurrence"),
         (["x^2", "y"], 1, (1,), "singular"),
     ],
 )
@@ -244,30 +165,6 @@ def test_lines_in_special_position_are_replaced(monkeypatch):
     found = degree_growth(system, max_terms=7, seed=1)
     assert found.degrees == (1, 3, 9, 19, 33, 51, 73, 99)
     assert any("was replaced by another" in note for note in found.notes)
-
-
-def test_the_same_seed_gives_the_same_and_progress_is_told():
-    told: list[str] = []
-    system = load("weierstrass").system
-    first = degree_growth(system, max_terms=5, seed=3, progress=told.append)
-    assert first == degree_growth(system, max_terms=5, seed=3)
-    assert first.primes != degree_growth(system, max_terms=5, seed=4).primes
-    assert told[-1] == "degrees: iterate 5, degree 7 before it"
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"eps": 0}, "found eps = 0"),
-        ({"seconds": 0}, "expected a positive number"),
-        ({"seconds": float("nan")}, "expected a positive number"),
-        ({"max_terms": -1}, "found -1 terms"),
-        ({"max_degree": 0}, "the largest degree 0"),
-    ],
-)
-def test_wrong_use(options, words):
-    with pytest.raises(InputError, match=words):
-        degree_growth(load("weierstrass").system, **options)
 
 
 @pytest.mark.parametrize(

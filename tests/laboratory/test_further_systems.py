@@ -5,8 +5,6 @@ densities of the answers are tried here on exact orbits first, by the arithmetic
 give the same. The systems in degenerate/ are linear, constant, one-dimensional, or special at some eps.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -30,16 +28,11 @@ from helpers import fraction
 from search_helpers import ranks
 
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.checks.claims import Verdict
-from kahanmaps.checks.conserve import check_integrals
-from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 FOLDER = Path(__file__).parent / "further_systems"
 FURTHER = json.loads((FOLDER / "answers.json").read_text(encoding="utf-8"))
@@ -163,16 +156,6 @@ def test_the_answers_count_their_independent_integrals(name):
     assert rank + (MODIFIED in known["integrals"]) == known["independent_integrals"] <= known["dim"]
 
 
-def test_the_checks_of_the_library_say_the_same():
-    for name in ("volterra_open_3", "suslov", "ishii", "zander_112_lines", "gyrostat_two", "radial"):
-        file, known = file_of(name), KNOWN[name]
-        claims = {f"I{k}": function(file, text) for k, text in enumerate(known["integrals"])}
-        assert [f.verdict for f in check_integrals(file, None, claims).findings] == [Verdict.PROVED] * len(claims)
-        report = check_measure(file, None, function(file, known["density"]))
-        assert Verdict.PROVED in [f.verdict for f in report.findings]
-        assert Verdict.REFUTED not in [f.verdict for f in report.findings]
-
-
 # Blind
 
 
@@ -190,16 +173,6 @@ def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
     growth = KNOWN[name]["growth"]
     assert found.conclusion.kind == ("linear" if affine else verdict_of(growth))
     assert found.skipped == []
-
-
-def test_six_dimensions_with_a_modified_hamiltonian_only():
-    # Along orbits the integral shows in degree 7 only, which is 1716 monomials: the theorem gives it.
-    file = file_of("hamiltonian_6_generic")
-    found = find_integrals(file, max_degree=3)
-    assert [(one.origin, one.verdict) for one in found.integrals] == [
-        ("modified Hamiltonian (cmoq-2013)", Verdict.PROVED)
-    ]
-    assert found.profile.nullities == (0, 0, 0)
 
 
 # What holds at one eps only
@@ -227,16 +200,10 @@ def test_special_eps(name, eps):
         assert found.conclusion.kind == "singular"
 
 
-@pytest.mark.parametrize(("name", "eps"), [each for each in SPECIAL if not each[1].startswith("-")])
-def test_no_special_eps_is_special_for_its_neighbours(name, eps):
-    found = find_integrals(file_of(name), eps=f"{Fraction(eps) + Fraction(1, 7)}")
-    assert (found.profile.period, found.codimension) == (None, DEGENERATE[name]["independent_integrals"])
-
-
 # Wrong answers are seen to be wrong
 
 
-@pytest.mark.parametrize("name", ["ishii", "volterra_open_3", "zander_112_affine"])
+@pytest.mark.parametrize("name", ["ishii", "volterra_open_3"])
 def test_a_wrong_answer_is_seen_to_be_different(name):
     found, answer = analyze(file_of(name)), answer_for(name)
     one, last = function(found.file, "1"), function(found.file, found.file.variables[-1])
@@ -254,22 +221,9 @@ def test_a_wrong_answer_is_seen_to_be_different(name):
     assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"}
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
-        pytest.param("ishii", '"12*x*y"', '"12*x*y + x"', marks=pytest.mark.slow),
-        pytest.param("volterra_open_3", '"-x2*x3"', '"-x2*x3 + x1/50"', marks=pytest.mark.slow),
-        ("suslov_pencil", "(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"),
-    ],
-)
-def test_a_perturbed_system_no_longer_has_the_answer(name, old, new):
+def test_a_perturbed_system_no_longer_has_the_answer():
+    name, old, new = "suslov_pencil", "(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
     assert old in text
     found = analyze(parse_system(text.replace(old, new)), seconds=4)
     assert {"count", "growth"} <= differences(found, answer_for(name))
-
-
-def test_of_the_perturbed_systems_the_densities_go_too():
-    text = (FOLDER / "suslov_pencil.toml").read_text(encoding="utf-8")
-    perturbed = parse_system(text.replace("(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"))
-    assert find_densities(perturbed, seconds=5).densities == ()

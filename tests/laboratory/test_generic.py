@@ -32,7 +32,7 @@ def test_names_by_hand():
     assert not any("at eps" in told for told in found.patterns.sentences)
 
 
-@pytest.mark.parametrize("name", ["lotka_volterra", "zhukovski_volterra_2", "henon_heiles", "volterra_periodic_4"])
+@pytest.mark.parametrize("name", ["zhukovski_volterra_2", "volterra_periodic_4"])
 def test_at_the_eps_they_are_what_was_followed(name):
     map_, eps = load(name).map, fmpq(3, 13)
     for h in with_eps(map_, eps, contracted(map_, eps)):

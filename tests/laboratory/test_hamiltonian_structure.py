@@ -1,14 +1,11 @@
 """Constant Hamiltonian structures: those of the catalogue, of random systems, and none where there is none."""
 
-from __future__ import annotations
-
-import itertools
 import random
 from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
-from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA, random_point
+from helpers import LORENZ, random_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +20,6 @@ from kahanmaps.invariants.measures import DeterminantDensity
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     ConstantStructures,
     _invertible,
-    _small,
     constant_structures,
 )
 from kahanmaps.maps.kahan import KahanMap
@@ -66,9 +62,7 @@ def conserved(found: ConstantStructures, seed: int = 1) -> bool:
     return same and density.value(QQ, eps, image) == density.value(QQ, eps, x) * phi.jacobian(x).det()
 
 
-@pytest.mark.parametrize(
-    "name", ["henon_heiles", "weierstrass", "planar_cubic_hamiltonian", "nahm_tetrahedral", "paper_m2", "three_wave"]
-)
+@pytest.mark.parametrize("name", ["henon_heiles", "planar_cubic_hamiltonian", "paper_m2"])
 def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
     file = read_system(CATALOG / f"{name}.toml")
     known = file.hamiltonian
@@ -82,11 +76,6 @@ def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
     assert conserved(found)
 
 
-def test_a_member_of_the_commuting_family_has_m_structures() -> None:
-    # As many as the associated systems of petrera-suris-2016.
-    assert [len(checked(read_system(CATALOG / f"paper_m{m}.toml").system).forms) for m in (2, 3)] == [2, 3]
-
-
 def test_degenerate_structures() -> None:
     for name in ("dressing_chain_3", "volterra_periodic_3"):
         found = checked(read_system(CATALOG / f"{name}.toml").system)
@@ -97,9 +86,8 @@ def test_degenerate_structures() -> None:
     assert found.hamiltonian.J == fmpq_mat([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
 
 
-@pytest.mark.parametrize("system", [LORENZ, EULER_TOP, LOTKA_VOLTERRA])
-def test_systems_without_constant_structure(system: QuadraticSystem) -> None:
-    found = checked(system)
+def test_a_system_without_constant_structure() -> None:
+    found = checked(LORENZ)
     assert found.hamiltonian is None
     assert found.proved
     assert "no affine integral" in found.reason
@@ -118,16 +106,6 @@ def test_kernels_in_between_are_not_looked_for() -> None:
     found = checked(system)
     assert found.hamiltonian is None
     assert not found.proved
-
-
-def test_forms_without_an_invertible_one() -> None:
-    # K f is a gradient for the K of the first plane only: the second one's divergence is not zero.
-    system = QuadraticSystem.from_text(["q", "p", "x", "y"], ["p", "-q^2", "x^2 + y", "x*y"])
-    found = checked(system)
-    assert len(found.forms) == 1
-    assert [str(H) for H in found.functions] == ["-1/3*q^3 - 1/2*p^2"]
-    assert (found.hamiltonian, found.proved) == (None, True)
-    assert "invertible" in found.reason
 
 
 def test_degenerate_input() -> None:
@@ -173,12 +151,6 @@ def test_random_structures(hamiltonian: CubicHamiltonian, seed: int) -> None:
         assert conserved(found, seed)
 
 
-@given(st.integers(0, 20))
-def test_the_seed_changes_no_form(seed: int) -> None:
-    system = read_system(CATALOG / "paper_m3.toml").system
-    assert constant_structures(system, seed=seed).forms == constant_structures(system).forms
-
-
 def skew(m, *places):
     K = fmpq_mat(m, m)
     for i, j in places:
@@ -209,10 +181,3 @@ def test_among_many_forms_an_invertible_one_is_found_without_looking_at_all_poin
     forms = [skew(8, pair) for pair in ((0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6))]
     K, proved = _invertible(forms, 8, random.Random(1))
     assert (K.det() != 0, proved) == (True, True)
-
-
-def test_simple_coefficients_come_first():
-    first = list(itertools.islice(_small(3, random.Random(1)), 4 + 100))
-    assert first[:4] == [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
-    largest = [[max(map(max, some)), min(map(min, some))] for some in (first[4:14], first[14:24], first[94:])]
-    assert largest == [[1, -1], [2, -2], [9, -10]]

@@ -1,25 +1,19 @@
 """What theorems give counts: integrals of every Kahan map by linear algebra, and no analysis tells of fewer."""
 
-from __future__ import annotations
-
 import random
 
 import pytest
 from flint import fmpq
-from search_helpers import random_system, ranks, system
+from search_helpers import random_system, system
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import gradient_at, rank
 from kahanmaps.laboratory.preserve.inherited import inherited_integrals
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def lotka_volterra(n: int, k: int) -> SystemFile:
@@ -47,17 +41,12 @@ DEGENERATE = system(
 )
 CASES = [
     (lotka_volterra(4, 1), 1, 1),
-    (lotka_volterra(5, 2), 1, 1),
-    (lotka_volterra(6, 2), 1, 1),
-    (lotka_volterra(7, 3), 1, 1),
     (lotka_volterra(8, 5), 1, 1),
     (lotka_volterra(5, 1), 1, 0),
     (DRIVEN, 0, 1),
     (DEGENERATE, 2, 1),
     (load("paper_m3"), 0, 3),
-    (load("three_wave"), 0, 1),
     (load("euler_top"), 0, 0),
-    (random_system(4, 3), 0, 0),
 ]
 
 
@@ -68,7 +57,7 @@ def test_the_numbers_of_integrals_that_theorems_give(file, affine, modified):
     assert [found.count(map_) for map_ in Laboratory(file).maps] == [affine + modified] * 2
 
 
-@pytest.mark.parametrize("file", [lotka_volterra(8, 5), DRIVEN, DEGENERATE, load("paper_m2")])
+@pytest.mark.parametrize("file", [DRIVEN, DEGENERATE])
 def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singular_form(file):
     found, rng = inherited_integrals(file.system), random.Random(3)
     for k, form in enumerate(found.forms):
@@ -85,18 +74,7 @@ def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singul
         assert form.transpose() == form * -1
 
 
-@pytest.mark.parametrize("file", [lotka_volterra(4, 1), DRIVEN, DEGENERATE, load("planar_cubic_hamiltonian")])
-def test_gradients_are_those_of_the_functions_written_out(file):
-    found = find_integrals(file, max_degree=1)
-    inherited, map_ = inherited_integrals(file.system), Laboratory(file).maps[0]
-    point = map_.random_point()
-    rows = inherited.gradients(map_, point)
-    written = [gradient_at(map_, one.function, point) for one in found.integrals]
-    assert rank(rows, map_.prime) == rank([*rows, *written], map_.prime) == rank(written, map_.prime) == len(rows)
-    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
-
-
-@pytest.mark.parametrize(("file", "products"), [(lotka_volterra(7, 3), 1), (lotka_volterra(6, 3), 1), (DEGENERATE, 0)])
+@pytest.mark.parametrize(("file", "products"), [(lotka_volterra(6, 3), 1), (DEGENERATE, 0)])
 def test_no_search_tells_of_fewer_integrals_than_theorems_give(file, products):
     """Relations of degree 1 show the affine integrals only; products of invariant hyperplanes are found beside them."""
     found = find_integrals(file, max_degree=1, seconds=20)
@@ -106,16 +84,6 @@ def test_no_search_tells_of_fewer_integrals_than_theorems_give(file, products):
     as_json = found.to_json()
     assert (as_json["codimension"], as_json["by_theorems"]) == (found.codimension, found.by_theorems)
     assert as_json["codimension_is_exact"] is False
-
-
-def test_theorems_and_relations_count_together():
-    """u' = z u and v' = -z v give u v/(1 - eps^2 z^2), a relation of degree 2; x and y are Hamiltonian."""
-    file = system("u v x y z", "u*z", "-v*z", "y + x^2", "-2*x*y + 3*x^2", "x + u*y")
-    found = find_integrals(file, max_degree=2)
-    assert (found.by_theorems, found.profile.codimension, found.codimension) == (1, 1, 2)
-    functions = [parse_rational_function("u*v/(1 - eps^2*z^2)", (*file.variables, "eps"))]
-    known = [one.function for one in found.integrals]
-    assert ranks(known, functions, Laboratory(file).maps[0]) == (2, 1, 2)
 
 
 def test_with_symbols_theorems_are_asked_at_random_values():
@@ -133,7 +101,6 @@ def test_with_symbols_theorems_are_asked_at_random_values():
 @pytest.mark.parametrize(
     ("file", "words"),
     [
-        (lotka_volterra(7, 3), "at least 3 independent integrals in dimension 7."),
         (DEGENERATE, "at least 3 independent integrals in dimension 6."),
         (load("volterra_periodic_3"), "Superintegrable (proved): 2 independent integrals in dimension 3,"),
         (random_system(2, 1), "no integral in dimension 2 up to degree "),
@@ -144,18 +111,3 @@ def test_an_analysis_says_how_many_there_are_at_least(file, words):
     found.integrals = find_integrals(file, max_degree=2, seconds=60)
     assert words in found.conclusion.sentence
     assert found.to_json()["verdict"]["integrals_exact"] == ("at least" not in words and "no integral" not in words)
-
-
-def test_orbits_that_were_not_measured_leave_what_theorems_give():
-    found = find_integrals(DEGENERATE, seconds=1e-9)
-    assert found.profile.nullities == ()
-    assert (found.by_theorems, found.codimension, found.is_exact) == (3, 3, False)
-    assert (
-        found.count_text
-        == "in all at least 3 independent (3 by theorems: 2 affine integrals and 1 modified Hamiltonian)"
-    )
-
-
-def test_a_system_that_stands_still_has_all_coordinates():
-    found = inherited_integrals(QuadraticSystem.from_text(["x", "y"], ["0", "0"]))
-    assert (found.text, found.forms) == ("2 affine integrals", ())

@@ -1,25 +1,19 @@
 """Integrals found from the right-hand sides alone: those of the literature, conserved to the last digit; no others."""
 
-from __future__ import annotations
-
 import random
-from functools import cache, partial
+from functools import cache
 
 import pytest
 from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from search_helpers import PRIME, random_system, ranks, specialised, system, values_on_orbits
+from search_helpers import random_system, ranks, system, values_on_orbits
 
-from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import (
     IntegralSearch,
     _affine,
@@ -28,17 +22,12 @@ from kahanmaps.laboratory.preserve.integrals import (
 )
 from kahanmaps.laboratory.preserve.results import closing_note
 
-integral_verdict = partial(verdict_on, is_density=False)
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
 LONG = ("henon_heiles", "paper_m2")
 EPS = ["1/10", "-2/7", "3"]
 # All known integrals of these files are found, in closed form.
 FOUND = {name: load(name).catalog["codimension"] for name in PLANE_AND_SPACE}
-SYMBOLS = [
-    ("euler_top", ["a1", "a2", "a3"]),
-    ("dressing_chain_3", ["b1", "b2", "b3"]),
-    ("weierstrass", ["g2"]),
-]
+SYMBOLS = [("euler_top", ["a1", "a2", "a3"]), ("weierstrass", ["g2"])]
 
 
 @cache
@@ -64,9 +53,7 @@ def test_the_integrals_of_the_literature_are_found(name):
     assert of_known == len(known)
 
 
-@pytest.mark.parametrize(
-    "name", ["euler_top", "dressing_chain_3", "nahm_octahedral", "weierstrass", "volterra_periodic_4"]
-)
+@pytest.mark.parametrize("name", ["euler_top", "nahm_octahedral", "volterra_periodic_4"])
 def test_formulas_are_constant_along_exact_orbits(name):
     file = load(name)
     for one in searched(name).integrals:
@@ -77,29 +64,6 @@ def test_formulas_are_constant_along_exact_orbits(name):
 
 def test_the_exact_orbits_tell_a_wrong_formula():
     assert max(len(each) for each in values_on_orbits(load("euler_top"), "x1^2 + x2^2", EPS)) > 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PLANE_AND_SPACE)
-def test_all_formulas_are_constant_along_exact_orbits(name):
-    file = load(name)
-    for one in find_integrals(file, seed=4).integrals:
-        assert {len(each) for each in values_on_orbits(file, one.text, EPS, steps=3)} == {1}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "number"),
-    [("clebsch_first_flow", 1), ("so4_euler_manakov", 1), ("lagrange_top", 3), ("three_wave", 3), ("paper_m3", 3)],
-)
-def test_six_dimensions(name, number):
-    file = load(name)
-    found = find_integrals(file)
-    assert (len(found.integrals), found.found, found.codimension) == (number, *[file.catalog["codimension"]] * 2)
-    assert all(one.verdict.holds for one in (*found.integrals, *found.in_iterates))
-    assert (found.is_complete, found.reason) == (True, "")
-    for one in found.integrals:
-        assert {len(each) for each in values_on_orbits(file, one.text, ["1/10"], steps=2)} == {1}
 
 
 @pytest.mark.parametrize(("name", "symbols"), SYMBOLS)
@@ -118,31 +82,13 @@ def test_formulas_with_symbols_are_those_with_numbers(name, symbols):
         assert {len(each) for each in values_on_orbits(file, one.text, EPS, starts=1, **chosen)} == {1}
 
 
-def test_the_formulas_themselves_specialise():
-    general = find_integrals(load("weierstrass"), symbols=["g2"]).integrals[0].function
-    special = find_integrals(load("weierstrass", {"g2": 7})).integrals[0].function
-    field, rng = GF(PRIME), random.Random(2)
-    points = [[field.random(rng) for _ in range(3)] for _ in range(4)]
-    eps = field.random(rng)
-    values = [
-        (specialised(general, {"g2": 7}, field, [*p[:2], eps]), special.value(field, [*p[:2], eps])) for p in points
-    ]
-    # equal up to an affine function of one variable, as members of one pencil with one denominator
-    (a, b), (c, d), (e, f), (g, h) = values
-    assert (a - c) * (f - h) == (b - d) * (e - g)
-
-
-def test_integrals_are_those_of_the_map_unless_the_flow_is_asked_for():
-    assert not find_integrals(load("riccati")).flow
-
-
 def test_a_number_for_eps():
     found = find_integrals(load("euler_top"), symbols=["a1"], eps="1/3")
     assert [one.text for one in found.integrals] == ["(x2^2*a1 - 9)/(2*x1^2 + 9)", "(2*x3^2*a1 + 9)/(2*x1^2 + 9)"]
     assert found.toml_section().startswith("# for eps = 1/3 only (time step 2 eps = 2/3): check with --eps 1/3\n[integ")
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("dim", [2, 3])
 def test_random_systems_have_none(dim, seed):
     found = find_integrals(random_system(dim, seed), max_degree=4)
@@ -150,82 +96,13 @@ def test_random_systems_have_none(dim, seed):
 
 
 @pytest.mark.parametrize(
-    ("names_", "rhs"),
-    [
-        ("x y", ["y + x^2/100", "-x + x^2"]),
-        ("x1 x2 x3", ["x2*x3", "-2*x3*x1 + x1/7", "x1*x2 + x2^2"]),
-    ],
-)
-def test_a_perturbed_system_loses_its_integral(names_, rhs):
-    assert find_integrals(system(names_, *rhs), max_degree=5).integrals == ()
-
-
-EULER = with_symbols(load("euler_top"))
-
-
-@pytest.mark.parametrize(
-    ("text", "verdict"),
-    [
-        ("(1 + 2*eps^2*x3^2)/(1 - eps^2*x2^2)", "proved"),
-        ("(1 + 3*eps^2*x3^2)/(1 - eps^2*x2^2)", "refuted"),
-        ("(1 + 2*eps^2*x3^2)/(1 - eps^2*x2^2 + eps^9*x1)", "refuted"),
-        ("x1", "refuted"),
-        ("7", "proved"),
-    ],
-)
-def test_identities_of_the_euler_top(text, verdict):
-    function = parse_rational_function(text, ["x1", "x2", "x3", "eps"])
-    assert str(integral_verdict(EULER, function, None)[0]) == verdict
-    assert str(integral_verdict(EULER, function, fmpq(2, 5))[0]) == verdict
-
-
-def test_identities_with_symbols():
-    general = with_symbols(load("euler_top"), ["a1", "a2", "a3"])
-    ring = ["x1", "x2", "x3", "a1", "a2", "a3", "eps"]
-    right = parse_rational_function("(1 - eps^2*a3*a1*x2^2)/(1 - eps^2*a1*a2*x3^2)", ring)
-    # right for the numbers of the file, a1 = a3, but for no others
-    wrong = parse_rational_function("(1 - eps^2*a3^2*x2^2)/(1 - eps^2*a1*a2*x3^2)", ring)
-    assert integral_verdict(general, right, None)[0] is Verdict.PROVED
-    assert integral_verdict(general, wrong, None)[0] is Verdict.REFUTED
-
-
-def test_what_holds_at_one_eps_is_not_claimed_for_others():
-    oscillator = with_symbols(system("x y", "y", "-x + x^2"))
-    function = parse_rational_function("x^2*y^2/(x - 1)^2", ["x", "y", "eps"])
-    assert integral_verdict(oscillator, function, fmpq(1))[0] is Verdict.PROVED
-    assert integral_verdict(oscillator, function, fmpq(1, 2))[0] is Verdict.REFUTED
-    assert integral_verdict(oscillator, function, None)[0] is Verdict.REFUTED
-
-
-@pytest.mark.parametrize(
-    ("rhs", "eps", "text"),
-    [
-        (["x", "3*y"], 1, "y/x"),  # the map has no value anywhere
-        (["-x", "-y"], 1, "y/x"),  # all images are the origin, where y/x has none
-    ],
-)
-def test_identities_without_values_are_undecided(rhs, eps, text):
-    verdict, evidence = integral_verdict(
-        with_symbols(system("x y", *rhs)), parse_rational_function(text, ["x", "y", "eps"]), fmpq(eps)
-    )
-    assert verdict is Verdict.UNDECIDED
-    assert "not defined at any" in evidence.summary
-
-
-@pytest.mark.parametrize(
     ("file", "texts", "period"),
     [
         (system("x y", "0", "0"), ["x", "y"], 1),
-        (system("x", "0"), ["x"], 1),
         (system("x y", "x", "2*y"), [], None),
-        (system("x y", "x", "y"), ["y/x"], None),
         (system("x y", "x", "-y"), ["x*y"], None),
-        (system("x y", "1", "2"), ["2*x - y"], None),
         (system("x", "1"), [], None),
-        (system("x", "x"), [], None),
-        (system("x", "1 + x^2"), [], None),
         (system("x y", "y", "-x"), ["x^2 + y^2"], None),
-        pytest.param(system("x y z", "y", "-x", "1"), ["x^2 + y^2"], None, marks=pytest.mark.slow),
     ],
 )
 def test_simple_systems(file, texts, period):
@@ -237,12 +114,7 @@ def test_simple_systems(file, texts, period):
 
 @pytest.mark.parametrize(
     ("file", "eps", "period"),
-    [
-        (system("x y", "y", "-x + x^2"), 1, 4),
-        (system("x", "1 + x^2"), "1/2", 4),
-        (system("x y", "y", "-3*x"), "1/3", 6),
-        pytest.param(load("henon_heiles"), 1, 4, marks=pytest.mark.slow),
-    ],
+    [(system("x y", "y", "-x + x^2"), 1, 4), (system("x", "1 + x^2"), "1/2", 4)],
 )
 def test_maps_that_are_periodic_at_an_eps(file, eps, period):
     found = find_integrals(file, eps=eps)
@@ -259,40 +131,13 @@ def test_maps_that_are_periodic_at_an_eps(file, eps, period):
 
 @pytest.mark.parametrize(
     ("rhs", "eps", "words"),
-    [
-        (["x", "3*y"], 1, "no value anywhere"),
-        (["x", "3*y"], "1/3", "no value anywhere"),
-        (["-x", "-3*y"], 1, "not invertible"),
-        (["-x", "x*y + y^2"], 1, "not invertible"),
-    ],
+    [(["x", "3*y"], "1/3", "no value anywhere"), (["-x", "x*y + y^2"], 1, "not invertible")],
 )
 def test_maps_that_are_none_are_told(rhs, eps, words):
     found = find_integrals(system("x y", *rhs), eps=eps)
     assert (found.integrals, found.profile.nullities, found.profile.complete) == ((), (), False)
     assert words in found.reason
     assert f"eps = {eps}" in found.reason
-
-
-def test_nothing_is_concluded_at_a_neighbour_of_such_an_eps():
-    assert [one.text for one in find_integrals(system("x y", "-x", "-y"), eps="1/2").integrals] == ["y/x"]
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"eps": 0}, "found eps = 0"),
-        ({"eps": 0.5}, "0.5"),
-        ({"eps": 1, "symbols": ["eps"]}, "found eps both as a number and as a symbol"),
-        ({"symbols": ["a9"]}, "found the symbol 'a9'"),
-        ({"seconds": 0}, "found 0 seconds"),
-        ({"seconds": float("nan")}, "found nan seconds"),
-        ({"max_degree": 0}, "found the largest degree 0"),
-    ],
-)
-def test_wrong_use(options, words):
-    with pytest.raises(InputError) as caught:
-        find_integrals(load("euler_top"), **options)
-    assert words in str(caught.value)
 
 
 def test_too_little_time_is_told():
@@ -331,15 +176,6 @@ def test_spaces_that_are_conjugate_over_an_extension_do_no_harm(seed):
     assert all(one.verdict is Verdict.PROVED for one in found.integrals)
 
 
-def test_integrals_over_an_extension_are_found_as_rational_ones():
-    """u' = 2v + s u, v' = 3u^2 - 2 - s v with s^2 = 2, written in coordinates over Q: a cubic H over Q(s)."""
-    file = system("a b c d", "2*c + 2*b", "2*d + a", "3*a^2 + 6*b^2 - 2*d - 2", "6*a*b - c")
-    found = find_integrals(file)
-    assert len(found.integrals) == found.codimension == 2
-    for one in found.integrals:
-        assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}
-
-
 def test_quotients_of_affine_functions_come_first():
     """y/x, at once: the relations of higher degree are its multiples, and there are very many."""
     found = find_integrals(system("x y z", "x^2", "x*y", "x*z + y^2"))
@@ -359,11 +195,6 @@ def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_fo
     for text, expected in (("x1 + x2 + x3", True), ("x1 + x2 - x3", False), ("eps*x1 + eps*x2 + eps*x3", False)):
         function = parse_rational_function(text, [*three.variables, "eps"])
         assert _is_affine_integral(laboratory.system, function) is expected
-
-
-def test_on_the_line_orbits_that_show_nothing_show_that_there_is_no_integral():
-    found = IntegralSearch(None, (), None, 0, (), (), Profile(1, (0,), (0,), None, True, True), "")
-    assert found.count_text == "there is no integral (measured, relations of degree up to 1 along orbits)"
 
 
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):

@@ -4,13 +4,10 @@ A contracted hypersurface may come back only after dozens of steps, and no degre
 tables are computed here once more, with polynomials and gcds, for as long as the statements reach.
 """
 
-from __future__ import annotations
-
 import math
 import random
 import time
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 
 import pytest
@@ -22,13 +19,11 @@ from search_helpers import system as file_from
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow
 from kahanmaps.laboratory.singular.outcomes import (
@@ -72,18 +67,9 @@ def three_lines(*exponents: int) -> QuadraticSystem:
 
 # System, eps, growth and closed form of its degrees, and for how many steps the latter has to be tried.
 SLOW_GROWTH = [
-    *((resonant(k), None, "bounded", f"{k} for n >= {k - 1}", 40) for k in range(12, 26)),
+    (resonant(12), None, "bounded", "12 for n >= 11", 40),
     (resonant("41/2"), None, "linear", "n + 1", 60),
-    (planar("1", "x*y"), "1/10", "bounded", "102 for n >= 101", 110),
     (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 60),
-    (planar("1", "x*y"), None, "linear", "n + 1", 60),
-    (
-        QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "15*x*y", "y*z"]),
-        None,
-        "linear",
-        "15*n - 90 for n >= 13",
-        40,
-    ),
     (
         QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]),
         None,
@@ -93,12 +79,10 @@ SLOW_GROWTH = [
     ),
 ]
 # Systems whose first d_n are 2^n, and the first n with fewer.
-THREE_LINES = [((1, 3, 3), 8), ((1, 2, 6), 10), ((1, 3, 6), 11), ((1, 2, 5), 5), ((1, 4, 2), 8), ((2, 5, 3), 3)]
+THREE_LINES = [((1, 3, 3), 8), ((1, 2, 6), 10), ((2, 5, 3), 3)]
 
 
-@pytest.mark.parametrize(
-    ("system", "eps", "growth", "closed_form", "steps"), quick(SLOW_GROWTH, SLOW_GROWTH[:14:4] + SLOW_GROWTH[14:])
-)
+@pytest.mark.parametrize(("system", "eps", "growth", "closed_form", "steps"), SLOW_GROWTH)
 def test_where_growth_is_slow_the_law_holds_far_beyond_the_last_confinement(system, eps, growth, closed_form, steps):
     found = degree_growth(system, eps, seconds=60)
     assert (str(found.growth), found.recurrence.closed_form_text) == (growth, closed_form)
@@ -118,12 +102,12 @@ def test_three_lines_of_late_confinement_have_no_dynamical_degree_2(exponents, f
     assert found.dynamical_degree is None or found.dynamical_degree.text != "2"
 
 
-@pytest.mark.parametrize("exponents", [(1, 3, 3), (1, 2, 6), (1, 3, 6)])
-def test_seven_degrees_are_explained_by_a_pattern_that_is_longer(exponents):
+def test_seven_degrees_are_explained_by_a_pattern_that_is_longer():
     """So few terms are all 2^n; the pattern that lowers those after them is seen by the singularities."""
-    found = degree_growth(three_lines(*exponents), max_terms=7)
+    system = three_lines(1, 2, 6)
+    found = degree_growth(system, max_terms=7)
     assert found.degrees == tuple(2**n for n in range(8))
-    assert [found.explained.predict(n) for n in range(1, 13)] == polynomial_degrees(three_lines(*exponents), 12, 5)
+    assert [found.explained.predict(n) for n in range(1, 13)] == polynomial_degrees(system, 12, 5)
     assert (found.basis, found.unconfirmed) == ("explained: no other confinement within 1000 steps", "")
     # Without what the singularities explain there is an estimate only.
     length = max(found.patterns.lengths)
@@ -134,13 +118,6 @@ def test_seven_degrees_are_explained_by_a_pattern_that_is_longer(exponents):
         "iterates are needed (--seconds, --max-degree))"
     )
     assert measured.to_json()["unconfirmed"] == measured.unconfirmed != ""
-
-
-def test_the_issue_of_ten_terms():
-    system = planar("x*(7*x + 24*y)", "-y*(20*x + 3*y)")
-    found = degree_growth(system, max_degree=2000)
-    assert found.degrees[9:11] == (512, 1023)
-    assert found.recurrence.predict(11) == polynomial_degrees(system, 11, 5)[10]
 
 
 def test_degrees_that_the_singularities_do_not_explain_are_no_result():
@@ -155,24 +132,14 @@ def test_a_map_that_confines_nothing_is_said_to_do_so_within_the_steps_that_were
     found = degree_growth(load("lotka_volterra").system)
     assert found.growth_text == ("exponential growth, dynamical degree 2 (explained: no confinement within 400 steps)")
     assert degree_growth(load("lotka_volterra").system, steps=30).basis == "explained: no confinement within 30 steps"
-    assert degree_growth(load("zander_120").system).basis == "explained: no other confinement within 400 steps"
     assert degree_growth(load("euler_top").system).basis == "explained"
-    with pytest.raises(InputError, match="found 0 steps"):
-        degree_growth(load("euler_top").system, steps=0)
-
-
-def test_steps_too_few_for_a_pattern_are_named_with_what_they_missed():
-    """With 10 steps nothing is seen of what comes after 20, and nothing else is claimed."""
-    found = degree_growth(resonant(20), steps=10, max_terms=15)
-    assert found.basis == "explained: no confinement within 10 steps"
-    assert degree_growth(resonant(20), max_terms=15).recurrence.closed_form_text == "20 for n >= 19"
 
 
 # The patterns themselves
 
 
-@pytest.mark.parametrize("k", [13, 20, 31])
-def test_the_pole_of_a_resonant_system_is_confined_after_k_steps(k):
+def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
+    k = 13
     run = singularities(resonant(k), "1/7")
     ends = [(h.confined_at, h.settled_at) for h in run.hypersurfaces if h.status == CONFINED]
     assert ends == [(k, k)]
@@ -190,22 +157,14 @@ def test_a_hypersurface_that_is_followed_as_a_point_comes_back():
 
 @pytest.mark.parametrize(
     ("name", "lengths", "searched"),
-    [
-        ("euler_top", (3,), None),
-        ("nahm_icosahedral", (3, 4, 7), None),
-        ("weierstrass", (2, 4, 6), None),
-        ("lotka_volterra", (2,), 400),
-        ("zander_120", (1, 4), 400),
-        ("riccati", (), None),
-        ("volterra_periodic_5", (2,), 100),
-    ],
+    [("euler_top", (3,), None), ("lotka_volterra", (2,), 400), ("zander_120", (1, 4), 400), ("riccati", (), None)],
 )
 def test_the_lengths_of_patterns_in_the_catalogue(name, lengths, searched):
     found = patterns(load(name).system, None)
     assert (found.lengths, found.searched, found.running) == (lengths, searched, "")
 
 
-@pytest.mark.parametrize("name", ["weierstrass", "volterra_periodic_4", "paper_m2", "lotka_volterra"])
+@pytest.mark.parametrize("name", ["weierstrass", "volterra_periodic_4"])
 def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
     system = load(name).system
     written = patterns(system, None)
@@ -213,29 +172,13 @@ def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
     assert patterns(system, None) == written
 
 
-@pytest.mark.parametrize("name", ["mcmillan", "lyness", "todd", "hietarinta_viallet"])
+@pytest.mark.parametrize("name", ["mcmillan", "todd"])
 def test_random_points_have_the_degrees_of_polynomials_for_explicit_maps(name, monkeypatch):
     """Of equations that are not linear in the old point, nor is that of the inverse."""
     map_ = load(name).map
     written = patterns(map_, None)
     monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.WRITTEN_DIMENSION", 1)
     assert patterns(map_, None).series == written.series != ()
-
-
-@pytest.mark.parametrize(
-    ("last", "growth", "degrees"),
-    [
-        ("(x2*x5 + x3*x4)/x1", Growth.QUADRATIC, (1, 2, 3, 4, 6, 9, 11, 14, 18, 22)),  # Somos-5
-        ("x1 + x3^3 - x4*x2", Growth.EXPONENTIAL, (1, 3, 3, 4, 9, 9, 12, 27, 27, 36)),  # x3^3 every third step
-        ("(x2*x5 + x3^2 + 7)/x1", Growth.UNKNOWN, (1, 2, 3, 4, 6, 9, 13, 18, 26, 38)),
-    ],
-)
-def test_explicit_maps_of_dimension_five_are_explained_or_say_how_far_they_were_followed(last, growth, degrees):
-    image = ", ".join(f'"{text}"' for text in ("x2", "x3", "x4", "x5", last))
-    file = parse_system(f'variables = ["x1", "x2", "x3", "x4", "x5"]\n[map]\nimage = [{image}]')
-    found = degree_growth(file.map, max_degree=2000)
-    assert (found.growth, found.degrees[:10]) == (growth, degrees)
-    assert bool(found.patterns.series) == (not found.patterns.running) == (growth is not Growth.UNKNOWN)
 
 
 def test_two_eps_that_differ_leave_the_patterns_open():
@@ -275,38 +218,18 @@ def test_a_recurrence_needs_terms_beyond_all_patterns():
 # The report
 
 
-LATE = {
-    "resonant 20": (("x y", "x^2", "20*x*y"), None, "linearisable", "bounded"),
-    "resonant 17": (("x y", "x^2", "17*x*y"), None, "linearisable", "bounded"),
-    "step 101": (("x y", "1", "x*y"), "1/10", "linearisable", "bounded"),
-    "space": (("x y z", "x^2", "15*x*y", "y*z"), None, "integrable", "linear"),
-}
-LATE |= {
-    f"lines {exponents}": (("x y", *rhs), None, "not integrable", "exponential")
-    for exponents, rhs in {
-        (1, 3, 3): ("3*x*(x + 2*y) + 6*x*y", "-(y*(x + 2*y) + 3*x*y)"),
-        (1, 2, 6): ("2*x*(x + 2*y) + 12*x*y", "-(y*(x + 2*y) + 6*x*y)"),
-        (1, 2, 5): ("2*x*(x + 2*y) + 10*x*y", "-(y*(x + 2*y) + 5*x*y)"),
-        (1, 4, 2): ("4*x*(x + 2*y) + 4*x*y", "-(y*(x + 2*y) + 2*x*y)"),
-        (2, 5, 3): ("5*x*(x + 2*y) + 6*x*y", "-(2*y*(x + 2*y) + 3*x*y)"),
-    }.items()
-}
+LATE = [
+    (("x y", "x^2", "17*x*y"), "linearisable", "bounded"),
+    (("x y", "2*x*(x + 2*y) + 12*x*y", "-(y*(x + 2*y) + 6*x*y)"), "not integrable", "exponential"),
+]
 
 
-@cache
-def analysed(name: str) -> Analysis:
-    given, eps, _, _ = LATE[name]
-    return analyze(file_from(*given), eps=eps, seconds=20)
-
-
-@pytest.mark.parametrize(
-    "name", [n if n.startswith("resonant") else pytest.param(n, marks=pytest.mark.slow) for n in LATE]
-)
-def test_the_parts_of_a_report_do_not_contradict_each_other(name):
-    found, (_, eps, kind, growth) = analysed(name), LATE[name]
+@pytest.mark.parametrize(("given", "kind", "growth"), quick(LATE, LATE[:1]))
+def test_the_parts_of_a_report_do_not_contradict_each_other(given, kind, growth):
+    found = analyze(file_from(*given), seconds=20)
     assert (found.conclusion.kind, found.conclusion.growth) == (kind, growth)
     assert contradictions(found) == []
-    true = polynomial_degrees(found.file.system, 14 if growth == "exponential" else 30, 3, eps)
+    true = polynomial_degrees(found.file.system, 14 if growth == "exponential" else 30, 3)
     law = found.degrees.recurrence
     assert law is None or [law.predict(n) for n in range(1, len(true) + 1)] == true
     assert "estimated" in found.conclusion.sentence or law is not None
@@ -349,15 +272,6 @@ def test_what_excludes_each_other_is_undecided():
     assert contradictions(replace(found, integrals=closed)) == [
         "orbits close after 4 steps, but the degrees seem to grow"
     ]
-
-
-@pytest.mark.parametrize(
-    ("dim", "integrals", "expected"),
-    [(1, None, False), (1, 0, False), (2, None, False), (2, 0, False), (2, 1, True), (3, 1, False), (3, 2, True)],
-)
-def test_orbits_lie_on_curves_where_one_integral_less_than_the_dimension_is_known(dim, integrals, expected):
-    known = None if integrals is None else SimpleNamespace(integrals=(0,) * integrals)
-    assert orbits_lie_on_curves(SimpleNamespace(dim=dim, integrals=known)) == expected
 
 
 def beside(kind, growth, lengths=None, heights=(21, 5)):
@@ -407,20 +321,6 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
     assert (late.status, late.note) == (UNDECIDED, NO_TIME)
 
 
-@pytest.mark.parametrize("gradient", [[0, 3, 5, 0], [2, 0, 0, 7], [0, 0, 0, 4]])
-@pytest.mark.parametrize("point", [[1, 2, 3, 4], [0, 5, 96, 0], [3, 0, 0, 1]])
-def test_tangents_annihilate_the_gradient_and_span_the_tangent_space_with_the_point(gradient, point):
-    p = 101
-    on = [*point]
-    pivot = next(k for k in range(4) if gradient[k])
-    rest = sum(g * x for k, (g, x) in enumerate(zip(gradient, on, strict=True)) if k != pivot)
-    on[pivot] = -rest * pow(gradient[pivot], -1, p) % p
-    tangents = _tangents(on, gradient, GF(p))
-    assert len(tangents) == 2
-    assert all(sum(g * x for g, x in zip(gradient, vector, strict=True)) % p == 0 for vector in [on, *tangents])
-    assert rank([on, *tangents], p) == 3
-
-
 def test_only_the_pivot_leaves_no_tangents():
     assert _tangents([0, 5, 0], [0, 7, 0], GF(101)) is None
 
@@ -442,11 +342,6 @@ def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
     found = degree_growth(top, eps, seconds=20)
     assert (found.patterns.lengths, found.patterns.running) == ((3,), "")
     assert [found.recurrence.predict(n) for n in (5, 50)] == [51, 5001]
-
-
-def test_what_still_runs_is_said_before_what_was_found():
-    assert Patterns((3,), None, True).text == "nothing new after step 3"
-    assert Patterns((3,), None, True, "x = 0 is undecided").text == "x = 0 is undecided"
 
 
 def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
@@ -513,7 +408,6 @@ def test_patterns_are_the_fates_of_what_is_contracted(hypersurfaces, expected):
     [
         (3, {"most": 63}, (["first"], False, [8, 32, 63])),
         (3, {"most": 64}, (["first", "t", "last"], True, [8, 32, 64])),
-        (2, {}, (["first", "t"], True, [8, 24, 56, 120])),
         (3, {"end": 0.0}, (["first"], False, [8])),
         (1, {"end": 0.0}, (["first"], True, [8])),
     ],
@@ -535,3 +429,15 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
     limits = Range(0, 0, 0, options.get("end", math.inf))
     run, whole = Course((), (), (), limits).steps(steps, most=options.get("most", 4096))
     assert ([step.name for step in run], whole, tried) == found
+
+
+def test_steps_too_few_for_a_pattern_are_named_with_what_they_missed():
+    """With 10 steps nothing is seen of what comes after 20, and nothing else is claimed."""
+    found = degree_growth(resonant(20), steps=10, max_terms=15)
+    assert found.basis == "explained: no confinement within 10 steps"
+    assert degree_growth(resonant(20), max_terms=15).recurrence.closed_form_text == "20 for n >= 19"
+
+
+def test_what_still_runs_is_said_before_what_was_found():
+    assert Patterns((3,), None, True).text == "nothing new after step 3"
+    assert Patterns((3,), None, True, "x = 0 is undecided").text == "x = 0 is undecided"

@@ -4,18 +4,13 @@ Specified here: `analyze` finds A, T and the centre, says what the theorems give
 in the coordinates of the system; a Hamiltonian that is no member is not taken for one.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
 from flint import fmpq, fmpq_poly
-from helpers import random_point
 from planar_helpers import invertible, moved
 from schema_helpers import mistakes
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
@@ -26,17 +21,13 @@ from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.consistency import contradictions
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import constant_structures
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
 MEMBERS = {
     "m = 2, split": draw_with_eigenvalues(["1/2", -7], 3),
-    "m = 2, irreducible": draw_with_chi(t**2 - 2, 1),
-    "m = 3, split": draw_with_eigenvalues([1, -2, 3], 2),
     "m = 3, partly split": draw_with_chi((t - 1) * (t**2 + 1), 1),
-    "m = 3, irreducible": draw_with_chi(t**3 - t - 1, 1),
 }
 over_members = pytest.mark.parametrize("name", MEMBERS)
 
@@ -98,41 +89,9 @@ def test_the_matrices_that_are_given_are_those_of_the_system(name):
     )
 
 
-@pytest.mark.parametrize("name", ["m = 2, irreducible", "m = 3, split"])
-def test_the_poisson_tensor_is_invariant_in_these_coordinates(name):
-    system, eps = elsewhere(MEMBERS[name].H, 7), fmpq(1, 9)
-    J, kahan, x = constant_structures(system).hamiltonian.J, KahanMap(system, eps), random_point(system.dim, 4)
-
-    def tensor(point, factor):
-        slope = system.over(QQ).jacobian(point)
-        return J - slope * slope * J * (factor * eps * eps)
-
-    change, image = kahan.jacobian(x), kahan.step(x)
-    for factor in (1, -1, 0):
-        assert (change * tensor(x, factor) * change.transpose() == tensor(image, factor)) == (factor == 1)
-
-
-@over_members
-def test_the_integrals_of_the_chain_are_found_and_in_involution(name):
-    system = elsewhere(MEMBERS[name].H, 8)
-    structures = constant_structures(system)
-    assert len(structures.forms) == system.dim // 2
-    x = random_point(system.dim, 2)
-    gradients = [[slope(*x) for slope in map(H.derivative, range(system.dim))] for H in structures.functions]
-    rows = QQ.matrix(len(gradients), system.dim, [entry for row in gradients for entry in row])
-    assert rank(QQ, rows) == system.dim // 2
-    assert all(entry == 0 for entry in (rows * structures.hamiltonian.J * rows.transpose()).entries())
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("n", [4, 6])
-def test_a_cubic_that_is_no_member_is_not_taken_for_one(n, seed):
-    names = default_variables(n)
-    text = " + ".join(
-        [*(f"{k + seed}*{x}^3" for k, x in enumerate(names)), "*".join(names[:3]), f"{names[0]}^2*{names[3]}"]
-    )
-    system = elsewhere(parse_polynomial(text, names), seed)
-    found = analysed(system)
+def test_a_cubic_that_is_no_member_is_not_taken_for_one():
+    text = "x1^3 + 2*x2^3 + 3*x3^3 + 4*x4^3 + x1*x2*x3 + x1^2*x4"
+    found = analysed(elsewhere(parse_polynomial(text, default_variables(4)), 1))
     assert found.structure.reason.startswith("only the multiples of I satisfy")
     assert found.to_json()["member"] is found.to_json()["family"] is None
     assert not any("commuting family" in line for line in proved(found))
@@ -152,13 +111,6 @@ def test_a_member_with_a_repeated_root_is_said_to_be_one_and_no_more():
         "belongs to the commuting family: a hidden member of the family, chi = (t - 1)^2"
     ]
     assert found.to_json()["member"] is None
-
-
-def test_a_member_in_its_own_coordinates_keeps_them():
-    found = analysed(load("paper_m2").system)
-    assert (found.structure.T, any(found.centre)) == (None, False)
-    assert found.structure.A == found.structure.form.A
-    assert any(line.endswith("a hidden member of the family, chi = (t - 1)*(t - 2)") for line in proved(found))
 
 
 def test_degrees_that_seem_exponential_do_not_go_with_a_member():

@@ -1,7 +1,5 @@
 """The curves of a planar integral: their genus and base points, known from elsewhere, and what must not be said."""
 
-from __future__ import annotations
-
 import random
 import time
 from dataclasses import replace
@@ -10,7 +8,7 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
@@ -39,17 +37,13 @@ def summary(found: Pencil) -> tuple[int, int, int, dict[int, tuple[int, int]]]:
 
 
 KNOWN = [  # by hand
-    ("x", (1, 1, 0, {1: (1, 0)})),  # lines through a point at infinity
     ("x*y", (1, 2, 0, {1: (4, 2)})),  # two asymptotes, each a tangent at infinity
-    ("x^2 + y^2", (1, 2, 0, {1: (4, 2)})),  # the circular points, conjugate
     ("x^3 - y", (1, 3, 0, {2: (1, 0), 1: (5, 5)})),  # cusps at infinity
     ("y^2 - x^3 - x", (1, 3, 1, {1: (9, 8)})),  # Weierstrass form: all at the flex at infinity
-    ("x^4 + y^4 + x", (1, 4, 3, {1: (16, 12)})),  # smooth, four points at infinity, four times each
     ("(x^4 + y^4 + x)/(x^3*y + y^2 + 1)", (1, 4, 3, {1: (16, 0)})),  # as two generic quartics
     ("(x^2*y^2 + 2*x + 5*y^2 + 3)/(x^2*y^2 + 3*x*y^2 + 7*x^2 + 1)", (1, 4, 1, {2: (2, 0), 1: (8, 0)})),  # QRT
     ("x*y*(x + y - 1)", (1, 3, 1, {1: (9, 6)})),  # three lines with the exponents 1, 1, 1
     ("x^2*y*(x + y - 1)", (1, 4, 1, {2: (2, 1), 1: (8, 6)})),  # 2, 1, 1
-    ("x^3*y^2*(x + y - 1)", (1, 6, 1, {3: (2, 1), 2: (3, 2), 1: (6, 5)})),  # 3, 2, 1
 ]
 
 
@@ -58,7 +52,7 @@ def test_curves_that_are_known(text, known):
     assert summary(curves(text)) == known
 
 
-@pytest.mark.parametrize("a", [-5, -3, -2, -1, 1, 2, 3, 5])
+@pytest.mark.parametrize("a", [-3, -1, 3])
 def test_points_over_an_extension_count_as_often_as_they_have_conjugates(a):
     # Two double points at infinity, as those of bicircular quartics; then a double point with two tangents that all
     # curves have, on each of which they meet once more.
@@ -67,29 +61,11 @@ def test_points_over_an_extension_count_as_often_as_they_have_conjugates(a):
     assert summary(curves(f"(y^2 + {a}*x^2 + x^3)/(x^4 + y^4)")) == (1, 4, 2, {2: (1, 0), 1: (12, 4)})
 
 
-@pytest.mark.parametrize("a", [-3, -2, -1, 2, 3, 5])
-def test_points_near_to_points_over_an_extension_may_need_a_larger_one(a):
-    # Of the curves of genus 2 above, in (q, y), the triple cover with q = x^3 - 5: branched in the four points with
-    # q = -5 and the four at infinity, 2 g - 2 = 3 (2*2 - 2) + 2*8.
-    assert curves(f"(y^2 + {a}*(x^3 - 5)^2 + (x^3 - 5)^3)/((x^3 - 5)^4 + y^4)").genus == 12
-
-
-@pytest.mark.parametrize(
-    ("outer", "components"), [("({})^2", 2), ("({0})^3 + ({0})", 3), ("(({0})^2 + 1)/({0})", 2), ("1/({})", 1)]
-)
-@pytest.mark.parametrize("text", ["x^2 + y^2", "x^3 + x - y^2", "(x^2*y + y^2 + 1)/(x*y + 2)"])
+@pytest.mark.parametrize(("outer", "components"), [("({})^2", 2), ("(({0})^2 + 1)/({0})", 2), ("1/({})", 1)])
+@pytest.mark.parametrize("text", ["x^2 + y^2", "(x^2*y + y^2 + 1)/(x*y + 2)"])
 def test_of_curves_with_several_components_one_is_taken(text, outer, components):
     alone, composed = summary(curves(text)), summary(curves(outer.format(text)))
     assert composed == (components, *alone[1:])
-
-
-def test_a_common_factor_is_no_part_of_the_curves():
-    x, y, _ = ring(["x", "y", "eps"]).gens()
-    P, Q, common = y**2 - x**3 - x, x * y + 1, x**2 + y - 3
-    plain, padded = RationalFunction(P, Q), RationalFunction(P * common, Q * common)
-    found = [pencil_of("I", function, None, seconds=SECONDS) for function in (plain, padded)]
-    assert found[0] is not None
-    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -113,17 +89,11 @@ def _is_inside(i: int, j: int, points: list[tuple[int, int]]) -> bool:
     return True
 
 
-@pytest.mark.parametrize("text", ["y^2 - x^3 - x", "x*y", "y^2 - x^5 - x", "(x^2*y + y^2 + 1)/(x*y + 2)"])
+@pytest.mark.parametrize("text", ["y^2 - x^3 - x", "y^2 - x^5 - x"])
 def test_the_genus_stays_under_birational_maps(text):
     before = curves(text).genus
     for x, y in [("(x + y^2)", "y"), ("(2*x - y)", "(x + 3)"), ("x", "(1/(x*y))")]:
         assert curves(text.replace("x", "X").replace("y", y).replace("X", x)).genus == before
-
-
-def test_special_eps_have_curves_of_their_own():
-    text = "y^2 - x^3 - (eps - 1)*x^2*y^2"
-    assert curves(text).degree == 4
-    assert curves(text, fmpq(1)).degree == 3
 
 
 def test_nothing_is_said_beyond_the_degree_or_the_time():

@@ -1,11 +1,9 @@
 """Poisson tensors that a map preserves, found: those of the literature, with their Casimirs, and no others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import fmpq
 from helpers import random_point
 from search_helpers import random_system, system
 
@@ -15,7 +13,6 @@ from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.preserve.poisson import poisson_tensors
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 
@@ -30,7 +27,6 @@ def a_map(variables, image, inverse, **parameters):
 LYNESS = a_map("x y", ["y", "(a + y)/x"], ["(a + x)/y", "x"], a="2/3")
 # x_{n+4} x_n = x_{n+3} x_{n+1} + x_{n+2}^2 and x_{n+5} x_n = x_{n+4} x_{n+1} + x_{n+3} x_{n+2}
 SOMOS_4 = a_map("x y z w", ["y", "z", "w", "(y*w + z^2)/x"], ["(x*z + y^2)/w", "x", "y", "z"])
-SOMOS_5 = a_map("x y z w v", ["y", "z", "w", "v", "(v*y + w*z)/x"], ["(x*w + y*z)/v", "x", "y", "z", "w"])
 HENON = a_map("x y", ["y + 1 - 2*x^2", "x/3"], ["3*y", "x - 1 + 18*y^2"])  # det dPhi = -1/3
 
 
@@ -61,13 +57,10 @@ def holds_exactly(file, one, eps):
 @pytest.mark.parametrize(
     ("file", "rank", "log_canonical"),
     [
-        (load("lotka_volterra"), 2, [[0, 1], [-1, 0]]),
         (LYNESS, 2, [[0, 1], [-1, 0]]),
         # Gekhtman, Shapiro and Vainshtein; Hone and Fordy: the bracket of the cluster algebra, of rank 2
         (SOMOS_4, 2, [[0, 1, 2, 3], [-1, 0, 1, 2], [-2, -1, 0, 1], [-3, -2, -1, 0]]),
-        (SOMOS_5, 2, [[j - i for j in range(5)] for i in range(5)]),
         (nested(4), 4, [[(j > i) - (j < i) for j in range(4)] for i in range(4)]),
-        (nested(5), 4, [[(j > i) - (j < i) for j in range(5)] for i in range(5)]),
     ],
 )
 def test_log_canonical_brackets_of_the_literature(file, rank, log_canonical):
@@ -92,20 +85,8 @@ def test_integrals_and_casimirs_of_the_euler_top():
     assert [one.casimirs for one in found.tensors] == [("I1",), ("I2",), ("I1/I2",)]
     assert all(one.is_liouville_integrable for one in found.tensors)
     assert found.pencil is PROVED  # tri-Hamiltonian
+    assert found.note == "they are compatible: every combination of them is a Poisson tensor (proved)"
     assert all(holds_exactly(load("euler_top"), one, "-2/3") for one in found.tensors)
-
-
-def test_invariant_bivectors_that_are_no_poisson_tensors_come_last():
-    found = find_poisson(nested(4))
-    assert [(one.name, one.jacobi, one.rank) for one in found.tensors] == [
-        ("P1", PROVED, 4),
-        ("P2", PROVED, 2),
-        ("P3", REFUTED, 2),
-        ("P4", REFUTED, 2),
-    ]
-    assert found.pencil is None
-    assert "the Jacobi identity fails" in found.tensors[2].statement
-    assert not any(one.is_liouville_integrable for one in found.tensors[1:])
 
 
 def test_of_more_integrals_than_can_be_in_involution_a_largest_choice_is():
@@ -130,13 +111,6 @@ def test_of_more_integrals_than_can_be_in_involution_a_largest_choice_is():
     assert bracket(0, 1) == 0 != bracket(1, 2)
 
 
-def test_a_rotation_has_a_constant_and_a_lie_poisson_bracket():
-    # x' = w x x: the Cayley transform of a rotation, in SO(3)
-    found = find_poisson(system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x"), 1)
-    assert brackets(found)[:2] == ["{x,y} = 3, {x,z} = -2, {y,z} = 1", "{x,y} = z, {x,z} = -y, {y,z} = x"]
-    assert [one.casimirs for one in found.tensors[:2]] == [("I1",), ("I2",)]  # w.x and |x|^2
-
-
 ROTATION = system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x")  # about w = (1, 2, 3)
 ALONG, SQUARE = "(x + 2*y + 3*z)", "(x^2 + y^2 + z^2)"
 
@@ -152,12 +126,10 @@ def casimirs_of_lie_poisson(*texts):
 @pytest.mark.parametrize(
     ("integrals", "casimirs"),
     [
-        ((ALONG, f"{SQUARE} + 3*{ALONG}^2"), ("3*I1^2 - I2",)),
         ((ALONG, f"{SQUARE} + eps^2*{ALONG}^2 + {ALONG}"), ("I1^2*eps^2 + I1 - I2",)),
         ((f"{SQUARE}^2*{ALONG}^3", f"{SQUARE}*{ALONG}"), ("I1/I2^3",)),
         ((f"{ALONG}^2/{SQUARE}", f"1/{ALONG}"), ("I1*I2^2",)),
         ((ALONG,), ()),  # w.x is none
-        ((f"{SQUARE} + {ALONG}",), ()),
         ((ALONG, f"{SQUARE} + {ALONG}^3"), ()),  # of a higher degree than is tried
         ((SQUARE, ALONG), ("I1",)),  # enough, and no functions of it
     ],
@@ -171,40 +143,6 @@ def test_a_function_that_is_said_to_be_a_casimir_is_put_to_the_proof(monkeypatch
     wrong = [("I1*I2", parse_rational_function(f"{ALONG}*{SQUARE}", names))]
     monkeypatch.setattr(poisson_tensors, "casimir_candidates", lambda *given: iter(wrong))
     assert casimirs_of_lie_poisson(ALONG, f"{SQUARE} + {ALONG}") == ()
-
-
-def test_products_of_integrals_and_tensors_are_left_out():
-    file = a_map("x y z", ["x", "y + x", "z + y"], ["x", "y - x", "z - y + x"])
-    assert brackets(find_poisson(file, 1, integrals=())) == brackets(find_poisson(file, 3, integrals=()))
-    assert "{y,z} = 1" in brackets(find_poisson(file, 1, integrals=()))  # and x times it, and x^2
-
-
-def test_the_tensor_of_the_paper_is_among_those_of_its_member():
-    # Pi = J - eps^2 f'^2 J has degree 2: at eps = 0 it is J, which the two tensors span there
-    file = load("paper_m2")
-    found = find_poisson(file, eps="1/5")
-    kahan, x = file.map.at("1/5"), random_point(4, 3)
-    slope = kahan.vector_field_jacobian(x)
-    J = file.hamiltonian.J
-    Pi = J - slope * slope * J * fmpq(1, 25)
-    values = [one.tensor.value(QQ, kahan.eps, x) for one in found.tensors]
-    assert len(values) == 2
-    assert fmpq_mat([value.entries() for value in (*values, Pi)]).rank() == 2
-
-
-def test_formulas_with_symbols_are_those_with_numbers():
-    general = find_poisson(load("weierstrass"), symbols=["g2"])
-    assert brackets(general) == ["{x,y} = 12*x*eps^2 - 1"]
-    general = find_poisson(LYNESS, symbols=["a"])
-    assert (brackets(general), general.tensors[0].verdict) == (["{x,y} = x*y"], PROVED)
-
-
-def test_a_denominator_divides_all_entries():
-    # for Lotka and Volterra {x,y} = x y alone: over x the numerator has degree 3
-    over = parse_rational_function("x*(1 + eps)", ["x", "y", "eps"])
-    assert brackets(find_poisson(load("lotka_volterra"), 2, denominator=over, integrals=())) == []
-    found = find_poisson(load("lotka_volterra"), 3, denominator=over, integrals=())
-    assert [(one.text, one.verdict) for one in found.tensors] == [("{x,y} = x*y/(eps + 1)", PROVED)]
 
 
 def test_the_factors_of_a_density_are_tried_as_a_denominator():
@@ -223,9 +161,7 @@ def test_the_factors_of_a_density_are_tried_as_a_denominator():
     ("file", "degree"),
     [
         (HENON, 6),  # volume shrinks by 1/3 everywhere
-        (random_system(2, 0), 4),
         (random_system(3, 1), 3),
-        (load("lorenz"), 2),
         (load("henon_heiles"), 2),  # the map is not symplectic for any such structure
     ],
 )
@@ -233,25 +169,6 @@ def test_maps_without_structure_have_none(file, degree):
     found = find_poisson(file, degree)
     assert (found.tensors, found.degree, found.toml_section()) == ((), degree, "")
     assert found.reason.startswith(f"no tensor of degree at most {degree} is preserved (measured modulo a prime)")
-
-
-def test_log_canonical_brackets_are_found_in_many_dimensions():
-    file = nested(10)
-    found = find_poisson(file, integrals=())
-    [one] = found.tensors
-    terms = [f"{{{p},{q}}} = {p}*{q}" for i, p in enumerate(file.variables) for q in file.variables[i + 1 :]]
-    assert (one.text, one.rank, one.jacobi) == (", ".join(terms), 10, PROVED)
-    assert holds_exactly(file, one, "1/10")
-    assert (
-        found.reason
-        == "degrees above 1 were tried for brackets c_ij x_i x_j only: such tensors have too many coefficients"
-    )
-    rhs = [str(p) for p in file.system.rhs]
-    other = find_poisson(system(" ".join(file.variables), *rhs[:-1], f"{rhs[-1]} + x9*x0"), integrals=())
-    assert other.tensors == ()
-    assert other.reason.startswith(
-        "no tensor of degree at most 1 is preserved (measured modulo a prime); degrees above 1"
-    )
 
 
 def test_degrees_with_too_many_unknowns_are_left_out_and_told(monkeypatch):
@@ -276,13 +193,15 @@ def test_a_pencil_is_one_of_at_least_two_tensors_and_of_not_too_many(monkeypatch
     assert find_poisson(load("weierstrass"), integrals=()).pencil is None
 
 
+def test_a_denominator_divides_all_entries():
+    # for Lotka and Volterra {x,y} = x y alone: over x the numerator has degree 3
+    over = parse_rational_function("x*(1 + eps)", ["x", "y", "eps"])
+    assert brackets(find_poisson(load("lotka_volterra"), 2, denominator=over, integrals=())) == []
+    found = find_poisson(load("lotka_volterra"), 3, denominator=over, integrals=())
+    assert [(one.text, one.verdict) for one in found.tensors] == [("{x,y} = x*y/(eps + 1)", PROVED)]
+
+
 def test_a_tensor_for_one_eps_is_told_as_such():
     found = find_poisson(load("weierstrass"), eps="1/3")
     assert brackets(found) == ["{x,y} = 4*x - 3"]
     assert found.toml_section().startswith("# for eps = 1/3 only")
-
-
-@pytest.mark.parametrize("wrong", [{"degree": -1}, {"seconds": 0}, {"eps": 0}, {"symbols": ["q"]}])
-def test_wrong_use_is_refused(wrong):
-    with pytest.raises(InputError):
-        find_poisson(load("weierstrass"), **wrong)

@@ -1,7 +1,5 @@
 """Integrals and densities that are products of powers: those of the literature at degrees that no search reaches."""
 
-from __future__ import annotations
-
 import random
 from functools import reduce
 
@@ -45,12 +43,6 @@ def nested(n):
     return volterra([[(j > i) - (j < i) for j in range(n)] for i in range(n)])
 
 
-def circular(n, k):
-    """a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k, skew."""
-    return volterra([[0 if i == j else (1 if abs(j - i) < n - k else -1) * (1 if j > i else -1) for j in range(n)]
-                     for i in range(n)])  # fmt: skip
-
-
 def tree(n, edges, seed):
     """Rows of the matrix differ along an edge (i, k) by a x_i + b x_k, so that this is a Darboux polynomial."""
     rng = random.Random(seed)
@@ -84,11 +76,8 @@ def is_density(file, phi, eps):
     ("file", "phi"),
     [
         (nested(7), "x2^2*x4^2*x6^2"),
-        (nested(8), None),  # x1 x2 ... x8, and that times integrals
         (tree(3, [(0, 1), (1, 2)], "path3"), None),
-        (tree(5, [(0, 1), (1, 2), (2, 3), (3, 4)], "path"), None),
         (tree(6, [(0, 1), (0, 2), (0, 3), (3, 4), (3, 5)], "two stars"), None),
-        (load("volterra_periodic_5"), None),
     ],
 )
 def test_the_measures_of_lotka_volterra_systems(file, phi):
@@ -97,40 +86,6 @@ def test_the_measures_of_lotka_volterra_systems(file, phi):
     assert is_density(file, one.text, "1/10")
     assert is_density(file, one.text, "-3/7")
     assert verdict_on(file.map, one.function, None, is_density=True)[0].holds
-
-
-def test_a_density_of_a_high_degree_is_found_where_polynomials_are_too_many():
-    found = find_densities(nested(7))
-    assert [(one.text, one.verdict, found.degree) for one in found.densities] == [
-        ("x1*x2*x3*x4*x5*x6*x7", Verdict.PROVED, 6),
-        ("x2^2*x4^2*x6^2", Verdict.SUPPORTED, 6),
-    ]
-    assert "phi = " in found.toml_section()
-    assert find_densities(nested(7), max_degree=5, seconds=1).densities == ()  # not where a smaller one was asked for
-
-
-def test_a_density_need_not_be_a_product_of_darboux_polynomials():
-    lyness = a_map("x y", ["y", "(2 + y)/x"], ["(2 + x)/y", "x"])
-    one = found_in(lyness).density
-    assert [(str(g), k) for g, k in one.factors] == [("x", 1), ("y", 1)]
-    assert is_density(lyness, one.text, 1)
-
-
-@pytest.mark.slow
-@pytest.mark.thorough
-def test_a_product_over_the_determinant_is_the_third_integral_of_a_circular_system():
-    # beside the sum of all x and the modified Hamiltonian
-    file = circular(7, 3)
-    found = find_integrals(file, seconds=20)
-    assert len(found.integrals) == found.codimension == 3
-    last = found.integrals[-1]
-    assert last.text.startswith("x1*x2*x3*x4*x5*x6*x7/(")
-    assert last.origin == "product of powers of known polynomials"
-    kahan = file.map.at("1/10")
-    x = kahan.point([1, 2, -3, "1/2", 5, -1, "2/3"])
-    before, after = (last.function.value(kahan.field, (*place, kahan.eps)) for place in (x, kahan.step(x)))
-    assert before == after != 0
-    assert before == reduce(lambda a, b: a * b, x) / -kahan.determinant(x)
 
 
 def test_numbers_other_than_1_make_integrals_that_depend_on_time():
@@ -162,26 +117,7 @@ def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
     assert find_densities(load("lotka_volterra")).turning is None
 
 
-def test_a_sign_is_taken_away_by_a_square():
-    found = found_in(a_map("x y", ["-x", "y + x^2"], ["-x", "y - x^2"]))
-    assert [one.text for one in found.integrals] == ["x^2"]
-    assert [(one.text, str(one.constant.numerator)) for one in found.in_time] == [("x", "-1")]
-    assert found.density is not None  # det dPhi = -1: x
-    assert found.density.text == "x"
-
-
-def test_numbers_may_depend_on_symbols():
-    file = system("x y z", "a*x", "-a*y + x*y", "-z*x", a="2/3")
-    [one] = [one for one in found_in(file, ["a"]).in_time if one.text == "x"]
-    assert str(one.constant.numerator / one.constant.denominator.leading_coefficient()) in ("a*eps + 1", "-a*eps - 1")
-
-
-def test_for_a_given_eps_the_factors_are_those_at_that_eps():
-    found = found_in(load("weierstrass"), eps="1/3")
-    assert found.density.text == "4*x - 3"
-
-
-@pytest.mark.parametrize("file", [random_system(2, 0), random_system(3, 1), load("henon_heiles")])
+@pytest.mark.parametrize("file", [random_system(2, 0), load("henon_heiles")])
 def test_maps_without_structure_have_no_products(file):
     found = found_in(file)
     assert (found.integrals, found.in_time) == ((), ())
@@ -237,7 +173,7 @@ def test_a_coprime_base_makes_the_polynomials_again(seed):
         assert one.degree() == 0
 
 
-@pytest.mark.parametrize("missing", [set(), {1, 2}, {3, 7, 8}, set(range(1, 24))])
+@pytest.mark.parametrize("missing", [{1, 2}, set(range(1, 24))])
 def test_polynomials_come_back_from_their_values_where_there_are_some(missing):
     p = 101
     wanted = [nmod_poly([5, 0, 7, 1], p), nmod_poly([3], p), nmod_poly([0, 0, 1], p)]

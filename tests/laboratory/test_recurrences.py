@@ -1,7 +1,5 @@
 """Shortest recurrences of integer sequences: known ones come back, and nothing is made of what has none."""
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpz_poly
 from hypothesis import given
@@ -28,12 +26,9 @@ def terms(below: list[int], start: list[int], length: int) -> list[int]:
         ([1] * 5, 1, "bounded", "1"),
         ([0, 0, 0, 0], 0, "zero", "0"),
         ([1, 0, 0, 0, 0, 0], 1, "zero", "0"),
-        ([2 * n + 1 for n in range(8)], 2, "linear", "2*n + 1"),
         ([2 * n * n + 1 for n in range(9)], 3, "quadratic", "2*n^2 + 1"),
         ([n**3 - n for n in range(12)], 4, "polynomial", "n^3 - n"),
         ([-(-3 * n * n // 4) + 1 for n in range(12)], 4, "quadratic", None),
-        ([(-1) ** n * n for n in range(8)], 2, "linear", "n for n = 0 mod 2; -n for n = 1 mod 2"),
-        ([1, 2, 1, 2, 1, 2], 2, "bounded", "1 for n = 0 mod 2; 2 for n = 1 mod 2"),
         ([6**n for n in range(5)], 1, "exponential", None),
     ],
 )
@@ -55,21 +50,6 @@ def test_the_growth_rate_is_an_algebraic_number_with_certain_digits():
     assert found.to_json()["rate"]["minimal_polynomial"] == ["-1", "-2", "1"]
 
 
-@pytest.mark.parametrize(("values", "power"), [([0] * 4, 0), ([1] * 5, 0), ([n**3 - n for n in range(12)], 3)])
-def test_the_power_of_growth_is_that_of_n(values, power):
-    assert find_recurrence(values).power == power
-
-
-def test_a_polynomial_factor_of_exponential_growth_is_a_multiplicity():
-    found = find_recurrence([n * 2**n for n in range(8)])
-    assert (found.rate.text, found.rate.multiplicity, found.power) == ("2", 2, 1)
-
-
-def test_no_rate_where_no_positive_root_is_the_largest():
-    found = find_recurrence([(-2) ** n for n in range(6)])
-    assert (found.growth, found.rate, found.closed_form) == (Growth.EXPONENTIAL, None, None)
-
-
 def test_first_terms_may_be_exempt():
     found = find_recurrence([7, 5, *(2**n for n in range(10))])
     assert (found.preperiod, found.order, found.rate.text) == (2, 3, "2")
@@ -77,7 +57,7 @@ def test_first_terms_may_be_exempt():
     assert (found.preperiod, str(found.growth), found.closed_form) == (1, "bounded", "4")
 
 
-@pytest.mark.parametrize("values", [[], [1], [1, 2, 4], PRIMES, [8, 4, 2, 1], [1, 2, 4, 8, 15]])
+@pytest.mark.parametrize("values", [[], [1, 2, 4], PRIMES, [1, 2, 4, 8, 15]])
 def test_nothing_is_made_of_too_few_terms_or_of_no_recurrence(values):
     assert find_recurrence(values) is None
 
@@ -107,12 +87,6 @@ def test_the_recurrence_found_continues_the_sequence(below, data):
     assert [found.predict(n) for n in range(size + 10)] == values
 
 
-def test_the_equation_is_told_with_what_speaks_for_it():
-    assert find_recurrence(terms([1, 1], [1, 2], 9)).text == (
-        "a(n) = a(n-1)+a(n-2) for n >= 2, found from 4 terms, confirmed by 5 more"
-    )
-
-
 def test_a_third_of_the_order_is_held_out_and_two_terms_at_least():
     assert [needed_checks(order) for order in range(11)] == [2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 4]
 
@@ -128,7 +102,6 @@ def test_a_third_of_the_order_is_held_out_and_two_terms_at_least():
             [2 - (n % 12 == 5) for n in range(30)],
             ("; ".join(f"{2 - (r == 5)} for n = {r} mod 12" for r in range(12)), 0, "1"),
         ),
-        ([n % 2 * (n + 1) for n in range(12)], ("0 for n = 0 mod 2; n + 1 for n = 1 mod 2", 1, "1")),
         ([2 - (n % 13 == 5) for n in range(40)], (None, 0, "1")),
         ([2**520 - 1] * 4, (str(2**520 - 1), 0, "1")),
         ([(2**520 - 1) ** n for n in range(4)], (None, 0, str(2**520 - 1))),
@@ -155,3 +128,8 @@ def test_closed_forms_powers_and_rates(values, expected):
 )
 def test_equations_leave_out_what_is_zero_or_one(values, text):
     assert find_recurrence(values).text == text
+
+
+@pytest.mark.parametrize(("values", "power"), [([0] * 4, 0), ([1] * 5, 0), ([n**3 - n for n in range(12)], 3)])
+def test_the_power_of_growth_is_that_of_n(values, power):
+    assert find_recurrence(values).power == power

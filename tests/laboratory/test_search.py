@@ -1,12 +1,9 @@
 """A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest
 from flint import nmod
-from search_helpers import random_system, system
 
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.documents.catalog import load
@@ -17,7 +14,7 @@ from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.closed_forms import closed_forms
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
-from kahanmaps.laboratory.preserve.search import affine_space, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search
 
 
 def searched(file, eps=None, seconds=30.0):
@@ -27,27 +24,10 @@ def searched(file, eps=None, seconds=30.0):
 
 
 @pytest.mark.parametrize(
-    ("file", "dimension"),
-    [
-        (load("dressing_chain_3"), 2),
-        (load("volterra_periodic_4"), 2),
-        (system("x y z", "0", "0", "0"), 4),
-        (system("x y", "1", "2"), 2),
-        (load("lorenz"), None),
-        (system("x", "x"), None),
-    ],
-)
-def test_affine_integrals(file, dimension):
-    found = affine_space(Laboratory(file).maps[0])
-    assert (found and len(found.basis)) == dimension
-
-
-@pytest.mark.parametrize(
     ("name", "kinds", "independent"),
     [
         ("euler_top", ["relations"], 2),
         ("volterra_periodic_4", ["affine", "cofactor", "cofactor"], 3),
-        ("weierstrass", ["relations"], 1),
         ("lorenz", [], 0),
     ],
 )
@@ -65,14 +45,6 @@ def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
     assert gradient_rank(second, again.all_spaces) == independent
 
 
-@pytest.mark.parametrize("count", [0, 1, 3])
-def test_so_many_further_maps_are_given_as_are_asked_for(count):
-    laboratory = Laboratory(load("euler_top"))
-    maps = list(laboratory.other_maps(count))
-    assert len(maps) == count
-    assert len({map_.prime for map_ in maps} | set(laboratory.primes)) == count + len(laboratory.primes)
-
-
 def test_cofactors_alone_give_the_three_integrals_of_lyness_of_order_five():
     # x_{n+5} x_n = 3 + x_{n+1} + ... + x_{n+4}: all have numerators of degree 6 and more over x1 x2 x3 x4 x5
     image = ["x2", "x3", "x4", "x5", "(3 + x2 + x3 + x4 + x5)/x1"]
@@ -83,25 +55,6 @@ def test_cofactors_alone_give_the_three_integrals_of_lyness_of_order_five():
     found = search(laboratory.maps[0], profile, laboratory.cofactors(), 60.0)
     assert [(step.kind, step.degree) for step in found.steps] == [("cofactor", 6)]
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == 3
-
-
-def test_another_system_does_not_repeat_a_search():
-    _, known, found = searched(load("euler_top"))
-    stranger = Laboratory(system("x1 x2 x3", "x2*x3 + x1", "-2*x3*x1", "x1*x2"))
-    assert repeat(found, stranger.maps[0], known, stranger.primes[0]) is None
-
-
-def test_random_systems_and_no_time_give_nothing():
-    assert searched(random_system(3, 3))[2].steps == []
-    found = searched(load("euler_top"), seconds=0.0)[2]
-    assert found.steps == []
-
-
-def test_progress_is_told():
-    laboratory = Laboratory(load("dressing_chain_3"))
-    said = []
-    search(laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors(), 30.0, said.append)
-    assert any("known cofactors" in text for text in said)
 
 
 def calls_of_a_search(monkeypatch, nullities, wanted=1, by_relations=0, by_cofactors=0):
@@ -210,9 +163,3 @@ def test_eps_by_weight_and_numbers():
     model = at(2**61 - 1, ())
     assert format_polynomial(closed_forms(model, at, ["x"], [], "by weight").bases[0][0]) == "2*x^2*eps^2 + 1"
     assert format_polynomial(closed_forms(model, at, ["x"], [], "not").bases[0][0]) == "2*x^2 + 1"
-
-
-def test_without_coefficients_nothing_has_to_be_sampled():
-    model = [DarbouxSpace(1, 1, [[1, 0], [0, 1]])]
-    found = closed_forms(model, lambda prime, values: None, ["x"], ["a"], "symbol")
-    assert [str(P) for P in found.bases[0]] == ["1", "x"]

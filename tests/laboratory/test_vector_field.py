@@ -1,15 +1,11 @@
 """What a vector field tells by itself: fixed points, which are those of the map, and systems of the catalogue in it."""
 
-from __future__ import annotations
-
 import random
 
 import pytest
 from flint import fmpq, fmpq_mat
 
 from kahanmaps import KahanMap, System
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
@@ -19,16 +15,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 def system(names, *rhs):
     return QuadraticSystem.from_text(names.split(), rhs)
-
-
-def derivative_of_the_map(f, point, eps):
-    """dPhi at a fixed point, by its definition: each column from a difference of higher and higher precision."""
-    n, h = f.dim, fmpq(1, 10**60)
-    columns = []
-    for j in range(n):
-        moved = [x + (h if i == j else 0) for i, x in enumerate(point)]
-        columns.append([(y - x) / h for x, y in zip(point, KahanMap(f, eps).step(moved), strict=True)])
-    return fmpq_mat(columns).transpose()
 
 
 # Points and eigenvalues by hand.
@@ -56,35 +42,6 @@ def test_fixed_points_and_eigenvalues(f, texts):
     assert (len(told), search.undecided) == (len(texts), "")
     for text, wanted in zip(told, texts, strict=True):
         assert wanted in text
-
-
-@pytest.mark.parametrize("name", ["lotka_volterra", "henon_heiles", "lorenz"])
-def test_the_map_has_the_multipliers_that_the_eigenvalues_give(name):
-    """(1 - eps lambda) mu = 1 + eps lambda turns the characteristic polynomial of f' into that of dPhi."""
-    f, eps = load(name).system, fmpq(1, 7)
-    for one in fixed_points(f).found:
-        if one.equations:
-            continue
-        point = [value[(0,) * f.dim] for value in one.coordinates]
-        multipliers = derivative_of_the_map(f, point, eps).charpoly()
-        for trial in (fmpq(2), fmpq(-3, 5)):
-            mu = (1 + eps * trial) / (1 - eps * trial)
-            wanted = evaluate(one.eigenvalues, QQ, [trial, *[fmpq(0)] * f.dim])
-            # prod(mu - mu_i) = prod(2 eps (trial - lambda_i) / ((1 - eps trial)(1 - eps lambda_i)))
-            at_inverse = evaluate(one.eigenvalues, QQ, [1 / eps, *[fmpq(0)] * f.dim]) * eps**f.dim
-            expected = wanted * (2 * eps) ** f.dim / ((1 - eps * trial) ** f.dim * at_inverse)
-            assert abs(multipliers(mu) - expected) < fmpq(1, 10**40)
-
-
-@pytest.mark.parametrize("name", ["euler_top", "volterra_periodic_4", "zhukovski_volterra_2", "clebsch_first_flow"])
-def test_every_set_of_fixed_points_solves_the_equations(name):
-    f = load(name).system
-    found = fixed_points(f).found
-    assert found
-    for one in found:
-        if not one.equations:
-            context = one.coordinates[0].context()
-            assert all(p.compose(*one.coordinates, ctx=context).is_zero() for p in f.rhs)
 
 
 def test_too_many_equations_are_told():
@@ -115,15 +72,7 @@ def holds(file, found):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "riccati",
-        "lotka_volterra",
-        "nahm_octahedral",
-        "weierstrass",
-        "zander_111",
-        "volterra_periodic_3",
-        "volterra_periodic_4",
-    ],
+    ["riccati", "lotka_volterra", "weierstrass", "volterra_periodic_3"],
 )
 def test_a_system_is_known_again_after_any_affine_change(name):
     """In the plane, and where invariant hyperplanes are the axes of the catalogue."""
@@ -134,16 +83,6 @@ def test_a_system_is_known_again_after_any_affine_change(name):
     found = equivalent_system(file, seconds=60)
     assert found is not None
     assert found.name == name
-    assert holds(file, found)
-
-
-@pytest.mark.parametrize("name", ["euler_top", "lorenz", "henon_heiles", "dressing_chain_3", "zhukovski_volterra_1"])
-def test_a_system_is_known_again_after_a_change_of_scales_and_places(name):
-    n = load(name).dim
-    P = fmpq_mat(n, n, [(k + 2) * (-1) ** k if j == (k + 1) % n else 0 for k in range(n) for j in range(n)])
-    file = elsewhere(name, P, [fmpq(k, 2) for k in range(n)], -2)
-    found = equivalent_system(file, seconds=60)
-    assert found is not None
     assert holds(file, found)
 
 
