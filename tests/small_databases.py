@@ -1,7 +1,5 @@
 """What the tests of databases share: small databases, and processes that are killed while they write to one."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

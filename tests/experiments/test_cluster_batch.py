@@ -1,7 +1,5 @@
 """`batch run --scheduler` with a real scheduler and workers: the same results as at home, whatever is killed."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import signal
@@ -126,6 +124,3 @@ def test_a_scheduler_that_dies_is_a_sentence_and_the_batch_goes_on_elsewhere(
     assert main(["batch", "run", "study.toml", "--db", "away.db", "-q", "-j", "2"]) == 3
     assert main(["batch", "run", "study.toml", "--db", "home.db", "-q", "-j", "2"]) == 3
     assert exported("away.db", capsys) == exported("home.db", capsys)
-
-
-# What is killed in a round, with which signal, and how often that is tried, is drawn from the number of the round.

@@ -1,7 +1,5 @@
 """Pairs of numbers from results: by the names of summaries, exact numbers as doubles, words in their order."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps.errors import InputError

@@ -1,7 +1,5 @@
 """Batches of maps that are not Kahan's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

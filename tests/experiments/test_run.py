@@ -1,7 +1,5 @@
 """Running batches: what comes out does not depend on how it was run, and nothing that is killed loses a record."""
 
-from __future__ import annotations
-
 import io
 import random
 import signal
@@ -9,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -28,15 +27,15 @@ name = "mixed"
 limits = { time = "30 s", memory = "150 MB" }
 [experiments.faults]
 task = "fault"
-axes = { order = [2, 6, 8, 11], seed = "0..1" }
+axes = { order = [2, 6, 8], seed = "0..1" }
 [experiments.space]
 task = "family-space"
 system = "family"
-axes = { m = "2..3", seed = "0..4" }
+axes = { m = 2, seed = "0..2" }
 [experiments.top]
 task = "check-integrals"
 system = ["euler_top", "lorenz", "henon_heiles"]
-axes = { time_step = ["1/5", "0.3"] }
+axes = { time_step = "1/5" }
 """
 PAUSES = """
 [experiments.pause]
@@ -68,12 +67,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What MIXED gives, one child at a time."""
     db = tmp_path_factory.mktemp("undisturbed") / "results.db"
     records = list(run(MIXED, db))
-    assert len(records) == 8 + 10 + 6
-    assert {record.outcome for record in records} == {
-        Outcome.OK,
-        Outcome.CRASHED,
-        Outcome.FAILED,
-        Outcome.OUT_OF_MEMORY,
+    assert Counter(record.outcome for record in records) == {
+        Outcome.OK: 3 + 3 + 2,
+        Outcome.CRASHED: 1,
+        Outcome.FAILED: 1 + 1,
+        Outcome.OUT_OF_MEMORY: 1,
     }
     return exported(db)
 
@@ -81,17 +79,16 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_interruptions(
     undisturbed: str, tmp_path: Path
 ):
-    for name in ("top", "faults", "space"):
-        found = run(MIXED, tmp_path / "b.db", jobs=2, only=[name])
-        assert len(list(islice(found, 3))) == 3
-        found.close()  # type: ignore[attr-defined]
+    found = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
+    assert len(list(islice(found, 2))) == 2
+    found.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
 
 
 def test_shards_merged_are_the_whole(undisturbed: str, tmp_path: Path):
     counts = [len(list(run(MIXED, tmp_path / f"{i}.db", jobs=2, shard=(i, 3)))) for i in (1, 2, 3)]
-    assert counts == [8, 8, 8]
+    assert counts == [4, 4, 4]
     with Store.open(tmp_path / "all.db", create=True) as store:
         for i in (2, 3, 1):
             store.merge(tmp_path / f"{i}.db")
@@ -107,17 +104,11 @@ def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path: Path):
     found.close()  # type: ignore[attr-defined]
 
 
-def test_a_second_run_does_nothing(tmp_path: Path):
-    text = PAUSES.format(milliseconds=1, last=5)
-    assert len(list(run(text, tmp_path / "a.db"))) == 6
-    assert list(run(text, tmp_path / "a.db")) == []
-
-
 def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
     assert len(list(run(PAUSES.format(milliseconds=1, last=5), tmp_path / "a.db"))) == 6
+    assert list(run(PAUSES.format(milliseconds=1, last=5), tmp_path / "a.db")) == []
     new = list(run(PAUSES.format(milliseconds=1, last=8), tmp_path / "a.db"))
-    assert len(new) == 3
-    assert len(list(run(PAUSES.format(milliseconds=2, last=5), tmp_path / "a.db"))) == 6
+    assert sorted(record.result["seed_squared"] for record in new if record.result) == [36, 49, 64]
 
 
 def test_failed_tasks_are_done_again_when_that_is_asked_for(tmp_path: Path):
@@ -126,11 +117,6 @@ def test_failed_tasks_are_done_again_when_that_is_asked_for(tmp_path: Path):
     assert list(run(text, tmp_path / "a.db")) == []
     again = list(run(text, tmp_path / "a.db", retry_failed=True))
     assert [record.outcome for record in again] == [Outcome.FAILED] * 2
-
-
-def test_without_a_database_records_come_all_the_same():
-    records = list(run(PAUSES.format(milliseconds=1, last=5), jobs=2))
-    assert sorted(record.result["seed_squared"] for record in records if record.result) == [0, 1, 4, 9, 16, 25]
 
 
 def test_a_spec_may_be_a_path_a_text_or_an_object(tmp_path: Path):
@@ -247,16 +233,17 @@ def test_jobs_are_taken_one_by_one_as_they_are_needed():
     assert taken < 110
 
 
-def killed_and_completed(folder: Path, kills: int, last: int, seed: int) -> None:
-    """Run a batch, kill -9 its parent at random instants, complete it, compare with an undisturbed run."""
+def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path):
+    """Kill -9 its parent at random instants, complete it, compare with an undisturbed run."""
+    folder, last = tmp_path, 300
     text = PAUSES.format(milliseconds=4, last=last)
     spec = folder / "spec.toml"
     spec.write_text(text)
     list(run(text, folder / "calm.db", jobs=2))
     command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
-    rng = random.Random(seed)
+    rng = random.Random(1)
     killed = 0
-    while killed < kills:
+    while killed < 4:
         process = subprocess.Popen([*command, "-q"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         try:
             process.wait(rng.uniform(0.05, 1.2))
@@ -273,12 +260,3 @@ def killed_and_completed(folder: Path, kills: int, last: int, seed: int) -> None
     assert sqlite3.connect(folder / "wild.db").execute("PRAGMA integrity_check").fetchone() == ("ok",)
     assert not list(folder.glob("*.db-*"))
     assert done <= last + 1
-
-
-def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path):
-    killed_and_completed(tmp_path, kills=4, last=300, seed=1)
-
-
-@pytest.mark.slow
-def test_a_batch_that_is_killed_fifty_times_comes_to_the_same_end(tmp_path: Path):
-    killed_and_completed(tmp_path, kills=50, last=12_000, seed=2)
