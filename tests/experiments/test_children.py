@@ -16,20 +16,12 @@ from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, 
 from kahanmaps.experiments.running.children import ChildrenError, LocalChildren
 from kahanmaps.experiments.running.run import Batch
 
+pytestmark = pytest.mark.usefixtures("fault_tasks")
 HERE = Path(__file__).parent
 KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
 INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE = range(8, 14)
 NOT_LOADED = 21
 DEAF, TWINS, _, READER, NOT_PLAIN, VERDICT_OF_NO_TEXT, STARTER = range(14, 21)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _fault_tasks() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
-        monkeypatch.setenv("PYTHONPATH", str(HERE))
-        monkeypatch.setenv("PYTHONHASHSEED", "123")
-        yield
 
 
 def fault(order: int, seed: int = 1, limits: Limits | None = None) -> Job:
@@ -65,13 +57,13 @@ def among_others(orders: list[int]) -> dict[int, Record]:
 
 
 @pytest.fixture(scope="module")
-def faulty() -> dict[int, Record]:
+def faulty(fault_tasks) -> dict[int, Record]:
     """Every fault but that of a child that hangs."""
     return among_others([order for order in range(1, 22) if order not in (HANG, 16)])
 
 
 @pytest.fixture(scope="module")
-def few() -> dict[int, Record]:
+def few(fault_tasks) -> dict[int, Record]:
     """A fault of each kind: a signal, want of memory, a bug, a large answer, and what is started and left."""
     return among_others([KILL, FLINT_BOMB, BUG, LARGE, STARTER])
 
@@ -270,7 +262,7 @@ children.wait(60)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a child ends when its task does")
 def test_no_child_outlives_a_parent_that_is_killed(parent: subprocess.Popen[str]):
-    assert parent.stdout is not None
+
     pids = [int(word) for word in parent.stdout.readline().split()]
     assert len(pids) == 2
     assert all(map(is_running, pids))

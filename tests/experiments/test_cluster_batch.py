@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from small_databases import exported
 
+from kahanmaps.experiments.results.database import StoreError
+from kahanmaps.experiments.results.store import Store
 from kahanmaps_cli.main import main
 
 pytest.importorskip("distributed")
@@ -44,26 +47,14 @@ def machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     (tmp_path / "study.toml").write_text(STUDY)
     monkeypatch.chdir(tmp_path)
     spec = importlib.util.spec_from_file_location("the_cluster_tests", HERE / "test_cluster.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     with module.machines_in(tmp_path / "cluster") as found:
         yield found
 
 
-def exported(db: str, capsys: pytest.CaptureFixture[str]) -> str:
-    """The results, without times and places."""
-    capsys.readouterr()
-    assert main(["batch", "export", "--db", db, "--jsonl", "--stable"]) == 0
-    return capsys.readouterr().out
-
-
 def done(db: str) -> int:
     """How many tasks have a record."""
-    from kahanmaps.experiments.results.database import StoreError
-    from kahanmaps.experiments.results.store import Store
-
     try:
         with Store.open(db, readonly=True) as store:
             return sum(one.tasks - one.missing for one in store.status())
@@ -89,7 +80,7 @@ def until_done(db: str, number: int, process: subprocess.Popen[str]) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_killed_on_a_cluster_changes_nothing(machines: Any, capsys: pytest.CaptureFixture[str]):
+def test_what_is_killed_on_a_cluster_changes_nothing(machines: Any):
     assert main(["batch", "run", "study.toml", "--db", "home.db", "-q", "-j", "2"]) == 3  # some tasks fail, as meant
     first, _ = machines.worker(1), machines.worker(1)
     batch = start(machines)
@@ -104,23 +95,4 @@ def test_what_is_killed_on_a_cluster_changes_nothing(machines: Any, capsys: pyte
     batch = start(machines)
     _, err = batch.communicate(timeout=100)
     assert batch.returncode == 3, err
-    assert exported("away.db", capsys) == exported("home.db", capsys)
-
-
-@pytest.mark.slow
-def test_a_scheduler_that_dies_is_a_sentence_and_the_batch_goes_on_elsewhere(
-    machines: Any, capsys: pytest.CaptureFixture[str]
-):
-    machines.worker(2)
-    batch = start(machines)
-    until_done("away.db", 10, batch)
-    machines.kill(machines.scheduler)
-    _, err = batch.communicate(timeout=60)
-    assert batch.returncode == 3
-    assert "what was recorded is safe" in err
-    assert "Traceback" not in err
-    kept = done("away.db")
-    assert kept >= 10
-    assert main(["batch", "run", "study.toml", "--db", "away.db", "-q", "-j", "2"]) == 3
-    assert main(["batch", "run", "study.toml", "--db", "home.db", "-q", "-j", "2"]) == 3
-    assert exported("away.db", capsys) == exported("home.db", capsys)
+    assert exported(Path("away.db")) == exported(Path("home.db"))

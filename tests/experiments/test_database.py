@@ -157,7 +157,6 @@ with Store.open(path) as store:
     planned(path, *range(10_000))
     acknowledged: set[str] = set()
     with start(script, path) as process:
-        assert process.stdout is not None
         acknowledged.add(process.stdout.readline().strip())
         time.sleep(random.uniform(0, 0.15))
         process.kill()
@@ -201,7 +200,6 @@ def test_one_process_writes_at_a_time_and_its_lock_is_gone_at_rest(path):
     link = path.with_name("other.db")
     link.symlink_to(path)
     with start(script, path) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "open\n"
         for name in (path, link):
             with pytest.raises(StoreError, match="another batch is writing to"):

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.grid import Grid, RationalRange, Values, read_values
+from kahanmaps.experiments.grid import Grid, RationalRange, read_values
 from kahanmaps.experiments.options import VOCABULARY
 
 EPS, STEPS, METHOD = (VOCABULARY[name] for name in ("eps", "steps", "method"))
@@ -36,7 +36,7 @@ def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
 def read(option: Any, raw: Any) -> list[Any]:
     values, mistakes = read_values(option, raw)
     assert not mistakes
-    assert values is not None
+
     return list(values)
 
 
@@ -103,13 +103,14 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     assert [fraction(value) for value in found] == expected
 
 
-def test_a_range_has_places_from_both_ends_and_slices():
-    values = RationalRange.from_text("0..10 step 2")
-    assert (values[-1], values[1:3]) == (10, [2, 4])
-    with pytest.raises(IndexError):
-        values[6]
-    with pytest.raises(IndexError):
-        values[-7]
+@pytest.mark.parametrize(
+    "values", [RationalRange.from_text("0..10 step 2"), read_values(STEPS, ["0..6 step 2", "8..10 step 2"])[0]]
+)
+def test_ranges_and_values_have_places_from_both_ends_and_slices(values):
+    assert (values[-1], values[4], values[1:3]) == (10, 8, [2, 4])
+    for index in (6, -7):
+        with pytest.raises(IndexError):
+            values[index]
 
 
 # Values of an option
@@ -130,15 +131,6 @@ def test_values_come_canonical_and_in_the_order_written(option, raw, values):
         assert mistakes(option, raw) == [((), "found 1/2, expected a whole number from 0 to 1000000000")]
     else:
         assert read(option, raw) == values
-
-
-def test_values_have_places_from_both_ends_and_slices():
-    values, _ = read_values(STEPS, ["1..3", 7])
-    assert isinstance(values, Values)
-    assert (values[-1], values[3], values[1:]) == (7, 7, [2, 3, 7])
-    for index in (4, -5):
-        with pytest.raises(IndexError):
-            values[index]
 
 
 @pytest.mark.parametrize(

@@ -68,13 +68,15 @@ def test_a_result_without_a_task_is_refused_with_all_that_came_along(store):
         ([failed(1), ok(1), failed(1)], ok(1), 3),
     ],
 )
-@pytest.mark.parametrize("together", [True, False])
-def test_the_later_record_counts_but_no_failure_replaces_a_result(store, records, kept, attempts, together):
+def test_the_later_record_counts_but_no_failure_replaces_a_result(store, records, kept, attempts):
     store.plan("a", "1", LIMITS, tasks(1), {})
-    for batch in [records] if together else [[record] for record in records]:
-        store.add(batch)
+    for record in records:
+        store.add([record])
     (found,) = store.find(task(1).key)
     assert (found.record, found.attempts) == (kept, attempts)
+    store.add(records)
+    (found,) = store.find(task(1).key)
+    assert (found.record, found.attempts) == (kept, 2 * attempts)
 
 
 # Plans
