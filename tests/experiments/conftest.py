@@ -33,7 +33,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def fault_tasks():
-    """The tasks of fault_tasks.py, here and in children, where sets are to have one order whatever is asked for here."""
+    """The tasks of fault_tasks.py, here and in children, where sets have one order whatever is asked for here."""
     here = str(Path(__file__).parent)
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.syspath_prepend(here)

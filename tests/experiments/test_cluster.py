@@ -221,22 +221,6 @@ def test_groups_grow_to_the_seconds_that_were_asked_for(workers, claim, largest)
     assert sum(record.result["jobs"] == 1 for record in records) >= 2  # nothing is known of the first ones
 
 
-def test_what_is_in_flight_is_bounded_by_the_threads(workers):
-    until(lambda: workers.wait(0.1) == [] and workers._dask.threads == 2)
-    largest = 0
-
-    def watch(records):
-        nonlocal largest
-        largest = max(largest, len(workers._groups))
-
-    done(workers, jobs_of(300, claim=1.0), meanwhile=watch)
-    assert largest <= 4
-    for job in jobs_of(10, kind="unknown"):
-        if workers.is_free:
-            workers.submit(job)
-    assert workers.in_flight == 4
-
-
 # Failures of a task
 
 

@@ -6,6 +6,7 @@ A stable export has no trace of where, when and how long the work was done.
 import csv
 import io
 import json
+import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
@@ -106,6 +107,11 @@ def test_lines_parse_back_to_what_was_put_in(rows):
             assert {value for name, value in of_record.items() if name != "key"} == {None}
         else:
             assert Record.from_json(of_record) == source.record
+
+
+def test_loading_the_module_does_not_load_flint():
+    code = "import sys, kahanmaps.experiments.results.export; sys.exit(bool({'flint', 'pyarrow'} & sys.modules.keys()))"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 
 # Columns of a table

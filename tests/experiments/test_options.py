@@ -18,7 +18,6 @@ from kahanmaps.experiments.options import FAMILY, VOCABULARY, Option, show
 from kahanmaps.experiments.registry import task_kinds
 
 ALL = {**VOCABULARY, **FAMILY}
-PRIME = 2**61 - 1
 
 # Option, ways to write one value, the canonical text.
 SAME = [

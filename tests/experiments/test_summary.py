@@ -1,8 +1,6 @@
 """Summaries: groups and their order, counts, quantiles that are values which occur, and the tables made of them."""
 
-import random
 from fractions import Fraction
-from math import ceil
 
 import pytest
 from hypothesis import given
@@ -55,12 +53,6 @@ def test_tasks_are_counted_by_outcome_and_verdict():
     assert group.verdicts == {"proved": 2, "supported": 0, "refuted": 1, "undecided": 0}
 
 
-def test_columns_of_zeros_are_left_out():
-    table = summarise([row({}, verdict="proved"), row(outcome=Outcome.CRASHED)]).counts()
-    assert table.columns == ("tasks", "ok", "crashed", "proved")
-    assert table.rows == (("2", "1", "1", "1"),)
-
-
 # Quantiles
 
 
@@ -89,21 +81,6 @@ def test_quantiles_are_those_of_a_naive_implementation(values):
         name: naive(exact, percent) for name, percent in QUANTILES.items()
     }
     assert found.is_same == (len(set(exact)) == 1)
-
-
-# By hand: of 1 to 20 the 5 % value has rank 1, of 1 to 21 rank ceil(1.05) = 2.
-@pytest.mark.parametrize(
-    ("count", "expected"),
-    [
-        (20, [1, 1, 5, 10, 15, 19, 20]),
-        (21, [1, 2, 6, 11, 16, 20, 21]),
-    ],
-)
-def test_quantiles_of_the_first_integers(count, expected):
-    values = list(range(1, count + 1))
-    random.Random(count).shuffle(values)
-    assert list(numbers_of(values).quantiles.values()) == expected
-    assert expected[3] == ceil(count / 2)
 
 
 def test_numbers_that_are_equal_as_floats_are_told_apart():
