@@ -57,6 +57,7 @@ def damaged(path: Path) -> None:
 
 WRONG = [
     (Path.mkdir, "is a folder or a device"),
+    (lambda path: path.write_bytes(b"x"), "is not an SQLite database"),  # which SQLite takes for an empty one
     (lambda path: path.write_text("text" * 1000), "is not an SQLite database"),
     (of_another_program, "of another program"),
     (of_another_format, "written by format 99 .* reads formats 1 and 2"),

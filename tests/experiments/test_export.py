@@ -134,6 +134,8 @@ def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result
     assert [found[name] for name in names] == ["2", "1", "3", "2", "4", "5"]
     names = ["verdict", "option.verdict", "result.verdict", "host", "option.host"]
     assert [found[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
+    (found,) = table([row(result={"a": {"b": 1}, "a.b": 2, "result.a.b": 3})])
+    assert [found[name] for name in ("a.b", "result.a.b", "result.result.a.b")] == ["1", "2", "3"]
 
 
 # Cells
