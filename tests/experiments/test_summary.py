@@ -83,6 +83,11 @@ def test_quantiles_are_those_of_a_naive_implementation(values):
     assert found.is_same == (len(set(exact)) == 1)
 
 
+def test_quantiles_of_the_first_integers():
+    # By hand: of 1 to 21 the 5 % value has rank ceil(1.05) = 2, the 25 % value rank ceil(5.25) = 6.
+    assert list(numbers_of(list(range(21, 0, -1))).quantiles.values()) == [1, 2, 6, 11, 16, 20, 21]
+
+
 def test_numbers_that_are_equal_as_floats_are_told_apart():
     third, near = "1/3", "0.3333333333333333333333333"
     quantiles = numbers_of([third, near, 1 / 3]).quantiles
