@@ -309,29 +309,19 @@ def test_without_a_start_singular_starts_are_avoided(monkeypatch):
 # Wrong use
 
 
-def test_one_plain_system_is_nothing_to_compare():
-    with pytest.raises(InputError, match="one system commutes with itself"):
-        check_commute(file_of(LOTKA_VOLTERRA))
-
-
-def test_a_second_step_without_a_second_system_is_refused():
-    with pytest.raises(InputError, match="second system"):
-        check_commute(SystemFile.from_member(SPLIT3), settings=Settings(eps=1), eps2=fmpq(2))
-
-
-def test_systems_of_different_dimension_are_refused():
-    with pytest.raises(InputError, match=r"dimension 2 and g 3"):
-        pair(LOTKA_VOLTERRA, EULER_TOP)
-
-
-def test_a_second_step_without_the_first_is_refused():
-    with pytest.raises(InputError, match="both --eps and --eps2"):
-        pair(LOTKA_VOLTERRA, FORCED_PLANE, eps2=fmpq(1, 2))
-
-
-def test_a_second_step_zero_is_refused():
-    with pytest.raises(InputError, match="eps2 = 0"):
-        pair(LOTKA_VOLTERRA, FORCED_PLANE, Settings(eps=1), eps2=fmpq(0))
+@pytest.mark.parametrize(
+    ("f", "g", "eps", "eps2", "message"),
+    [
+        (file_of(LOTKA_VOLTERRA), None, None, None, "one system commutes with itself"),
+        (SystemFile.from_member(SPLIT3), None, 1, 2, "a second step needs a second system"),
+        (file_of(LOTKA_VOLTERRA), file_of(EULER_TOP, "g"), None, None, "dimension 2 and g 3"),
+        (file_of(LOTKA_VOLTERRA), file_of(FORCED_PLANE), None, "1/2", "both --eps and --eps2"),
+        (file_of(LOTKA_VOLTERRA), file_of(FORCED_PLANE), 1, 0, "eps2 = 0"),
+    ],
+)
+def test_what_cannot_be_compared_is_told(f, g, eps, eps2, message):
+    with pytest.raises(InputError, match=message):
+        check_commute(f, g, Settings(eps=eps), eps2=eps2)
 
 
 # Mutations: a broken formula has to show
