@@ -17,12 +17,14 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from small_databases import exported
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Limits, Outcome, Task
 from kahanmaps.experiments.running import cluster
 from kahanmaps.experiments.running.children import TRIES
 from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
+from kahanmaps.experiments.running.run import run
 
 pytest.importorskip("distributed")
 
@@ -354,17 +356,23 @@ def test_closing_twice_is_allowed_and_leaves_the_scheduler_and_its_workers(share
 # The group command itself
 
 
-def test_real_tasks_are_done_by_the_workers(shared, monkeypatch):
+STUDY = """
+[experiments.space]
+task = "family-space"
+system = "family"
+axes = { m = 2 }
+[experiments.top]
+task = "check-integrals"
+system = "euler_top"
+axes = { eps = "1/3" }
+"""
+
+
+def test_a_batch_done_by_workers_has_the_results_of_one_at_home(shared, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    families = [{"draw": "eigenvalues", "m": 2, "seed": seed} for seed in range(2)]
-    jobs = [Job(Task("family-space", {"family": family}, {}), Limits(time=60)) for family in families]
-    workers = shared.workers(command=None)
-    try:
-        records = done(workers, jobs)
-    finally:
-        workers.close()
-    assert_exactly_once(records, jobs)
-    assert {record.outcome for record in records} == {Outcome.OK}
+    assert len(list(run(STUDY, tmp_path / "away.db", scheduler=str(shared.file)))) == 2
+    assert len(list(run(STUDY, tmp_path / "home.db"))) == 2
+    assert exported(tmp_path / "away.db") == exported(tmp_path / "home.db")
 
 
 # Before there is a cluster
