@@ -24,6 +24,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import cubic_space
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -264,6 +265,16 @@ def commute_at(f: QuadraticSystem, g: QuadraticSystem, eps: Fraction, x: Sequenc
         return None
     left, right = kahan_step(g, eps, after_f), kahan_step(f, eps, after_g)
     return None if left is None or right is None else left == right
+
+
+ORIGINAL_STEP = KahanMap.step
+
+
+def half_step(self: KahanMap, point: Sequence[Any]) -> tuple[Any, ...]:
+    """x + eps (I - eps f')^{-1} f, to put in the place of KahanMap.step: eps where 2 eps belongs."""
+    x = self.point(point)
+    image = ORIGINAL_STEP(self, x)
+    return tuple(a + (b - a) / self.field.convert(2) for a, b in zip(x, image, strict=True))
 
 
 def verdicts(report: Report) -> list[Verdict]:

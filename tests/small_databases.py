@@ -1,7 +1,6 @@
 """What the tests of databases share: small databases, and processes that are killed while they write to one."""
 
-from __future__ import annotations
-
+import io
 import os
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import pytest
 
 from kahanmaps.experiments.results import store as store_module
 from kahanmaps.experiments.results import tables
+from kahanmaps.experiments.results.export import write_jsonl
 from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.results.store import Store
 
@@ -52,6 +52,14 @@ def planned(path: Path, *numbers: int, records=(), experiment: str = "a", defini
         store.plan(experiment, definition or repr(numbers), LIMITS, tasks(*numbers), {})
         store.add(records)
     return path
+
+
+def exported(path: Path) -> str:
+    """The results of a database without times and places, in the order of the plan."""
+    stream = io.StringIO()
+    with Store.open(path, readonly=True) as store:
+        write_jsonl(store.rows(), stream, stable=True)
+    return stream.getvalue()
 
 
 @contextmanager

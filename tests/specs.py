@@ -1,7 +1,5 @@
 """Short specs, and what is asked of specs in several files of tests."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Tasks as a child does them: systems from their recipes, options from their canonical texts, results of plain data."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -4,14 +4,11 @@ Four words and no others: proved, refuted (with a witness), supported, undecided
 of its claims, controls left out. What a report says of itself is enough to run it again.
 """
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 
 import pytest
 from check_helpers import QUICK, file_of, hamiltonian_of, system_of
-from flint import fmpq
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness, combined
 from kahanmaps.checks.commute import check_commute
@@ -19,7 +16,7 @@ from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.version import __version__
@@ -37,10 +34,6 @@ def finding(verdict: Verdict, control: bool = False) -> Finding:
 # Verdicts
 
 
-def test_there_are_four_verdicts_spelled_as_documented():
-    assert [str(verdict) for verdict in Verdict] == ["proved", "refuted", "supported", "undecided"]
-
-
 @pytest.mark.parametrize(("verdict", "holds"), [(P, True), (S, True), (R, False), (U, None)])
 def test_a_verdict_says_whether_the_claim_holds(verdict, holds):
     assert verdict.holds is holds
@@ -51,16 +44,8 @@ def test_a_verdict_says_whether_the_claim_holds(verdict, holds):
     ("verdicts", "expected"),
     [
         ([P], P),
-        ([S], S),
-        ([U], U),
-        ([R], R),
-        ([P, P], P),
         ([P, S], S),
-        ([P, U], U),
-        ([P, R], R),
         ([S, U], U),
-        ([S, R], R),
-        ([U, R], R),
         ([P, S, U, R], R),
         ([], U),
     ],
@@ -83,7 +68,7 @@ def test_a_report_of_controls_alone_decides_nothing():
 
 @pytest.mark.parametrize(
     ("verdict", "control", "expected"),
-    [(R, True, True), (P, True, False), (S, True, False), (U, True, False), (R, False, True), (P, False, True)],
+    [(R, True, True), (P, True, False), (U, True, False), (R, False, True), (P, False, True)],
 )
 def test_a_control_is_as_expected_only_when_refuted(verdict, control, expected):
     assert finding(verdict, control).is_as_expected is expected
@@ -128,20 +113,21 @@ PLANE = SystemFile.from_hamiltonian(hamiltonian_of("q p", "q^3/3 + p^2/2"))
 REPORTS = {
     "commute, member": lambda settings: check_commute(MEMBER, None, settings),
     "commute, pair": lambda settings: check_commute(PLANE, LOTKA_VOLTERRA, settings),
-    "integrals, member": lambda settings: check_integrals(MEMBER, settings),
-    "integrals, claimed": lambda settings: check_integrals(LOTKA_VOLTERRA, settings),
-    "measure, member": lambda settings: check_measure(MEMBER, settings),
-    "measure, claimed": lambda settings: check_measure(LOTKA_VOLTERRA, settings),
-    "poisson, member": lambda settings: check_poisson(MEMBER, settings),
-    "poisson, plane": lambda settings: check_poisson(PLANE, settings),
+    "integrals": lambda settings: check_integrals(LOTKA_VOLTERRA, settings),
+    "measure": lambda settings: check_measure(LOTKA_VOLTERRA, settings),
+    "poisson": lambda settings: check_poisson(PLANE, settings),
 }
-over_reports = pytest.mark.parametrize("run", REPORTS.values(), ids=REPORTS.keys())
+over_reports = pytest.mark.parametrize("run", REPORTS.values(), ids=REPORTS)
 
 
 @over_reports
-def test_every_report_is_plain_data_that_json_gives_back(run):
-    plain = run(QUICK).to_json()
+def test_every_report_is_plain_data_for_every_eps_with_a_witness_where_it_is_refuted(run):
+    report = run(QUICK)
+    plain = report.to_json()
     assert json.loads(json.dumps(plain)) == plain
+    assert (plain["eps"], plain["time_step"]) == ("every", "every")
+    assert 0 < Fraction(plain["orbit"]["eps"]) < 1
+    assert all((found.witness is not None) == (found.verdict is R) for found in report.findings)
 
 
 @over_reports
@@ -158,28 +144,12 @@ def test_every_report_carries_what_is_needed_to_run_it_again(run):
 
 
 @over_reports
-def test_every_report_comes_out_the_same_from_the_same_seed(run):
-    assert run(Settings(steps=2, seed=11)).to_json() == run(Settings(steps=2, seed=11)).to_json()
-
-
-@over_reports
-def test_a_report_run_again_from_its_own_start_takes_the_same_orbit(run):
-    first = run(Settings(steps=2, seed=11)).to_json()["orbit"]
-    again = run(Settings(steps=2, eps=first["eps"], start=first["start"], seed=12)).to_json()["orbit"]
-    assert again == first
-
-
-@over_reports
-def test_refuted_claims_and_no_others_have_a_witness(run):
-    for found in run(QUICK).findings:
-        assert (found.witness is not None) == (found.verdict is R)
-
-
-@over_reports
-def test_every_report_says_every_eps_when_none_is_named(run):
-    plain = run(QUICK).to_json()
-    assert (plain["eps"], plain["time_step"]) == ("every", "every")
-    assert 0 < Fraction(plain["orbit"]["eps"]) < 1
+def test_every_report_comes_out_the_same_from_the_same_seed_and_its_orbit_from_its_own_start(run):
+    first = run(Settings(steps=2, seed=11)).to_json()
+    assert run(Settings(steps=2, seed=11)).to_json() == first
+    orbit = first["orbit"]
+    again = run(Settings(steps=2, eps=orbit["eps"], start=orbit["start"], seed=12)).to_json()
+    assert again["orbit"] == orbit
 
 
 @over_reports
@@ -192,21 +162,10 @@ def test_the_orbit_and_its_eps_follow_the_seed(run):
 # Settings
 
 
-def test_settings_take_every_exact_number():
-    settings = Settings(eps="1/10", start=(1, "0.5", fmpq(1, 3)))
-    assert settings.eps == fmpq(1, 10)
-    assert settings.start == (fmpq(1), fmpq(1, 2), fmpq(1, 3))
-
-
 def test_settings_are_for_every_eps_and_an_error_of_two_to_the_minus_one_hundred_unless_said_otherwise():
     settings = Settings()
     assert (settings.eps, settings.start, settings.seed, settings.error_bits) == (None, None, 0, 100)
     assert not settings.orbit_is_asked
-
-
-def test_settings_refuse_a_machine_float():
-    with pytest.raises(InexactNumber):
-        Settings(eps=0.1)
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,6 @@ A claim that is wrong in its eps^2 term, in one digit far out, or at every eps b
 computed a second time with Python's Fractions.
 """
 
-from __future__ import annotations
-
 import pytest
 from check_helpers import (
     QUICK,
@@ -14,22 +12,23 @@ from check_helpers import (
     exact,
     file_of,
     function_value,
+    half_step,
     hamiltonian_of,
     hamiltonians,
     kahan_step,
-    modified_value,
     only,
     system_of,
     verdicts,
     verify_witness,
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA, THOROUGH
+from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
-from kahanmaps.checks import judge, theorems
+from kahanmaps.checks import conserve, theorems
 from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.conserve import check_integrals, conservation, known_integrals
 from kahanmaps.checks.judge import Contradiction
@@ -38,27 +37,19 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+pytestmark = pytest.mark.usefixtures("at_points_only")
 few = settings(max_examples=20)
 
 HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
 WEIERSTRASS = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
 # Rank 2 in dimension 3, an inhomogeneous H; (1, -2, 1) spans the kernel of J.
 ODD = hamiltonian_of("x y z", "x^3/3 - x*y*z + z^2/2 + y", [[0, 1, 2], [-1, 0, 1], [-2, -1, 0]])
-SINGULAR = hamiltonian_of("x y z w", "x^2*w - y^3 + z*x + w", [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]])
-
-
-@pytest.fixture(autouse=True, scope="module")
-def claims_are_decided_at_points_alone():
-    """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_expand.py."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "expansion", lambda *_: None)
-        yield
 
 
 def verify_claim_witness(found: Finding, system: QuadraticSystem, function: RationalFunction) -> None:
@@ -85,25 +76,15 @@ def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Verdict
 # Hamiltonian systems
 
 
-@pytest.mark.parametrize("eps", [None, "1/3", "-2"])
-@pytest.mark.parametrize(
-    "hamiltonian", [HENON, WEIERSTRASS, ODD, SINGULAR], ids=["Henon", "cubic", "odd", "singular J"]
-)
-def test_modified_h_is_proved_for_every_constant_skew_j(hamiltonian, eps):
-    report = check_integrals(SystemFile.from_hamiltonian(hamiltonian), Settings(eps=eps, steps=2))
-    assert only(report).verdict is PROVED
-    assert only(report).claim == "modified H is conserved"
-
-
 @few
-@given(hamiltonians(dims=(1, 2, 3)))
-def test_modified_h_is_proved_and_no_point_contradicts_it(hamiltonian):
-    assert set(proved(hamiltonian)) == {PROVED}
+@given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
+def test_modified_h_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
+    found = set(proved(hamiltonian, Settings(eps=eps, steps=2)))
+    # At one eps, as for H = q p at eps = 1, there may be no map at all.
+    assert found == {PROVED} or (eps is not None and found == {UNDECIDED})
 
 
-@pytest.mark.parametrize(
-    "hamiltonian", [HENON, WEIERSTRASS, ODD, SINGULAR], ids=["Henon", "cubic", "odd", "singular J"]
-)
+@pytest.mark.parametrize("hamiltonian", [HENON, ODD], ids=["Henon", "odd"])
 def test_without_the_theorem_modified_h_is_supported(hamiltonian, monkeypatch):
     monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
     assert proved(hamiltonian) == [SUPPORTED]
@@ -118,11 +99,6 @@ def test_homogeneous_h_with_the_standard_j_has_both_normalisations():
 def test_a_linear_function_from_the_kernel_of_j_is_supported():
     # k^T f = k^T J grad H = 0, and Kahan maps conserve linear integrals.
     assert check_claim(ODD.system, "x - 2*y + z").verdict is SUPPORTED
-
-
-@pytest.mark.parametrize("text", ["x - 2*y + 2*z", "x", "x - 2*y + z + x/10^50"])
-def test_another_linear_function_is_refuted(text):
-    assert check_claim(ODD.system, text).verdict is REFUTED
 
 
 # H itself, and modified H written out
@@ -148,8 +124,7 @@ def test_modified_h_written_out_is_supported():
     assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
 
 
-@pytest.mark.parametrize("power", [1, 10, 50, 300])
-@pytest.mark.parametrize("term", ["q", "eps^2*q^2", "eps^2/(1 - 2*eps^2*q)"])
+@pytest.mark.parametrize(("term", "power"), [("q", 300), ("eps^2/(1 - 2*eps^2*q)", 50)])
 def test_modified_h_with_one_coefficient_wrong_in_a_far_digit_is_refuted(term, power):
     text = f"{written_out(WEIERSTRASS)} + ({term})/10^{power}"
     assert check_claim(WEIERSTRASS.system, text).verdict is REFUTED
@@ -158,10 +133,7 @@ def test_modified_h_with_one_coefficient_wrong_in_a_far_digit_is_refuted(term, p
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("+ 2/3*eps^2", "- 2/3*eps^2"),  # the sign of eps^2
         ("+ 2/3*eps^2", "+ 1/3*eps^2"),  # eps for 2 eps
-        ("+ 2/3*eps^2", "+ 2/3*eps^4"),  # a power of eps
-        ("1 - 2*eps^2*q", "1 + 2*eps^2*q"),
         ("1 - 2*eps^2*q", "1"),  # the leading term alone
     ],
 )
@@ -170,36 +142,12 @@ def test_modified_h_with_a_slip_in_it_is_refuted(right, wrong):
     assert check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS).replace(right, wrong)).verdict is REFUTED
 
 
-def test_a_constant_added_does_no_harm():
-    assert check_claim(WEIERSTRASS.system, f"{written_out(WEIERSTRASS)} + 7*eps + 5").verdict is SUPPORTED
-
-
 # Known answers from the literature
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "(1 - eps^2*x2^2)/(1 + 2*eps^2*x3^2)",
-        "(1 + 2*eps^2*x3^2)/(1 + 2*eps^2*x1^2)",
-    ],
-)
-def test_the_integrals_of_the_discrete_euler_top_are_supported(text):
+def test_an_integral_of_the_discrete_euler_top_is_supported():
     # petrera-suris-euler: (1 - eps^2 a_i a_j x_k^2)/(1 - eps^2 a_j a_k x_i^2), here a = (1, -2, 1).
-    assert check_claim(EULER_TOP, text).verdict is SUPPORTED
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "(1 + eps^2*x2^2)/(1 + 2*eps^2*x3^2)",
-        "(1 - eps^2*x2^2)/(1 + 2*eps^2*x1*x3)",
-        "(1 - 4*eps^2*x2^2)/(1 + 8*eps^2*x3^2)",  # the same with the time step for eps
-        "2*x1^2 + x2^2",  # the integral of the flow
-    ],
-)
-def test_wrong_integrals_of_the_discrete_euler_top_are_refuted(text):
-    assert check_claim(EULER_TOP, text).verdict is REFUTED
+    assert check_claim(EULER_TOP, "(1 - eps^2*x2^2)/(1 + 2*eps^2*x3^2)").verdict is SUPPORTED
 
 
 # One eps, every eps
@@ -226,14 +174,9 @@ FAMILY = {
     "m=2": (draw_with_eigenvalues([1, -2], seed=3), 2),
     "m=2, irreducible": (draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3), 1),
     "m=3": (draw_with_eigenvalues([1, -2, 3], seed=3), 4),
-    "m=3, (t-1)(t^2-2)": (draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3), 2),
     "m=3, eigenvalue twice": (draw_with_eigenvalues([1, 1, 2], seed=3), 2),
-    "m=4": (draw_with_eigenvalues([1, -2, 3, 5], seed=3), 8),
 }
-over_family = pytest.mark.parametrize(
-    ("member", "classes"),
-    [pytest.param(*FAMILY[name], id=name, marks=THOROUGH if name == "m=4" else ()) for name in FAMILY],
-)
+over_family = pytest.mark.parametrize(("member", "classes"), FAMILY.values(), ids=FAMILY)
 
 
 @over_family
@@ -257,8 +200,8 @@ def test_without_the_theorem_the_integrals_of_the_class_are_supported(member, cl
     assert set(verdicts(report)) == {SUPPORTED}
 
 
-@over_family
-def test_every_map_of_a_class_conserves_the_integrals_of_the_whole_class(member, classes):
+def test_every_map_of_a_class_conserves_the_integrals_of_the_whole_class():
+    member = FAMILY["m=3"][0]
     for associate in member.associated():
         other = FamilyMember(member.A, member.H, associate.signs)
         report = check_integrals(SystemFile.from_member(other), Settings(steps=1))
@@ -275,29 +218,6 @@ def test_a_matrix_that_does_not_commute_with_the_jacobian_gives_no_integral(monk
     assert only(check_integrals(SystemFile.from_member(member), QUICK)).verdict is REFUTED
 
 
-def test_h_of_a_member_is_refuted_as_an_integral_of_the_map():
-    member = FAMILY["m=2"][0]
-    H = claim(str(member.H), " ".join(member.variables))
-    report = check_integrals(SystemFile.from_member(member), QUICK, {"H": H})
-    *known, claimed = report.findings
-    assert {found.verdict for found in known} == {PROVED}
-    verify_claim_witness(claimed, member.chosen.system, H)
-    assert report.verdict is REFUTED
-
-
-def test_the_map_of_h1_is_refuted_to_conserve_modified_h0(monkeypatch):
-    # The known integrals of one system put to the map of another.
-    first, second = FAMILY["m=2"][0], FamilyMember(FAMILY["m=2"][0].A, FAMILY["m=2"][0].chain[1])
-    integral = ModifiedHamiltonian(first.chosen.hamiltonian)
-    monkeypatch.setattr("kahanmaps.checks.conserve.known_integrals", lambda file: [(integral, None, "")])
-    found = only(check_integrals(SystemFile.from_member(second), QUICK))
-    assert found.verdict is REFUTED
-    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
-    image = kahan_step(second.chosen.system, eps, x)
-    sides = [[modified_value(first.chosen.hamiltonian, eps, point)] for point in (image, x)]
-    verify_witness(found.witness, *sides)
-
-
 def test_the_integrals_of_the_commutant_belong_to_the_system_that_the_signs_pick():
     member = FAMILY["m=3"][0]
     file = SystemFile.from_member(FamilyMember(member.A, member.H, (1, -1, 1)))
@@ -312,20 +232,20 @@ def test_the_integrals_of_the_commutant_belong_to_the_system_that_the_signs_pick
     ]
 
 
-def test_of_many_proved_integrals_the_first_ones_are_tried_along_the_orbit():
-    report = check_integrals(
-        SystemFile.from_member(draw_with_eigenvalues([1, -2, 3, 5, 7, -4], seed=3)), Settings(steps=1)
-    )
+def test_of_many_proved_integrals_the_first_ones_are_tried_along_the_orbit(monkeypatch):
+    monkeypatch.setattr(conserve, "_TRIED", 2)
+    report = check_integrals(SystemFile.from_member(FAMILY["m=2"][0]), Settings(steps=1))
     assert set(verdicts(report)) == {PROVED}
     tried = [any(evidence.method == "exact orbit" for evidence in found.also) for found in report.findings]
-    assert tried == [True] * 32 + [False] * 6
-    assert report.notes == ["of the proved integrals the first 32 were also tried along an orbit"]
+    assert tried == [True] * 2 + [False] * 2
+    assert report.notes == ["of the proved integrals the first 2 were also tried along an orbit"]
 
 
-def test_a_class_of_many_systems_lists_the_single_minus_signs():
-    file = SystemFile.from_member(draw_with_eigenvalues(range(1, 10), seed=3))
+def test_a_class_of_many_systems_lists_the_single_minus_signs(monkeypatch):
+    monkeypatch.setattr(theorems, "MAX_FACTORS", 3)
+    file = SystemFile.from_member(draw_with_eigenvalues([1, -2, 3, 5], seed=3))
     labels = [integral.name for integral, _, _ in known_integrals(file) if integral.name.startswith("K~")]
-    assert len(labels) == 9
+    assert len(labels) == 4
     assert all(label.count("-") == 1 for label in labels)
 
 
@@ -346,10 +266,7 @@ def test_claims_of_the_file_and_of_the_caller_are_both_checked():
         ("x/((10*eps - 1)*y)", "1/9", ""),
         ("eps*x/((10*eps - 1)*y + eps*x)", "1/10", ", being a constant at eps = 1/10"),
         ("eps*x/((10*eps - 1)*y + eps*x)", None, ""),
-        ("(10*eps - 1)*y/x + 3", "1/10", ", being a constant at eps = 1/10"),
-        ("(10*eps - 1)*y/x + 3", None, ""),
         ("(x - y)/(2*y - 2*x)", None, ", being a constant"),
-        ("0", None, ", being a constant"),
         ("x/((10*eps - 1)*x)", None, ", where 10*eps - 1 is not 0, being a constant"),
         ("x/((10*eps - 1)*x)", "1/9", ", being a constant at eps = 1/9"),
     ],
@@ -364,8 +281,6 @@ def test_the_claim_says_where_an_integral_has_values_and_when_it_is_a_constant(t
     ("H", "eps", "condition"),
     [
         ("3*q^2 + p^2", "1/2", ", being a constant at eps = 1/2"),
-        ("3/2*q^2 + 1/2*p^2", "-1", ", being a constant at eps = -1"),
-        ("3*q^2 + p^2", None, ""),
         ("3*q^2 + p^2", "1/3", ""),
         ("3*q^2 + p^2 + q^3", "1/2", ""),
         ("5", None, ", being a constant"),
@@ -382,11 +297,6 @@ def test_a_claim_is_shown_by_its_formula():
     function = claim("(x^2 + y)/(1 - eps)", "x y")
     found = only(check_integrals(file_of(LOTKA_VOLTERRA, I="(x^2 + y)/(1 - eps)"), QUICK))
     assert found.formula == format_rational_function(function)
-
-
-def test_the_names_of_parameters_may_be_used_in_claims():
-    text = 'variables = ["x", "y"]\n[parameters]\na = "3/2"\n[system]\nrhs = ["y", "0"]\n[integrals]\nI = "a*y"\n'
-    assert only(check_integrals(parse_system(text), QUICK)).verdict is SUPPORTED
 
 
 def test_a_claim_undefined_along_the_orbit_says_so():
@@ -433,7 +343,7 @@ def test_a_system_without_any_integral_is_wrong_use():
         check_integrals(file_of(LOTKA_VOLTERRA))
 
 
-@pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps"), ("x", "y", "z", "eps"), ("eps", "x", "y")])
+@pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps")])
 def test_a_claim_in_other_variables_is_wrong_use(names):
     function = parse_rational_function("x", names)
     with pytest.raises(InputError, match="expected a rational function of x, y, eps"):
@@ -443,28 +353,10 @@ def test_a_claim_in_other_variables_is_wrong_use(names):
 # Mutations
 
 
-ORIGINAL_STEP = KahanMap.step
-
-
-def half_step(self: KahanMap, point):
-    """x + eps (I - eps f')^{-1} f: eps where 2 eps belongs."""
-    x = self.point(point)
-    image = ORIGINAL_STEP(self, x)
-    return tuple(a + (b - a) / self.field.convert(2) for a, b in zip(x, image, strict=True))
-
-
-@pytest.mark.parametrize("file", [SystemFile.from_hamiltonian(HENON), SystemFile.from_member(FAMILY["m=2"][0])])
-def test_a_step_of_half_the_length_contradicts_the_theorems(file, monkeypatch):
+def test_a_step_of_half_the_length_contradicts_the_theorems(monkeypatch):
     monkeypatch.setattr(KahanMap, "step", half_step)
     with pytest.raises(Contradiction):
-        check_integrals(file, QUICK)
-
-
-def test_a_step_of_half_the_length_refutes_a_claim(monkeypatch):
-    file = file_of(WEIERSTRASS.system, I=written_out(WEIERSTRASS))
-    assert only(check_integrals(file, QUICK)).verdict is SUPPORTED
-    monkeypatch.setattr(KahanMap, "step", half_step)
-    assert only(check_integrals(file, QUICK)).verdict is REFUTED
+        check_integrals(SystemFile.from_member(FAMILY["m=2"][0]), QUICK)
 
 
 ORIGINAL_VALUE = ModifiedHamiltonian.value
@@ -480,22 +372,11 @@ def test_one_half_for_one_third_in_modified_h_contradicts_the_theorem(monkeypatc
         check_integrals(SystemFile.from_hamiltonian(HENON), QUICK)
 
 
-def test_x_in_place_of_its_image_in_the_papers_integral_contradicts_the_theorem(monkeypatch):
-    def wrong(self, field, eps, point):
-        m = len(point) // 2
-        return sum((point[i] * point[m + i] for i in range(m)), field.zero) / field.convert(eps)
-
-    monkeypatch.setattr(PaperIntegral, "value", wrong)
-    with pytest.raises(Contradiction, match="H~ is conserved"):
-        check_integrals(SystemFile.from_member(FAMILY["m=2"][0]), QUICK)
-
-
 @pytest.mark.parametrize(
     ("rhs", "claimed", "degree"),
     [
         ("x^2", "1/(x^3 + 1)", 7),  # x~ = x/(1 - 2 eps x): the denominators x^3 + 1, x^3 + W^3 and W = 1 - 2 eps x
         ("x", "1/x", 2),  # x~ = x (1 + eps)/(1 - eps): x twice
-        ("1 + x^2", "x/(x^4 + 1)", 9),
     ],
 )
 def test_the_degree_of_all_poles_is_bounded(rhs, claimed, degree):

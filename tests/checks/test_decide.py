@@ -5,8 +5,6 @@ little its sides differ; the witness is a small rational point, or where none sh
 computed a second time here. What is defined nowhere, or too large to decide, is undecided.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable
@@ -16,7 +14,7 @@ from itertools import chain
 from typing import Any
 
 import pytest
-from check_helpers import exact, texts, verify_witness
+from check_helpers import exact, verify_witness
 from flint import fmpq
 from helpers import fraction, rationals
 from hypothesis import given, settings
@@ -89,13 +87,10 @@ def square_right(x: Any, e: Any, K: Field) -> Any:
 
 
 TRUE = identity_of(square_left, square_right)
-FALSE = identity_of(lambda x, e, K: (x + e) * (x + e), lambda x, e, K: x * x + e * e)
-
-
 # True identities
 
 
-@pytest.mark.parametrize("error_bits", [1, 50, 56, 100, 300, 1000])
+@pytest.mark.parametrize("error_bits", [1, 56, 1000])
 def test_a_true_identity_is_supported_with_an_error_below_the_bound_asked_for(error_bits):
     decision = decide(TRUE, 0, error_bits)
     assert decision.verdict is SUPPORTED
@@ -106,17 +101,11 @@ def test_a_true_identity_is_supported_with_an_error_below_the_bound_asked_for(er
 
 
 @pytest.mark.parametrize("error_bits", [1, 100, 300])
-def test_the_number_of_points_is_that_of_the_trials_made(error_bits):
+def test_as_many_points_are_tried_as_the_bound_needs_and_all_are_told(error_bits):
     identity, fields = counted(TRUE)
     data = decide(identity, 0, error_bits).evidence.data
-    assert len(fields) == data["points"]
+    assert len(fields) == data["points"] == math.ceil(error_bits / -log2_error(*TRUE.bound))
     assert [str(field.prime) for field in fields] == data["primes"]
-
-
-@pytest.mark.parametrize("error_bits", [1, 100, 300])
-def test_no_more_points_are_tried_than_the_bound_needs(error_bits):
-    needed = math.ceil(error_bits / -log2_error(*TRUE.bound))
-    assert decide(TRUE, 0, error_bits).evidence.data["points"] == needed
 
 
 def test_the_sentence_of_the_evidence_says_what_the_data_say():
@@ -126,11 +115,8 @@ def test_the_sentence_of_the_evidence_says_what_the_data_say():
         f"held at {points} random points over GF(p), p random of 63 bits, for every eps; "
         f"false with probability below {bound}"
     )
-
-
-def test_the_evidence_says_for_which_eps_it_stands():
-    every, one = decide(TRUE, 0).evidence, decide(identity_of(square_left, square_right, eps=fmpq(-1, 3)), 0).evidence
-    assert (every.data["eps"], one.data["eps"]) == ("every", "-1/3")
+    one = decide(identity_of(square_left, square_right, eps=fmpq(-1, 3)), 0).evidence
+    assert (evidence.data["eps"], one.data["eps"]) == ("every", "-1/3")
     assert "for eps = -1/3;" in one.summary
 
 
@@ -150,16 +136,7 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
     assert found >= math.log2(2 * (max(1, bits // 62) / primes + roots)) - 1e-9
 
 
-@pytest.mark.parametrize("larger", [(2**41, 1e3), (2**40, 1e9)])
-def test_more_degree_or_coefficients_mean_a_larger_error(larger):
-    def error(degree, bits):
-        return log2_error(Size(degree, bits), 9)
-
-    assert error(2**40, 1e3) < error(*larger) < -1
-
-
-@pytest.mark.parametrize("conjugates", [2, 6, 24])
-@pytest.mark.parametrize("bits", [62, 6200.0])
+@pytest.mark.parametrize(("conjugates", "bits"), [(2, 62), (24, 6200.0)])
 def test_coefficients_in_a_number_field_of_degree_c_multiply_the_bad_primes_by_2_c_squared(conjugates, bits):
     """A norm is c times as long, and at least 1/(2 c) of the primes split: half of what Chebotarev's density gives."""
     size = Size(0, float(bits))
@@ -191,31 +168,6 @@ def test_two_polynomials_are_refuted_exactly_when_they_differ(first, second, see
         (x,) = exact(*decision.witness.point)
         sides = [[sum(fraction(c) * x**k for k, c in enumerate(coefficients))] for coefficients in (first, second)]
         verify_witness(decision.witness, *sides)
-
-
-@pytest.mark.parametrize("power", [10, 50, 1000])
-def test_a_difference_in_one_far_digit_is_found(power):
-    tiny = fmpq(1, 10**power)
-    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(tiny), bits=4.0 * power)
-    decision = decide(identity, 0)
-    assert decision.verdict is REFUTED
-    (x,) = exact(*decision.witness.point)
-    verify_witness(decision.witness, [x], [x + Fraction(1, 10**power)])
-
-
-def test_an_identity_that_fails_only_away_from_small_integers_is_refuted():
-    # x (x - 1) ... (x - 40) (x + 1) ... (x + 40) = 0 holds at most points one would try.
-    def product(x, e, K):
-        value = x
-        for a in range(1, 41):
-            value = value * (x - K.convert(a)) * (x + K.convert(a))
-        return value
-
-    decision = decide(identity_of(product, lambda x, e, K: K.zero, degree=81, bits=500.0), 0)
-    assert decision.verdict is REFUTED
-    (x,) = exact(*decision.witness.point)
-    assert x.denominator > 1 or abs(x) > 40
-    verify_witness(decision.witness, [math.prod(x - a for a in range(-40, 41))], [Fraction(0)])
 
 
 def test_an_identity_that_holds_at_every_small_point_that_is_tried_is_refuted_by_a_high_one():
@@ -261,26 +213,12 @@ def shifted(shift: int, subject: tuple[Any, ...]) -> Identity:
     return replace(identity, subject=subject)
 
 
-def test_points_that_do_not_follow_the_claim_let_a_false_one_pass_that_is_made_for_them():
-    # Why `subject` has to be all that determines the two sides: here it leaves out the shift.
-    primes = [int(prime) for prime in decide(TRUE, 0).evidence.data["primes"]]
-    shift = math.prod(primes)
-    assert decide(shifted(shift, ()), 0).verdict is SUPPORTED
-    assert decide(shifted(shift, ()), 1).verdict is REFUTED
-
-
 def test_a_false_claim_made_of_the_primes_of_another_is_refuted():
     shift = 1
     for _ in range(5):  # each time the primes at which the claim before would pass
         primes = [int(p) for p in decide(replace(TRUE, subject=(shift,)), 0).evidence.data["primes"]]
         shift = math.prod(primes)
         assert decide(shifted(shift, (shift,)), 0).verdict is REFUTED
-
-
-def test_a_false_identity_is_refuted_by_the_first_trial():
-    identity, fields = counted(FALSE)
-    decide(identity, 0)
-    assert sum(field is not QQ for field in fields) == 1
 
 
 # Every eps, or one
@@ -291,12 +229,9 @@ def one_eps(eps: fmpq | None) -> Identity:
     return identity_of(lambda x, e, K: x * e, lambda x, e, K: x / K.convert(3), eps=eps)
 
 
-def test_an_identity_that_holds_at_one_eps_is_supported_there():
+@pytest.mark.parametrize("eps", [None, fmpq(1, 3) + fmpq(1, 10**60)])
+def test_an_identity_that_holds_at_one_eps_is_supported_there_and_refuted_elsewhere(eps):
     assert decide(one_eps(fmpq(1, 3)), 0).verdict is SUPPORTED
-
-
-@pytest.mark.parametrize("eps", [None, fmpq(1, 2), fmpq(-1, 3), fmpq(1, 3) + fmpq(1, 10**60)])
-def test_an_identity_that_holds_at_one_eps_is_refuted_elsewhere(eps):
     decision = decide(one_eps(eps), 0)
     assert decision.verdict is REFUTED
     (x,), (at,) = exact(*decision.witness.point), exact(decision.witness.eps)
@@ -317,16 +252,10 @@ def draw_first(monkeypatch, prime):
     monkeypatch.setattr(decide_module, "random_prime_field", lambda rng: next(fields))
 
 
-def test_a_prime_that_divides_eps_is_drawn_again(monkeypatch):
+@pytest.mark.parametrize("eps", [fmpq(101), fmpq(1, 101)])
+def test_a_prime_that_divides_eps_or_its_denominator_is_drawn_again(monkeypatch, eps):
     draw_first(monkeypatch, 101)
-    evidence = decide(identity_of(square_left, square_right, eps=fmpq(101)), 0).evidence
-    assert evidence.data["poles_met"] == 1
-    assert "101" not in evidence.data["primes"]
-
-
-def test_a_prime_that_divides_a_denominator_of_eps_is_drawn_again(monkeypatch):
-    draw_first(monkeypatch, 101)
-    evidence = decide(identity_of(square_left, square_right, eps=fmpq(1, 101)), 0).evidence
+    evidence = decide(identity_of(square_left, square_right, eps=eps), 0).evidence
     assert evidence.data["poles_met"] == 1
     assert "101" not in evidence.data["primes"]
 
@@ -384,19 +313,15 @@ def test_an_identity_defined_at_half_of_the_points_is_decided_there():
     assert decision.evidence.data["poles_met"] > 0
 
 
-@pytest.mark.parametrize("degree", [2**61, 2**62, 2**80, 10**400])
+@pytest.mark.parametrize("degree", [2**61, 10**400])
 def test_an_identity_of_too_large_a_degree_is_undecided(degree):
     identity, fields = counted(identity_of(square_left, square_right, degree=degree))
     decision = decide(identity, 0)
     assert decision.verdict is UNDECIDED
     assert fields == []
     assert decision.evidence.data["degree_bound"] == degree
-
-
-@pytest.mark.parametrize("poles", [2**61, 2**62, 10**400])
-def test_an_identity_with_too_many_poles_is_undecided(poles):
-    # The few points that are left may all be roots.
-    assert decide(identity_of(square_left, square_right, degree=1, poles=poles), 0).verdict is UNDECIDED
+    # With as many poles the few points that are left may all be roots.
+    assert decide(identity_of(square_left, square_right, degree=1, poles=degree), 0).verdict is UNDECIDED
 
 
 @pytest.mark.parametrize(("bound", "points"), [(-0.5, 0), (-1.0, 0), (-1.5, 67)])
@@ -414,9 +339,10 @@ def test_an_error_of_another_kind_is_not_swallowed():
 # Chance, and how to repeat it
 
 
-@pytest.mark.parametrize("identity", [TRUE, FALSE])
-def test_the_same_seed_gives_the_same_decision(identity):
-    assert decide(identity, 12) == decide(identity, 12)
+def test_the_same_seed_gives_the_same_decision():
+    false = identity_of(lambda x, e, K: (x + e) * (x + e), lambda x, e, K: x * x + e * e)
+    for identity in (TRUE, false):
+        assert decide(identity, 12) == decide(identity, 12)
 
 
 def test_another_seed_draws_other_primes_and_points():
@@ -478,10 +404,3 @@ def test_a_witness_with_named_entries_shows_the_first_that_differs():
     witness = witness_of(named, QQ, (fmpq(1),), fmpq(1), ([fmpq(1), fmpq(2)], [fmpq(1), fmpq(3)]))
     assert (witness.left, witness.right) == (("2",), ("3",))
     assert (witness.left_label, witness.right_label) == ("entry (1,2) of Pi", "entry (1,2) of Pi~")
-
-
-@given(rationals(30), rationals(30))
-def test_a_witness_writes_numbers_that_read_back(left, right):
-    witness = witness_of(TRUE, QQ, (left,), fmpq(1), ([left], [right]))
-    assert (witness is None) == (left == right)
-    assert witness is None or (witness.left, witness.right) == (texts(exact(left)), texts(exact(right)))

@@ -1,7 +1,5 @@
 """The bound of an identity, against its two sides written out as rational functions of x and eps."""
 
-from __future__ import annotations
-
 import random
 from itertools import pairwise
 
@@ -32,18 +30,13 @@ some_eps = st.one_of(st.none(), rationals(6).filter(lambda eps: eps != 0))
 
 
 @few
-@given(systems(dims=(1,)), systems(dims=(1,)), some_eps)
-def test_commutativity_is_bounded_in_dimension_one(f, g, eps):
+@given(st.sampled_from([1, 2]), st.data(), some_eps)
+def test_commutativity_is_bounded(n, data, eps):
+    f, g = (data.draw(systems(dims=(n,))) for _ in range(2))
     check(commutativity(f, g, eps, ("f", "g")))
 
 
-@few
-@given(systems(dims=(2,)), systems(dims=(2,)), some_eps)
-def test_commutativity_is_bounded_in_dimension_two(f, g, eps):
-    check(commutativity(f, g, eps, ("f", "g")))
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_commutativity_is_bounded_for_dense_systems_and_not_far_from_the_truth(seed):
     rng = random.Random(seed)
 
@@ -63,17 +56,14 @@ def test_commutativity_is_bounded_for_dense_systems_and_not_far_from_the_truth(s
 # One large row, one large part of a row, large denominators: nothing makes up for a row that is left out.
 LOPSIDED = [
     system_of("x", "10^30*x^2"),
-    system_of("x", "10^30"),
-    system_of("x y", "10^30*x^2", "x + y"),
     system_of("x y", "x + y", "10^30*x*y"),
     system_of("x y", "10^30*(x - y)", "y^2"),
     system_of("x y", "1", "10^30"),
-    system_of("x y", "x^2/(10^30 + 57)", "y^2/(10^30 + 57)"),
     system_of("x y", "x/(10^30 + 57)", "y/(10^15 + 37)"),
 ]
 
 
-@pytest.mark.parametrize("eps", [None, fmpq(10**20, 3), fmpq(3, 10**20)])
+@pytest.mark.parametrize("eps", [None, fmpq(10**20, 3)])
 @pytest.mark.parametrize("system", LOPSIDED)
 def test_a_system_with_one_large_part_is_bounded(system, eps):
     other = system_of("x", "x^2 + 1") if system.dim == 1 else LOTKA_VOLTERRA
@@ -92,8 +82,7 @@ def test_a_smaller_size_would_not_bound_the_difference():
     assert not covers_polynomial(Size(identity.bound[0].degree, bits - 0.01), above)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
-@pytest.mark.parametrize("eps", [None, fmpq(1, 2)])
+@pytest.mark.parametrize(("n", "eps"), [(1, None), (2, fmpq(1, 2)), (3, None)])
 def test_a_step_makes_degrees_as_large_as_the_documentation_says(n, eps):
     K = BoundField()
     names = ["x", "y", "z"][:n]
@@ -131,15 +120,13 @@ def test_conservation_of_an_integral_of_the_commutant_is_bounded(hamiltonian, A,
 
 
 CLAIMS = [
-    "x",
     "x^2/3 + eps*y",
-    "(x^2 + y^2)/(1 - eps^2*y^2)",
     "x*y/(2*x - 3/5*y) + eps/7",
     "1/(x^3 + eps^4*y)",
 ]
 
 
-@pytest.mark.parametrize("eps", [None, fmpq(-3, 7), fmpq(10**9 + 7, 998244353)])
+@pytest.mark.parametrize("eps", [None, fmpq(10**9 + 7, 998244353)])
 @pytest.mark.parametrize("text", CLAIMS)
 def test_conservation_of_a_claimed_function_is_bounded(text, eps):
     check(conservation(LOTKA_VOLTERRA, ClaimedIntegral("I", claim(text, "x y")), eps), differs=True)
@@ -177,12 +164,11 @@ LOPSIDED_HAMILTONIANS = [
     hamiltonian_of("q p", "10^30*q^3 + p"),
     hamiltonian_of("q p", "q^2*p/(10^30 + 57) + p^2"),
     hamiltonian_of("q p", "q^3 + p^3", [[0, fmpq(1, 10**30)], [fmpq(-1, 10**30), 0]]),
-    hamiltonian_of("x y z", "x^2*z", [[0, 10**30, 0], [-(10**30), 0, 1], [0, -1, 0]]),
     hamiltonian_of("x y z", "10^30*z^3 + x*y*z", [[0, 1, fmpq(1, 10**9)], [-1, 0, 1], [fmpq(-1, 10**9), -1, 0]]),
 ]
 
 
-@pytest.mark.parametrize("eps", [fmpq(2, 3), fmpq(10**20, 3), fmpq(3, 10**20)])
+@pytest.mark.parametrize("eps", [fmpq(10**20, 3), fmpq(3, 10**20)])
 @pytest.mark.parametrize("hamiltonian", LOPSIDED_HAMILTONIANS)
 def test_the_poisson_identities_of_a_system_with_one_large_part_are_bounded(hamiltonian, eps):
     check(transformation_identity(Kahan(hamiltonian.system), HamiltonianTensor(hamiltonian), eps))
@@ -199,6 +185,6 @@ _ODD_DENOMINATORS = [
 ]
 
 
-@pytest.mark.parametrize("H", ["x^3", "x^3 + y^2*z - w", "w^3 + z*y*x"])
-def test_denominators_of_j_without_common_factors_are_bounded(H):
-    check(jacobi_identity(HamiltonianTensor(hamiltonian_of("x y z w", H, _ODD_DENOMINATORS)), None))
+def test_denominators_of_j_without_common_factors_are_bounded():
+    tensor = HamiltonianTensor(hamiltonian_of("x y z w", "x^3 + y^2*z - w", _ODD_DENOMINATORS))
+    check(jacobi_identity(tensor, None))

@@ -6,9 +6,6 @@ generic Hamiltonian in dimension 4. Tensors that are given are decided, for maps
 second time, det dPhi and dPhi from dual numbers.
 """
 
-from __future__ import annotations
-
-from contextlib import nullcontext
 from fractions import Fraction
 
 import pytest
@@ -20,11 +17,11 @@ from check_helpers import (
     exact,
     file_of,
     function_value,
+    half_step,
     hamiltonian_of,
     hamiltonians,
     kahan_jacobian,
     kahan_step,
-    member_of,
     only,
     slope,
     system_of,
@@ -36,12 +33,12 @@ from check_helpers import (
     verify_witness,
 )
 from flint import fmpq, fmpq_poly
-from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA
+from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.checks import judge, preserve, theorems
+from kahanmaps.checks import preserve, theorems
 from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.preserve import check_measure, check_poisson
@@ -49,40 +46,24 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.invariants import poisson
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+pytestmark = pytest.mark.usefixtures("at_points_only")
 few = settings(max_examples=15)
 
 PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
 ODD = hamiltonian_of("x y z", "x^3/3 - x*y*z + z^2/2 + y", [[0, 1, 2], [-1, 0, 1], [-2, -1, 0]])
 GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
-SINGULAR = hamiltonian_of("x y z w", "x^2*w - y^3 + z*x + w", [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]])
-HAMILTONIANS = {"plane": PLANE, "odd": ODD, "generic": GENERIC, "singular J": SINGULAR}
-over_hamiltonians = pytest.mark.parametrize("hamiltonian", HAMILTONIANS.values(), ids=HAMILTONIANS.keys())
-
 MEMBERS = {
     "m=1": draw_with_eigenvalues([2], seed=3),
-    "m=2": draw_with_eigenvalues([1, -2], seed=3),
     "m=2, irreducible": draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
     "m=3": draw_with_eigenvalues([1, -2, 3], seed=3),
-    "m=3, (t-1)(t^2-2)": draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3),
-    "m=4": draw_with_eigenvalues([1, -2, 3, 5], seed=3),
-    "m=4, irreducible": draw_with_chi(fmpq_poly([1, 1, 0, 0, 1]), seed=3),
 }
-over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
-
-
-@pytest.fixture(autouse=True, scope="module")
-def claims_are_decided_at_points_alone():
-    """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_expand.py."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "expansion", lambda *_: None)
-        yield
+over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS)
 
 
 def file(hamiltonian: CubicHamiltonian) -> SystemFile:
@@ -101,26 +82,16 @@ def at_witness(found: Finding, system: QuadraticSystem):
 # Densities
 
 
-@over_hamiltonians
-@pytest.mark.parametrize("eps", [None, "1/3", "-2"])
-def test_the_determinant_density_is_proved_for_every_constant_skew_j(hamiltonian, eps):
-    report = check_measure(file(hamiltonian), Settings(eps=eps, steps=2))
-    assert only(report).verdict is PROVED
-    assert only(report).formula == "phi = det(I - eps f'(x))"
-
-
 @few
-@given(hamiltonians(dims=(1, 2, 3)))
-def test_the_determinant_density_is_proved_and_no_point_contradicts_it(hamiltonian):
-    assert only(check_measure(file(hamiltonian), QUICK)).verdict is PROVED
+@given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
+def test_the_determinant_density_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
+    found = only(check_measure(file(hamiltonian), Settings(eps=eps, steps=2)))
+    # At one eps, as for H = q p at eps = 1, there may be no map at all.
+    assert found.verdict is PROVED or (eps is not None and found.verdict is UNDECIDED)
+    assert found.formula == "phi = det(I - eps f'(x))"
 
 
-@over_members
-def test_the_determinant_density_of_every_member_is_proved(member):
-    assert only(check_measure(SystemFile.from_member(member), QUICK)).verdict is PROVED
-
-
-@over_hamiltonians
+@pytest.mark.parametrize("hamiltonian", [ODD, GENERIC], ids=["odd", "generic"])
 def test_without_the_theorem_the_determinant_density_is_supported(hamiltonian, monkeypatch):
     monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
     assert only(check_measure(file(hamiltonian), QUICK)).verdict is SUPPORTED
@@ -141,19 +112,15 @@ def check_density(system: QuadraticSystem, phi: str, how: Settings = QUICK) -> F
     return found
 
 
-# (system, a density, why)
-DENSITIES = {
-    "Lotka-Volterra, Sanz-Serna": (LOTKA_VOLTERRA, "x*y"),
-    "its multiple": (LOTKA_VOLTERRA, "-3/7*eps*x*y"),
-    "a plane Hamiltonian, written out": (PLANE.system, "1 - 2*eps^2*q"),
-    "times a function of the integral of x' = 0": (system_of("x y", "0", "1"), "x^3 - 2"),
-    # phi_ij = (1 - eps^2 a_i a_j x_k^2) times another such factor: petrera-suris-euler
-    "Euler top": (EULER_TOP, "(1 - eps^2*x2^2)*(1 - eps^2*x2^2)"),
-    "Euler top, two factors": (EULER_TOP, "(1 - eps^2*x2^2)*(1 + 2*eps^2*x3^2)"),
-}
-
-
-@pytest.mark.parametrize(("system", "phi"), DENSITIES.values(), ids=DENSITIES.keys())
+@pytest.mark.parametrize(
+    ("system", "phi"),
+    [
+        (LOTKA_VOLTERRA, "-3/7*eps*x*y"),  # a multiple of Sanz-Serna's
+        (PLANE.system, "1 - 2*eps^2*q"),  # the determinant written out
+        # phi_ij = (1 - eps^2 a_i a_j x_k^2) times another such factor: petrera-suris-euler
+        (EULER_TOP, "(1 - eps^2*x2^2)*(1 + 2*eps^2*x3^2)"),
+    ],
+)
 def test_a_right_density_is_supported(system, phi):
     found = check_density(system, phi)
     assert found.verdict is SUPPORTED
@@ -163,17 +130,9 @@ def test_a_right_density_is_supported(system, phi):
 @pytest.mark.parametrize(
     ("system", "phi"),
     [
-        (LOTKA_VOLTERRA, "1"),
-        (LOTKA_VOLTERRA, "x"),
         (LOTKA_VOLTERRA, "1/(x*y)"),  # the density of dx dy / phi upside down
-        (LOTKA_VOLTERRA, "x*y + 1/10^50"),
         (LOTKA_VOLTERRA, "x*y*(1 + eps^2/10^40*x)"),
         (PLANE.system, "1"),  # the flow preserves dq dp
-        (PLANE.system, "1 - 4*eps^2*q"),
-        (PLANE.system, "1 + 2*eps^2*q"),
-        (FORCED_PLANE, "x*y"),
-        (LORENZ, "1"),
-        (EULER_TOP, "1 - eps^2*x2^2"),
         (EULER_TOP, "(1 + eps^2*x2^2)*(1 + 2*eps^2*x3^2)"),
     ],
 )
@@ -193,40 +152,27 @@ def test_the_density_of_the_file_and_that_of_the_caller_are_both_checked():
     assert report.verdict is REFUTED
 
 
-def test_a_system_without_any_density_is_wrong_use():
-    with pytest.raises(InputError, match="no density of f is known or claimed"):
-        check_measure(file_of(LORENZ))
-
-
-def test_the_density_zero_is_wrong_use():
-    with pytest.raises(InputError, match="found the density 0"):
-        check_measure(file_of(LORENZ), extra=claim("x - x", "x y z"))
-
-
-@pytest.mark.parametrize("eps", ["1/10", "-2"])
-@pytest.mark.parametrize("of", [LORENZ, LOTKA_VOLTERRA, EULER_TOP])
-def test_a_density_that_is_zero_at_the_eps_in_force_is_wrong_use(eps, of):
+def test_a_density_that_is_zero_at_the_eps_in_force_is_wrong_use():
     # 0 = 0 is every law that a density obeys.
-    phi = f"(eps^2 - ({eps})*eps)*({of.variables[0]} + 1)"
-    with pytest.raises(InputError, match=f"which is identically 0 at eps = {eps}, expected a function"):
-        check_measure(file_of(of), Settings(eps=eps, steps=1), claim(phi, " ".join(of.variables)))
+    phi = "(eps^2 - eps/10)*(x + 1)"
+    with pytest.raises(InputError, match="which is identically 0 at eps = 1/10, expected a function"):
+        check_measure(file_of(LORENZ), Settings(eps="1/10", steps=1), claim(phi, "x y z"))
     with pytest.raises(InputError, match="identically 0"):
-        check_measure(file_of(of, phi=phi), Settings(eps=eps, steps=1))
+        check_measure(file_of(LORENZ, phi=phi), Settings(eps="1/10", steps=1))
 
 
-def test_a_density_that_is_zero_at_the_values_of_the_parameters_is_wrong_use():
-    text = """variables = ["x", "y"]
-        parameters = { a = "1/10" }
-        [system]
-        rhs = ["x^2 + y", "y^2 + x*y + 1"]
-        [density]
-        phi = "(a - eps)*x"
-        """
-    for eps, ends in (("1/10", pytest.raises(InputError, match="identically 0 at eps = 1/10")), ("1/5", nullcontext())):
-        with ends:
-            assert check_measure(parse_system(text), Settings(eps=eps, steps=1)).verdict is REFUTED
-    with pytest.raises(InputError, match="found 0, expected a function that is not zero"):
-        parse_system(text.replace("a - eps", "a - 1/10"))
+@pytest.mark.parametrize(
+    ("phi", "variables", "message"),
+    [
+        (None, "", "no density of f is known or claimed"),
+        ("x - x", "x y", "found the density 0"),
+        ("(10*eps - 1)*x*y/(10*eps - 1)", "x y", "which is 0/0 at eps = 1/10"),
+        ("x", "y x", "expected a rational function of x, y, eps"),
+    ],
+)
+def test_what_is_no_density_is_wrong_use(phi, variables, message):
+    with pytest.raises(InputError, match=message):
+        check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi and claim(phi, variables))
 
 
 def test_a_density_for_every_eps_says_at_which_eps_it_is_none():
@@ -240,27 +186,6 @@ def test_a_density_for_every_eps_says_at_which_eps_it_is_none():
 def test_a_density_without_a_value_at_the_eps_in_force_is_undecided():
     phi = claim("x*y/(10*eps - 1)", "x y")
     assert check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi).verdict is UNDECIDED
-
-
-def test_a_density_that_is_0_over_0_at_the_eps_in_force_is_refused():
-    phi = claim("(10*eps - 1)*x*y/(10*eps - 1)", "x y")
-    with pytest.raises(InputError, match="which is 0/0 at eps = 1/10"):
-        check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi)
-
-
-def test_a_density_with_a_denominator_that_some_eps_makes_0_is_for_the_others():
-    phi = claim("(eps - 3)*x*y*eps/(10*eps - 1)", "x y")
-    found = only(check_measure(file_of(LOTKA_VOLTERRA), Settings(steps=1), phi))
-    assert (found.verdict, found.claim) == (
-        SUPPORTED,
-        "the measure dx/phi is invariant, where eps - 3 is not 0 and 10*eps - 1 is not 0",
-    )
-
-
-@pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps")])
-def test_a_density_in_other_variables_is_wrong_use(names):
-    with pytest.raises(InputError, match="expected a rational function of x, y, eps"):
-        check_measure(file_of(LOTKA_VOLTERRA), extra=parse_rational_function("x", names))
 
 
 # The Poisson tensor
@@ -318,21 +243,11 @@ def test_in_dimension_two_the_proof_is_the_invariant_measure():
     assert found.evidence.data["theorem"] == "the invariant measure in dimension 2"
 
 
-@pytest.mark.parametrize("eps", [None, "1/3"])
-def test_the_tensor_of_a_generic_hamiltonian_in_dimension_four_is_refuted(eps):
-    law, jacobi = check_poisson(file(GENERIC), Settings(eps=eps, steps=2)).findings
+def test_the_tensor_of_a_generic_hamiltonian_in_dimension_four_is_refuted():
+    law, jacobi = check_poisson(file(GENERIC), QUICK).findings
     verify_law(law, GENERIC)
     assert jacobi.verdict is REFUTED
     verify_jacobi(jacobi, GENERIC)
-
-
-def test_the_tensor_of_a_member_disturbed_in_a_far_digit_is_refuted():
-    H = MEMBERS["m=2"].H
-    x = H.context().gens()
-    disturbed = CubicHamiltonian(H + fmpq(1, 10**40) * x[0] * x[1] ** 2, MEMBERS["m=2"].chosen.hamiltonian.J)
-    law, jacobi = check_poisson(file(disturbed), Settings(steps=1)).findings
-    verify_law(law, disturbed)
-    verify_jacobi(jacobi, disturbed)
 
 
 @few
@@ -342,23 +257,8 @@ def test_in_dimension_three_the_tensor_is_supported_without_a_theorem(hamiltonia
     assert verdicts(check_poisson(file(hamiltonian), QUICK)) == [SUPPORTED, SUPPORTED]
 
 
-def test_for_a_j_of_rank_two_in_dimension_four_the_tensor_is_supported_without_a_theorem():
-    assert verdicts(check_poisson(file(SINGULAR), QUICK)) == [SUPPORTED, SUPPORTED]
-
-
-# A = I: every cubic belongs to the space, and the roots of chi are as repeated as can be.
-EVERY_CUBIC = member_of(QQ.identity(4), [1, -2, 0, 3, 1, 1, -1, 2])
-
-
-@pytest.mark.parametrize(
-    "member",
-    [
-        draw_with_eigenvalues([1, 1], seed=3),
-        draw_with_eigenvalues([1, 1, 2], seed=3),
-    ],
-    ids=["1, 1", "1, 1, 2"],
-)
-def test_where_A_is_derogatory_the_tensor_is_not_proved_but_decided(member):
+def test_where_A_is_derogatory_the_tensor_is_not_proved_but_decided():
+    member = draw_with_eigenvalues([1, 1, 2], seed=3)
     # These H are sums of planar ones: the tensor is Poisson although the theorem does not say so.
     assert not member.is_generic
     assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
@@ -370,50 +270,14 @@ def test_for_a_jordan_block_the_tensor_is_proved():
     assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [PROVED, PROVED]
 
 
-def test_where_roots_are_repeated_another_h_of_the_space_is_refuted():
-    law, jacobi = check_poisson(SystemFile.from_member(EVERY_CUBIC), QUICK).findings
-    verify_law(law, EVERY_CUBIC.chosen.hamiltonian)
-    verify_jacobi(jacobi, EVERY_CUBIC.chosen.hamiltonian)
-
-
-def test_a_system_without_a_hamiltonian_is_wrong_use():
-    with pytest.raises(InputError, match=r"of kind \[system\]"):
-        check_poisson(file_of(LORENZ))
-
-
-# Orbits
-
-
-def test_a_singular_start_is_told():
-    # x' = x^2, y' = -2 x y for H = x^2 y: det(I - eps f') = (1 - 2 eps x)(1 + 2 eps x), singular at x = 5.
-    how = Settings(eps="1/10", start=(5, 1), steps=3, orbit_is_asked=True)
-    for report in (check_measure(file(hamiltonian_of("x y", "x^2*y")), how), check_poisson(file(PLANE), QUICK)):
-        assert report.verdict is PROVED
-    report = check_measure(file(hamiltonian_of("x y", "x^2*y")), how)
-    assert report.ended_early
-    assert report.to_json()["orbit"]["status"] == "singular"
-    assert "could not be tried at any point" in only(report).also[-1].summary
-
-
 # Mutations
 
 
-ORIGINAL_STEP = KahanMap.step
-
-
-def half_step(self: KahanMap, point):
-    """x + eps (I - eps f')^{-1} f: eps where 2 eps belongs."""
-    x = self.point(point)
-    image = ORIGINAL_STEP(self, x)
-    return tuple(a + (b - a) / self.field.convert(2) for a, b in zip(x, image, strict=True))
-
-
 @pytest.mark.parametrize("check", [check_measure, check_poisson])
-@pytest.mark.parametrize("member", [MEMBERS["m=1"], MEMBERS["m=2"]], ids=["m=1", "m=2"])
-def test_a_step_of_half_the_length_contradicts_the_theorems(check, member, monkeypatch):
+def test_a_step_of_half_the_length_contradicts_the_theorems(check, monkeypatch):
     monkeypatch.setattr(KahanMap, "step", half_step)
     with pytest.raises(Contradiction, match="defining equation of the Kahan map"):
-        check(SystemFile.from_member(member), QUICK)
+        check(SystemFile.from_member(MEMBERS["m=1"]), QUICK)
 
 
 # Given tensors
@@ -428,7 +292,6 @@ NESTED = """variables = ["x", "y", "z", "w"]
 [system]
 rhs = ["x*(y + z + w)", "y*(-x + z + w)", "z*(-x - y + w)", "w*(-x - y - z)"]
 """
-LINE = "variables = ['x', 'y']\n[map]\nimage = ['x + 1', 'y + x^2']\ninverse = ['x - 1', 'y - (x - 1)^2']\n"
 
 
 def log_canonical(names, a):
@@ -449,8 +312,6 @@ SIGNS = [[(j > i) - (j < i) for j in range(4)] for i in range(4)]
         (NESTED, log_canonical("xyzw", SIGNS), SUPPORTED),
         (NESTED, log_canonical("xyzw", [[2 * e if {i, j} == {0, 1} else e for j, e in enumerate(row)]
                                         for i, row in enumerate(SIGNS)]), REFUTED),
-        (LINE, GivenTensor.from_text([["0", "1"], ["-1", "0"]], "xy"), SUPPORTED),  # det dPhi = 1
-        (LINE, GivenTensor.from_text([["0", "1/(x^2 - y)"], ["-1/(x^2 - y)", "0"]], "xy"), REFUTED),
     ],
 )  # fmt: skip
 def test_a_given_tensor_is_tried_on_any_map(text, given, law):
@@ -470,39 +331,13 @@ def test_a_tensor_with_denominators_is_differentiated():
     assert exact(*found.witness.left) == (1 / ((x - z) * y**2),)
 
 
-def test_a_tensor_of_another_dimension_is_wrong_use():
-    with pytest.raises(InputError, match="found a tensor in dimension 2, expected 3"):
-        check_poisson(file_of(LORENZ), QUICK, log_canonical("xy", PLANAR))
-
-
-def wrong_sign(hamiltonian, field, eps, point):
-    """J + eps^2 f'(x)^2 J."""
-    J = field.convert_matrix(hamiltonian.J)
-    return J + J - ORIGINAL_TENSOR(hamiltonian, field, eps, point)
-
-
-ORIGINAL_TENSOR = poisson.poisson_tensor
-
-
-def wrong_scale(hamiltonian, field, eps, point):
-    """J - 4 eps^2 f'(x)^2 J: the time step for eps."""
-    return ORIGINAL_TENSOR(hamiltonian, field, eps + eps, point)
-
-
-@pytest.mark.parametrize("wrong", [wrong_sign, wrong_scale], ids=["sign", "scale"])
-@pytest.mark.parametrize("name", ["m=1", "m=2", "m=3"])
-def test_a_wrong_tensor_contradicts_the_theorem(wrong, name, monkeypatch):
-    monkeypatch.setattr(poisson, "poisson_tensor", wrong)
-    with pytest.raises(Contradiction, match="Poisson for Pi"):
-        check_poisson(SystemFile.from_member(MEMBERS[name]), QUICK)
-
-
-@pytest.mark.parametrize("wrong", [wrong_sign, wrong_scale], ids=["sign", "scale"])
-def test_a_wrong_tensor_is_refuted_where_no_theorem_applies(wrong, monkeypatch):
-    member = draw_with_eigenvalues([1, 1, 2], seed=3)
-    assert check_poisson(SystemFile.from_member(member), QUICK).findings[0].verdict is SUPPORTED
-    monkeypatch.setattr(poisson, "poisson_tensor", wrong)
-    assert check_poisson(SystemFile.from_member(member), QUICK).findings[0].verdict is REFUTED
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [(None, r"of kind \[system\]"), (log_canonical("xy", PLANAR), "found a tensor in dimension 2, expected 3")],
+)
+def test_without_a_tensor_of_its_dimension_there_is_nothing_to_check(given, message):
+    with pytest.raises(InputError, match=message):
+        check_poisson(file_of(LORENZ), extra=given)
 
 
 def test_a_map_without_an_inverse_has_no_measure_to_judge():
@@ -513,24 +348,6 @@ def test_a_map_without_an_inverse_has_no_measure_to_judge():
     right = parse_rational_function("x*y", ["x", "y", "eps"])
     assert check_measure(contraction, Settings(eps=fmpq(1, 2)), right).holds is True
     assert check_measure(contraction, Settings(eps=fmpq(1, 2)), phi).verdict is REFUTED
-
-
-def test_a_wrong_sign_of_eps_in_det_dphi_refutes_a_right_density(monkeypatch):
-    own = file_of(LOTKA_VOLTERRA, phi="x*y")
-    assert only(check_measure(own, QUICK)).verdict is SUPPORTED
-    monkeypatch.setattr(
-        preserve, "jacobian_determinant_sides", lambda kahan, x, image: (kahan.determinant(image), kahan.determinant(x))
-    )
-    assert only(check_measure(own, QUICK)).verdict is REFUTED
-
-
-def test_a_wrong_determinant_contradicts_the_theorem(monkeypatch):
-    # The determinant at 2 eps, and of x~ twice.
-    monkeypatch.setattr(
-        preserve, "jacobian_determinant_sides", lambda kahan, x, image: (kahan.determinant(x), kahan.determinant(x))
-    )
-    with pytest.raises(Contradiction, match="measure"):
-        check_measure(file(ODD), QUICK)
 
 
 def test_a_proof_of_something_false_is_contradicted_by_the_computation(monkeypatch):

@@ -4,8 +4,6 @@ Each hypothesis is broken singly here, and the evidence has to be gone. Where a 
 as well, that is shown by a point at which the independent computation fails.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -15,25 +13,21 @@ from check_helpers import (
     exact,
     hamiltonian_of,
     hamiltonians,
-    member_of,
-    rank_by_elimination,
-    rows_of,
     side_by_side,
     system_of,
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, HENON_HEILES, LOTKA_VOLTERRA, fraction, matrices, points, rationals, systems
+from helpers import EULER_TOP, LOTKA_VOLTERRA, matrices, points, rationals, systems
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import monomials as all_monomials
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks import theorems
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 few = settings(max_examples=25)
@@ -55,21 +49,10 @@ def test_evidence_names_the_theorem_and_every_hypothesis():
     assert found.method == "hypotheses"
     assert found.summary == "Theorem 1 applies: a; b"
     assert found.data == {"theorem": "Theorem 1", "hypotheses": ["a", "b"]}
-
-
-@given(st.lists(st.booleans(), max_size=5))
-def test_there_is_evidence_exactly_when_all_hypotheses_hold(holds):
-    found = theorems.evidence("Theorem 1", [(str(k), value) for k, value in enumerate(holds)])
-    assert (found is not None) == all(holds)
+    assert theorems.evidence("Theorem 1", [("a", True), ("b", False)]) is None
 
 
 # Members and their associated systems
-
-
-@pytest.mark.parametrize("signs", [(1, 1, 1), (1, 1, -1), (-1, 1, 1), (-1, -1, -1)])
-def test_every_associated_system_fulfils_the_hypotheses(signs):
-    assert failing(theorems.associated_hypotheses(MEMBER, MEMBER.associate(signs))) == []
-    assert failing(theorems.member_hypotheses(MEMBER)) == []
 
 
 ASSOCIATE = MEMBER.associate((1, 1, -1))
@@ -88,30 +71,14 @@ BROKEN_ASSOCIATES = {
         replace(ASSOCIATE, K=ASSOCIATE.K + parse_polynomial("x1^3", MEMBER.variables)),
         "grad K_++- = B_++- grad H",
     ),
-    "K with another sign": (replace(ASSOCIATE, K=-ASSOCIATE.K), "grad K_++- = B_++- grad H"),
-    "the K of other signs": (
-        replace(ASSOCIATE, K=MEMBER.associate((1, -1, 1)).K),
-        "grad K_++- = B_++- grad H",
-    ),
 }  # fmt: skip
-over_broken = pytest.mark.parametrize(
-    ("associate", "hypothesis"), BROKEN_ASSOCIATES.values(), ids=BROKEN_ASSOCIATES.keys()
-)
 
 
-@over_broken
+@pytest.mark.parametrize(("associate", "hypothesis"), BROKEN_ASSOCIATES.values(), ids=BROKEN_ASSOCIATES)
 def test_a_broken_associated_system_fails_in_that_hypothesis_alone(associate, hypothesis):
+    assert failing(theorems.associated_hypotheses(MEMBER, ASSOCIATE)) == []
     assert failing(theorems.associated_hypotheses(MEMBER, associate)) == [hypothesis]
-
-
-@over_broken
-def test_a_broken_associated_system_has_no_shared_integral(associate, hypothesis):
     assert theorems.shared_integral(MEMBER, associate) is None
-
-
-def test_an_associated_system_of_another_member_fails():
-    other = draw_with_eigenvalues([1, -2, 4], seed=3).associate((1, 1, -1))
-    assert failing(theorems.associated_hypotheses(MEMBER, other)) != []
 
 
 def forced(member: FamilyMember, **fields: object) -> FamilyMember:
@@ -123,6 +90,7 @@ def forced(member: FamilyMember, **fields: object) -> FamilyMember:
 
 
 def test_the_hypotheses_on_a_and_h_are_verified_anew():
+    assert failing(theorems.member_hypotheses(MEMBER)) == []
     A = MEMBER.A * fmpq(1)
     A[0, 0] += 1
     assert "A^T J = J A" in failing(theorems.member_hypotheses(forced(MEMBER, A=A)))
@@ -181,23 +149,14 @@ def test_a_chi_that_does_not_annihilate_a_proves_nothing_over_the_splitting_fiel
 # Poisson tensor, modified H, density
 
 
-def test_generic_members_have_an_invariant_poisson_tensor():
+def test_generic_members_have_an_invariant_poisson_tensor_and_those_with_a_repeated_root_none_by_the_theorem():
     assert theorems.poisson_tensor_invariant(MEMBER.chosen.hamiltonian, MEMBER) is not None
-
-
-def test_members_with_a_repeated_root_have_none_by_the_theorem():
     member = draw_with_eigenvalues([1, 1, 2], seed=3)
     assert theorems.poisson_tensor_invariant(member.chosen.hamiltonian, member) is None
 
 
 def test_a_hamiltonian_in_dimension_four_has_none_by_the_theorem():
     assert theorems.poisson_tensor_invariant(hamiltonian_of("x y z w", "x^3 + y*z*w"), None) is None
-
-
-@few
-@given(hamiltonians(dims=(2,)))
-def test_in_dimension_two_every_hamiltonian_has_an_invariant_poisson_tensor(hamiltonian):
-    assert theorems.poisson_tensor_invariant(hamiltonian, None) is not None
 
 
 @few
@@ -230,38 +189,22 @@ def test_a_broken_hamiltonian_system_proves_nothing(fields):
 
 # Linear relations g = C f
 
-
-def coefficient_rows(system: QuadraticSystem) -> list[list[Fraction]]:
-    """The coefficients of each component, in one order of the monomials."""
-    n = system.dim
-    monomials = [m for d in range(3) for m in all_monomials(n, d)]
-    tables = [{tuple(map(int, m)): c for m, c in polynomial.terms()} for polynomial in system.rhs]
-    return [[fraction(table.get(m, 0)) for m in monomials] for table in tables]
-
-
-def is_independent(system: QuadraticSystem) -> bool:
-    return rank_by_elimination(coefficient_rows(system)) == system.dim
-
-
-@st.composite
-def system_and_matrix(draw):
-    system = draw(systems(dims=(1, 2, 3)))
-    return system, draw(matrices(system.dim, system.dim))
+# x and (y, z) do not see each other; inhomogeneous on both sides.
+DECOUPLED = system_of("x y z", "x^2 - 3*x + 1", "y*z + 2*y - 1/2", "y^2 - z + 5")
 
 
 @few
-@given(system_and_matrix())
-def test_a_linear_relation_is_found_where_there_is_one(drawn):
-    f, C = drawn
-    assume(is_independent(f))
-    assert theorems.linear_relation(f, f.transformed(C)) == C
+@given(matrices(3, 3))
+def test_a_linear_relation_is_found_where_there_is_one(C):
+    assert theorems.linear_relation(DECOUPLED, DECOUPLED.transformed(C)) == C
 
 
-@few
-@given(systems(dims=(2,)), systems(dims=(2,)))
-def test_a_linear_relation_that_is_found_holds(f, g):
-    C = theorems.linear_relation(f, g)
-    assert C is None or f.transformed(C).rhs == g.rhs
+def test_where_components_depend_only_plus_and_minus_f_are_recognised():
+    dependent = system_of("x y", "x^2 + y", "2*x^2 + 2*y")
+    for sign in (1, -1):
+        assert theorems.linear_relation(dependent, dependent.scaled(sign)) == QQ.identity(2) * fmpq(sign)
+    assert theorems.linear_relation(dependent, dependent.scaled(2)) is None
+    assert theorems.linear_relation(LOTKA_VOLTERRA, EULER_TOP) is None
 
 
 @few
@@ -273,74 +216,26 @@ def test_a_relation_up_to_a_tiny_term_is_none(f, power, data):
     assert theorems.linear_relation(f, QuadraticSystem(rhs)) is None
 
 
-DEPENDENT = system_of("x y", "x^2 + y", "2*x^2 + 2*y")
-
-
-@pytest.mark.parametrize(("sign", "C"), [(1, QQ.identity(2)), (-1, QQ.identity(2) * fmpq(-1))])
-def test_where_components_depend_only_plus_and_minus_f_are_recognised(sign, C):
-    assert theorems.linear_relation(DEPENDENT, DEPENDENT.scaled(sign)) == C
-    assert theorems.linear_relation(DEPENDENT, DEPENDENT.scaled(2)) is None
-
-
-def test_systems_of_different_dimension_have_no_relation():
-    assert theorems.linear_relation(LOTKA_VOLTERRA, EULER_TOP) is None
-
-
 # The splitting lemma
-
-# x and (y, z) do not see each other; inhomogeneous on both sides.
-DECOUPLED = system_of("x y z", "x^2 - 3*x + 1", "y*z + 2*y - 1/2", "y^2 - z + 5")
-SPLIT = fmpq_mat([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
-HIDE = fmpq_mat([[1, 2, 0], [0, 1, -1], [1, 0, 1]])
-
-
-def hidden(system: QuadraticSystem, S: fmpq_mat) -> QuadraticSystem:
-    """The system in the coordinates y = S x: y' = S f(S^{-1} y)."""
-    back = S.inv()
-    x = ring(system.variables).gens()
-    old = [sum((back[i, j] * x[j] for j in range(system.dim)), 0 * x[0]) for i in range(system.dim)]
-    moved = [polynomial.compose(*old) for polynomial in system.rhs]
-    n = system.dim
-    return QuadraticSystem([sum((S[i, j] * moved[j] for j in range(n)), 0 * x[0]) for i in range(n)])
-
-
-def test_a_decoupled_inhomogeneous_system_and_its_flip_commute_by_the_lemma():
-    g = DECOUPLED.transformed(SPLIT)
-    proof = theorems.commuting_by_splitting(DECOUPLED, g)
-    assert proof.data["hypotheses"] == [
-        "g = C f with a constant matrix C",
-        "C^3 = C",
-        "C f'(x) = f'(x) C for every x",
-    ]
-    assert commute_at(DECOUPLED, g, EPS, X[:3]) is True
-
-
-def test_the_lemma_sees_through_a_change_of_coordinates():
-    f, C = hidden(DECOUPLED, HIDE), HIDE * SPLIT * HIDE.inv()
-    g = f.transformed(C)
-    assert theorems.commuting_by_splitting(f, g) is not None
-    assert commute_at(f, g, EPS, X[:3]) is True
-
-
-def test_the_names_of_the_variables_do_not_matter_to_the_lemma():
-    g = DECOUPLED.transformed(SPLIT)
-    renamed = g.renamed(["a", "b", "c"])
-    assert theorems.commuting_by_splitting(DECOUPLED, renamed) is not None
 
 
 @few
 @given(systems(dims=(1, 2)), systems(dims=(1, 2)), points(4, rationals(9)))
 def test_two_systems_side_by_side_and_one_of_them_reversed_commute(first, second, x):
     f, g = side_by_side(first, second), side_by_side(first, second.scaled(-1))
-    assume(is_independent(f))
+    assume(theorems.linear_relation(f, g) is not None)  # the components of f do not depend on each other
     assert theorems.commuting_by_splitting(f, g) is not None
     assert commute_at(f, g, EPS, exact(*x)[: f.dim]) in (True, None)
 
 
-@pytest.mark.parametrize("signs", [(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 1), (0, -1, -1)])
-def test_a_part_may_stand_still(signs):
+@pytest.mark.parametrize("signs", [(1, -1, -1), (0, 0, 0), (-1, 0, 0), (0, 1, 1)])
+def test_each_of_two_decoupled_parts_may_be_kept_reversed_or_stopped(signs):
     g = DECOUPLED.transformed(fmpq_mat([[s * (i == j) for j in range(3)] for i, s in enumerate(signs)]))
-    assert theorems.commuting_by_splitting(DECOUPLED, g) is not None
+    assert theorems.commuting_by_splitting(DECOUPLED, g).data["hypotheses"] == [
+        "g = C f with a constant matrix C",
+        "C^3 = C",
+        "C f'(x) = f'(x) C for every x",
+    ]
     assert commute_at(DECOUPLED, g, EPS, X[:3]) is True
 
 
@@ -368,18 +263,12 @@ BROKEN_SPLITTINGS = {
 @pytest.mark.parametrize(("f", "g"), BROKEN_SPLITTINGS.values(), ids=BROKEN_SPLITTINGS.keys())
 def test_each_hypothesis_of_the_lemma_is_needed(f, g):
     assert theorems.commuting_by_splitting(f, g) is None
-
-
-@pytest.mark.parametrize(("f", "g"), BROKEN_SPLITTINGS.values(), ids=BROKEN_SPLITTINGS.keys())
-def test_without_a_hypothesis_of_the_lemma_these_maps_do_not_commute(f, g):
     assert commute_at(f, g, EPS, X[:3]) is False
 
 
-@pytest.mark.parametrize("system", [LOTKA_VOLTERRA, EULER_TOP, HENON_HEILES])
-def test_a_map_commutes_with_itself_and_its_inverse_by_the_lemma(system):
-    assert theorems.commuting_by_splitting(system, system) is not None
-    assert theorems.commuting_by_splitting(system, system.scaled(-1)) is not None
-    assert theorems.commuting_by_splitting(system, system.scaled(2)) is None
+def test_a_map_commutes_with_itself_and_its_inverse_by_the_lemma():
+    for factor in (1, -1):
+        assert theorems.commuting_by_splitting(EULER_TOP, EULER_TOP.scaled(factor)) is not None
 
 
 def test_every_pair_of_a_class_commutes_by_the_lemma_too():
@@ -388,13 +277,3 @@ def test_every_pair_of_a_class_commutes_by_the_lemma_too():
     for associate in MEMBER.associated():
         assert theorems.linear_relation(base, associate.system) == associate.B.transpose()
         assert theorems.commuting_by_splitting(base, associate.system) is not None
-
-
-def test_a_member_with_a_equal_to_the_identity_may_have_any_cubic():
-    member = member_of(QQ.identity(4), [1, 2, 0, -1])
-    assert rows_of(member.A) == [[Fraction(int(i == j)) for j in range(4)] for i in range(4)]
-    assert theorems.member_hypotheses(member) == [
-        ("A^T J = J A", True),
-        ("H is a homogeneous cubic with A Hess(H) = Hess(H) A^T", True),
-    ]
-    assert standard_structure(4) * member.A == member.A.transpose() * standard_structure(4)

@@ -3,8 +3,6 @@
 For H = q p the determinant is 1 - eps^2, so at eps = 1 and eps = -1 the Kahan map has no value anywhere.
 """
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpq, fmpq_mat
 
@@ -29,22 +27,15 @@ SADDLE = SystemFile.from_hamiltonian(
     CubicHamiltonian(parse_polynomial("q*p", ["q", "p"]), standard_structure(2)), "saddle"
 )
 CHECKS = [check_integrals, check_measure, check_poisson, lambda file, settings: check_commute(file, file, settings)]
-over_checks = pytest.mark.parametrize("check", CHECKS, ids=["integrals", "measure", "poisson", "commute"])
 
 
-@over_checks
-@pytest.mark.parametrize("eps", ["1", "-1"])
-def test_nothing_is_proved_of_a_map_without_values(check, eps):
-    report = check(SADDLE, Settings(eps=eps, steps=2))
+@pytest.mark.parametrize("check", CHECKS, ids=["integrals", "measure", "poisson", "commute"])
+def test_nothing_is_proved_of_a_map_without_values(check):
+    report = check(SADDLE, Settings(eps="-1", steps=2))
     assert report.findings[0].verdict == "undecided"
     assert report.holds is None
     assert "not defined at any" in report.findings[0].evidence.summary
-
-
-@over_checks
-@pytest.mark.parametrize("eps", [None, "1/2"])
-def test_the_same_claims_are_proved_where_the_map_exists(check, eps):
-    assert check(SADDLE, Settings(eps=eps, steps=2)).verdict == "proved"
+    assert check(SADDLE, Settings(eps="1/2", steps=2)).verdict == "proved"
 
 
 def test_the_commutant_lemma_asks_for_the_standard_structure():

@@ -3,8 +3,6 @@
 `prime` says what happens, `seed` when: the odd ones go wrong, the even ones are done.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal
@@ -123,7 +121,7 @@ def _exit() -> dict[str, Any]:
 
 
 def _large() -> dict[str, Any]:
-    return {"digits": "7" * 3_000_000}
+    return {"digits": "7" * 3_000_000, "hash_seed": os.environ["PYTHONHASHSEED"]}
 
 
 def _deaf() -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """What a child makes of a task: what errors mean for the record, and that a limit of memory is the task's alone."""
 
-from __future__ import annotations
-
 import errno
 import json
 import sys

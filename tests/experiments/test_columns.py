@@ -1,7 +1,5 @@
 """Pairs of numbers from results: by the names of summaries, exact numbers as doubles, words in their order."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps.errors import InputError
@@ -22,10 +20,6 @@ def test_exact_numbers_are_doubles():
     assert (found.x.categories, found.missing, found.left_out) == (None, 0, 0)
 
 
-def test_numbers_beyond_doubles_are_infinite():
-    assert value_pairs([row(0, {"h": "1" + "0" * 400})], "eps", "h").y.values == [float("inf")]
-
-
 def test_words_have_places_in_their_order():
     rows = [row(0, {"h": 1}, verdict="refuted"), row(1, {"h": 2}, verdict="proved"), row(2, {"h": 3}, verdict="proved")]
     found = value_pairs(rows, "verdict", "h")
@@ -42,10 +36,6 @@ def test_what_has_no_number_is_counted():
     rows = [row(0, {"h": 1}), row(1, None), row(2, {}), row(3, {"h": "many"}), row(4, {"h": True})]
     found = value_pairs(rows, "eps", "h")
     assert (len(found.y.values), found.missing, found.left_out) == (1, 1, 3)
-
-
-def test_a_result_of_that_name_comes_before_the_run():
-    assert value_pairs([row(0, {"seconds": 7})], "m", "result.seconds").y.values == [7.0]
 
 
 @pytest.mark.parametrize(("x", "y"), [("epsi", "h"), ("eps", "hh"), ("eps", "word")])

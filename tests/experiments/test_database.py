@@ -3,8 +3,6 @@
 Faults are real ones: processes killed with signal 9, a disk that is full, bytes overwritten.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import signal
@@ -59,7 +57,7 @@ def damaged(path: Path) -> None:
 
 WRONG = [
     (Path.mkdir, "is a folder or a device"),
-    (lambda path: path.write_bytes(b"x"), "is not an SQLite database"),
+    (lambda path: path.write_bytes(b"x"), "is not an SQLite database"),  # which SQLite takes for an empty one
     (lambda path: path.write_text("text" * 1000), "is not an SQLite database"),
     (of_another_program, "of another program"),
     (of_another_format, "written by format 99 .* reads formats 1 and 2"),
@@ -67,13 +65,13 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("how", [{"readonly": True}, {}, {"create": True}])
 @pytest.mark.parametrize(("make", "told"), WRONG)
-def test_what_is_no_database_of_results_is_refused_and_left_alone(path, make, told, how):
+def test_what_is_no_database_of_results_is_refused_and_left_alone(path, make, told):
     make(path)
     before = path.read_bytes() if path.is_file() else None
-    with pytest.raises(StoreError, match=told):
-        Store.open(path, **how).status()
+    for how in ({"readonly": True}, {}, {"create": True}):
+        with pytest.raises(StoreError, match=told):
+            Store.open(path, **how).status()
     assert before is None or path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
 
@@ -159,21 +157,19 @@ with Store.open(path) as store:
 """
     planned(path, *range(10_000))
     acknowledged: set[str] = set()
-    for _ in range(2):
-        with start(script, path) as process:
-            assert process.stdout is not None
-            acknowledged.add(process.stdout.readline().strip())
-            time.sleep(random.uniform(0, 0.15))
-            process.kill()
-            lines = process.stdout.read().split("\n")
-        acknowledged.update(lines[:-1])  # after the last line break there may be half a key
-        assert process.returncode == -signal.SIGKILL
-        with Store.open(path, readonly=True) as store:
-            assert acknowledged <= {row.record.key for row in store.rows() if row.record}
-        with Store.open(path) as store:  # and the lock is free
-            # At most the one result for which the process was killed before it could say so, for each kill.
-            assert 0 <= 10_000 - store.count_pending() - len(acknowledged) <= 2
-    assert len(acknowledged) > 4
+    with start(script, path) as process:
+        acknowledged.add(process.stdout.readline().strip())
+        time.sleep(random.uniform(0, 0.15))
+        process.kill()
+        lines = process.stdout.read().split("\n")
+    acknowledged.update(lines[:-1])  # after the last line break there may be half a key
+    assert process.returncode == -signal.SIGKILL
+    with Store.open(path, readonly=True) as store:
+        assert acknowledged <= {row.record.key for row in store.rows() if row.record}
+    with Store.open(path) as store:  # and the lock is free
+        # At most the one result for which the process was killed before it could say so.
+        assert 0 <= 10_000 - store.count_pending() - len(acknowledged) <= 1
+    assert len(acknowledged) > 2
 
 
 def test_a_kill_while_a_plan_is_replaced_leaves_the_old_one(path):
@@ -205,7 +201,6 @@ def test_one_process_writes_at_a_time_and_its_lock_is_gone_at_rest(path):
     link = path.with_name("other.db")
     link.symlink_to(path)
     with start(script, path) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "open\n"
         for name in (path, link):
             with pytest.raises(StoreError, match="another batch is writing to"):

@@ -3,8 +3,6 @@
 A stable export has no trace of where, when and how long the work was done.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -14,11 +12,11 @@ import tracemalloc
 from dataclasses import replace
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.results.export import NUMBER, cell, flatten, write_csv, write_jsonl, write_parquet
+from kahanmaps.experiments.results.export import cell, flatten, write_csv, write_jsonl, write_parquet
 from kahanmaps.experiments.results.records import Outcome, Record, Row, Task
 
 FAMILY = Task("check-commute", {"family": {"m": 3, "seed": 7}}, {"eps": "1/10", "steps": 5})
@@ -54,6 +52,7 @@ def columns(rows, **options):
     return next(csv.reader(io.StringIO(csv_text(rows, **options), newline="")))
 
 
+few = settings(max_examples=40)
 TEXTS = st.text(max_size=8) | st.sampled_from(
     ["=A1", "-1/2", "+x", "'=1", "a\rb", "a\nb", 'a"b', "\udc80", "\0", "-1e5"]
 )
@@ -95,6 +94,7 @@ def many_rows(draw):
 # JSON lines
 
 
+@few
 @given(many_rows())
 def test_lines_parse_back_to_what_was_put_in(rows):
     header, *results, end = [json.loads(line) for line in jsonl(rows).split("\n")[:-1]]
@@ -134,6 +134,8 @@ def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result
     assert [found[name] for name in names] == ["2", "1", "3", "2", "4", "5"]
     names = ["verdict", "option.verdict", "result.verdict", "host", "option.host"]
     assert [found[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
+    (found,) = table([row(result={"a": {"b": 1}, "a.b": 2, "result.a.b": 3})])
+    assert [found[name] for name in ("a.b", "result.a.b", "result.result.a.b")] == ["1", "2", "3"]
 
 
 # Cells
@@ -144,24 +146,18 @@ def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result
     [
         (None, ""),
         (True, "true"),
-        (False, "false"),
-        (-3, "-3"),
         (10**40 + 1, "1" + "0" * 39 + "1"),
         (-0.1, "-0.1"),
         ("-7/3", "-7/3"),
-        ("+.5", "+.5"),
         ("-1.5e-3", "-1.5e-3"),
         ([1, "a", None], '[1, "a", null]'),
         ("=1+1", "'=1+1"),
         ("@x", "'@x"),
         ("+x", "'+x"),
-        ("-x^2", "'-x^2"),
         ("-1/0", "'-1/0"),  # no number
-        ("-1+cmd", "'-1+cmd"),
         ("\t=1", "'\t=1"),
         ("'=1", "''=1"),
         ("'quoted'", "'quoted'"),
-        ("a-b", "a-b"),
         ("\udc80", "\\udc80"),
     ],
 )
@@ -169,16 +165,7 @@ def test_a_cell_says_the_value(value, text):
     assert cell(value) == text
 
 
-@given(st.text(alphabet="'=+-@\t1/x.e", max_size=6))
-@example("''=x")
-def test_the_apostrophe_in_front_of_formulas_can_be_taken_away(text):
-    written = cell(text)
-    harmful = written[:1] in {"=", "+", "-", "@", "\t"} and not NUMBER.fullmatch(written)
-    assert not harmful
-    is_guarded = written.startswith("'") and written.lstrip("'")[:1] in {"=", "+", "-", "@", "\t"}
-    assert (written[1:] if is_guarded else written) == text
-
-
+@few
 @given(many_rows())
 def test_a_table_reads_back_cell_by_cell(rows):
     found = table(rows)
@@ -195,13 +182,6 @@ def test_a_table_reads_back_cell_by_cell(rows):
         assert sorted(filter(None, cells.values())) == expected
 
 
-def test_lines_end_in_a_newline_alone_and_cells_keep_their_line_ends():
-    rows = [row(message="a\r\nb"), row(message="c\rd"), row(message="e\nf")]
-    text = csv_text(rows)
-    assert text.count("\r\n") == 1
-    assert [cells["message"] for cells in table(rows)] == ["a\r\nb", "c\rd", "e\nf"]
-
-
 def test_a_new_column_in_the_second_reading_is_refused():
     readings = iter([[row()], [row(result={"late": 1})]])
     with pytest.raises(InputError, match="'late' of task 0 changed"):
@@ -211,6 +191,7 @@ def test_a_new_column_in_the_second_reading_is_refused():
 # Stable exports
 
 
+@few
 @given(many_rows(), st.data())
 def test_stable_exports_are_the_same_bytes_whatever_the_timings(rows, data):
     def elsewhere(source):
@@ -244,19 +225,17 @@ def stream_of_rows(count):
         yield row(number, result={"claims": number, "constant": f"{number}/7"})
 
 
-def to_jsonl(count, sink):
-    write_jsonl(stream_of_rows(count), sink)
-
-
-def to_csv(count, sink):
-    write_csv(lambda: stream_of_rows(count), sink)
-
-
-@pytest.mark.parametrize("count", [4_000, pytest.param(100_000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("write", "extra_lines"), [(to_jsonl, 2), (to_csv, 1)])
-def test_many_rows_are_never_held_together(write, extra_lines, count):
+@pytest.mark.parametrize(
+    ("write", "extra_lines"),
+    [
+        (lambda count, sink: write_jsonl(stream_of_rows(count), sink), 2),
+        (lambda count, sink: write_csv(lambda: stream_of_rows(count), sink), 1),
+    ],
+    ids=["jsonl", "csv"],
+)
+def test_many_rows_are_never_held_together(write, extra_lines):
     write(1, Sink())  # what is loaded late does not count
-    sink = Sink()
+    count, sink = 1_000, Sink()
     tracemalloc.start()
     try:
         write(count, sink)
@@ -264,7 +243,7 @@ def test_many_rows_are_never_held_together(write, extra_lines, count):
     finally:
         tracemalloc.stop()
     assert sink.lines == count + extra_lines
-    assert peak < 300_000  # measured: 4 kB and 140 kB, for any count; 10,000 rows in a list take 7 MB
+    assert peak < 300_000  # measured: 4 kB and 140 kB, for any count; 1,000 rows in a list take 700 kB
 
 
 # Parquet
@@ -289,13 +268,10 @@ def parquet(tmp_path):
     [
         ([1, None, -(2**63)], "int64", [1, None, -(2**63)]),
         ([1, 2**63], "string", ["1", str(2**63)]),
-        ([True, False], "bool", [True, False]),
         ([True, 1], "string", ["true", "1"]),
         ([1, 0.5], "double", [1.0, 0.5]),
         ([2**53 + 1, 0.5], "string", [str(2**53 + 1), "0.5"]),  # a float would lose the last digit
-        ([1, "7/3"], "string", ["1", "7/3"]),
         (["=1", "\udc80"], "string", ["=1", "\\udc80"]),  # no spreadsheet here
-        ([[1], None], "string", ["[1]", None]),
         ([None, None], "string", [None, None]),
     ],
 )

@@ -1,7 +1,5 @@
 """Grids: all combinations of axes, counted without being walked, in an order that is fixed; ranges are exact."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import product
 from typing import Any
@@ -12,10 +10,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.grid import Grid, RationalRange, Values, is_range, read_values
+from kahanmaps.experiments.grid import Grid, RationalRange, read_values
 from kahanmaps.experiments.options import VOCABULARY
 
-EPS, STEPS, SEED, METHOD = (VOCABULARY[name] for name in ("eps", "steps", "seed", "method"))
+EPS, STEPS, METHOD = (VOCABULARY[name] for name in ("eps", "steps", "method"))
 HUGE = 10**18
 
 
@@ -38,7 +36,7 @@ def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
 def read(option: Any, raw: Any) -> list[Any]:
     values, mistakes = read_values(option, raw)
     assert not mistakes
-    assert values is not None
+
     return list(values)
 
 
@@ -55,18 +53,12 @@ def mistakes(option: Any, raw: Any) -> list[tuple[tuple[int, ...], str]]:
     ("text", "values"),
     [
         ("1..3", ["1", "2", "3"]),
-        ("3..3", ["3"]),
-        ("1/10..1/2 step 1/10", ["1/10", "1/5", "3/10", "2/5", "1/2"]),
         ("0.1..0.3 step 0.1", ["1/10", "1/5", "3/10"]),  # machine numbers would end at 0.2
         ("0..1 step 0.3", ["0", "3/10", "3/5", "9/10"]),  # the end is not met
         ("0..1 step 2", ["0"]),
-        ("3..1 step -1", ["3", "2", "1"]),
         ("1/2..-1/2 step -1/3", ["1/2", "1/6", "-1/6", "-1/2"]),
-        ("-2..2 step 2", ["-2", "0", "2"]),
-        ("-5..-4", ["-5", "-4"]),
         (" 1 .. 2  step  1/2 ", ["1", "3/2", "2"]),
         (".5..1.5", ["1/2", "3/2"]),
-        ("1e1..2e1 step 5", ["10", "15", "20"]),
         ("1/3...5 step .1", ["1/3", "13/30"]),  # up to .5
     ],
 )
@@ -79,18 +71,15 @@ def test_a_range_is_exact(text, values):
     [
         ("1..5 step 0", "found a range of step 0, expected another step"),
         ("5..1", "found a range without values, from 5 to 1 in steps of 1 (for a falling range write a negative step)"),
-        ("1..5 step -1", "found a range without values, from 1 to 5 in steps of -1"),
+
         ("..", 'found \'..\', expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'),
         ("1..", "expected \"FIRST..LAST\""),
-        ("..5", "expected \"FIRST..LAST\""),
         ("5", "expected \"FIRST..LAST\""),
         ("1..5 step", "expected \"FIRST..LAST\""),
-        ("1..5 by 2", "expected \"FIRST..LAST\""),
         ("1..5 step 1 2", "expected \"FIRST..LAST\""),
         ("1..5 Step 2", "expected \"FIRST..LAST\""),
         ("1..3..5", "found '3..5', expected an integer, p/q or a decimal"),
         ("a..b", "found 'a', expected an integer, p/q or a decimal"),
-        ("0..10^18", "found '10^18', expected an integer, p/q or a decimal"),
         ("0..1e30", "more values than anybody can want"),
         ("0..1 step 1e-5000", "more values than anybody can want"),
     ],
@@ -114,18 +103,14 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     assert [fraction(value) for value in found] == expected
 
 
-def test_a_range_has_places_from_both_ends_and_slices():
-    values = RationalRange.from_text("0..10 step 2")
-    assert (values[-1], values[1:3]) == (10, [2, 4])
-    with pytest.raises(IndexError):
-        values[6]
-    with pytest.raises(IndexError):
-        values[-7]
-
-
-@pytest.mark.parametrize(("raw", "expected"), [("1..2", True), ("1.2", False), (5, False), (["1..2"], False)])
-def test_two_dots_in_a_text_make_a_range(raw, expected):
-    assert is_range(raw) is expected
+@pytest.mark.parametrize(
+    "values", [RationalRange.from_text("0..10 step 2"), read_values(STEPS, ["0..6 step 2", "8..10 step 2"])[0]]
+)
+def test_ranges_and_values_have_places_from_both_ends_and_slices(values):
+    assert (values[-1], values[4], values[1:3]) == (10, 8, [2, 4])
+    for index in (6, -7):
+        with pytest.raises(IndexError):
+            values[index]
 
 
 # Values of an option
@@ -135,9 +120,7 @@ def test_two_dots_in_a_text_make_a_range(raw, expected):
     ("option", "raw", "values"),
     [
         (EPS, "0.1", ["1/10"]),
-        (EPS, ["1/10", "0.05"], ["1/10", "1/20"]),
         (EPS, ["1/10", "1/3..2/3 step 1/6", 7], ["1/10", "1/3", "1/2", "2/3", "7"]),
-        (STEPS, "0..2", [0, 1, 2]),
         (STEPS, ["4..2 step -1", "10..11"], [4, 3, 2, 10, 11]),
         (STEPS, "1/2..1 step 1/2", None),
         (METHOD, ["doubling", "generic"], ["doubling", "generic"]),
@@ -150,25 +133,14 @@ def test_values_come_canonical_and_in_the_order_written(option, raw, values):
         assert read(option, raw) == values
 
 
-def test_values_have_places_from_both_ends_and_slices():
-    values, _ = read_values(STEPS, ["1..3", 7])
-    assert isinstance(values, Values)
-    assert (values[-1], values[3], values[1:]) == (7, 7, [2, 3, 7])
-    for index in (4, -5):
-        with pytest.raises(IndexError):
-            values[index]
-
-
 @pytest.mark.parametrize(
     ("option", "raw", "expected"),
     [
         (EPS, [], [((), "found an empty list, expected at least one value")]),
         (EPS, [1, 0, "x"], [(2, "found 0"), (3, "found 'x'")]),
         (EPS, "-1..1", [((), "found 0, expected another number")]),
-        (EPS, ["-1/2..1/2 step 1/4"], [(1, "found 0, expected another number")]),
         (EPS, ["0.1", "1/10"], [(2, "found '1/10', the same value as in place 1: expected it once")]),
         (STEPS, "0..4 step 3/2", [((), "found 3/2, expected a whole number")]),
-        (STEPS, "1..2 step 1/2", [((), "found 3/2, expected a whole number")]),
         (STEPS, "-5..5", [((), "found -5, expected a whole number")]),
         (STEPS, "0..1e10 step 1e9", [((), "found 10000000000, expected a whole number")]),
         (EPS, ["1..4e18", "5e18..9e18"], [((), "found more values than anybody can want")]),
@@ -225,19 +197,6 @@ def test_a_grid_is_the_product_of_its_axes_in_order(case):
     assert grid.size == len(expected)
     assert list(grid) == expected
     assert [grid[k] for k in range(grid.size)] == expected
-
-
-def test_the_last_axis_runs_fastest():
-    assert [row["b"] for row in Grid({"a": [1, 2], "b": [3, 4]})] == [3, 4, 3, 4]
-
-
-def test_zipped_axes_run_together_in_the_place_of_the_first():
-    grid = Grid({"a": [1, 2], "b": [3, 4], "c": [5, 6]}, [["c", "a"]])
-    assert [(row["a"], row["b"], row["c"]) for row in grid] == [(1, 3, 5), (1, 4, 5), (2, 3, 6), (2, 4, 6)]
-
-
-def test_a_grid_without_axes_is_one_point():
-    assert list(Grid({})) == [{}]
 
 
 @pytest.mark.parametrize("index", [-1, 4])

@@ -4,10 +4,7 @@ Known answers, with their origin, are those of the catalogue: the degrees 2 n^2 
 degrees 2 and 3 of maps without cancellation, the integrals and densities of the literature that the files name.
 """
 
-from __future__ import annotations
-
 import json
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +16,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import task_kind
-from kahanmaps.experiments.results.store import Store
-from kahanmaps.experiments.results.summary import summarise
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.finite.cycle_laws import compare
 from kahanmaps.laboratory.finite.cycles import cycle_census
-from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.preserve import densities, integrals
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve import densities
 from kahanmaps.laboratory.singular.singularities import singularities
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.reversors import find_reversor
@@ -66,38 +58,13 @@ def test_degenerate_systems_have_results_too(name, system):
     result = perform(name, system, **NEEDED.get(name, {}))
     assert result["status"]
     assert result.get("verdict", "proved") in (None, "proved", "supported", "undecided")
+    assert not set(result) & set(task_kind(name).options)  # otherwise a column would be called result.x
 
 
-@pytest.mark.parametrize("name", TASKS)
-def test_the_same_task_has_the_same_result_without_the_names_of_options(name):
-    # Otherwise a column would be called result.x.
-    asked = NEEDED.get(name, {})
-    result = perform(name, NAHM, **asked)
-    assert perform(name, NAHM, **asked) == result
-    assert not set(result) & set(task_kind(name).options)
-
-
-@pytest.mark.parametrize("name", [name for name in TASKS if "eps" in task_kind(name).options])
-def test_eps_0_is_refused(name):
-    with pytest.raises(InputError, match="at eps = 0 the Kahan map is the identity"):
-        perform(name, NAHM, **{**NEEDED.get(name, {}), "eps": 0})
-
-
-@pytest.mark.parametrize("name", [name for name in TASKS if name not in ("cycles", "singularities", "lyapunov")])
-def test_the_whole_report_is_kept_if_asked_for(name):
-    calls = {
-        "degrees": lambda: degree_growth(RIVALS.system),
-        "find-integrals": lambda: integrals.find_integrals(RIVALS),
-        "find-density": lambda: densities.find_densities(RIVALS),
-        "find-poisson": lambda: find_poisson(RIVALS),
-        "find-symmetry": lambda: linear_symmetries(RIVALS.system),
-        "find-commuting": lambda: commuting_systems(RIVALS.system, "linear"),
-        "analyze": lambda: analyze(RIVALS),
-    }
-    short, long = perform(name, RIVALS), perform(name, RIVALS, report=True)
+def test_the_whole_report_is_kept_if_asked_for():
+    short, long = perform("find-density", RIVALS), perform("find-density", RIVALS, report=True)
     assert "report" not in short
-    seconds = {"seconds": long["report"].get("seconds")} if name == "analyze" else {}
-    assert long == {**short, "report": {**json.loads(json.dumps(calls[name]().to_json())), **seconds}}
+    assert long == {**short, "report": json.loads(json.dumps(densities.find_densities(RIVALS).to_json()))}
 
 
 # Degrees
@@ -109,22 +76,18 @@ def test_the_whole_report_is_kept_if_asked_for(name):
         (TOP, "quadratic", "1", 2),
         (RIVALS, "exponential", "2", 0),
         (OSCILLATOR, "bounded", "1", 0),
-        (LINE, "bounded", "1", 0),
-        (member(1), "quadratic", "1", 2),
     ],
 )
 def test_the_growth_of_degrees_is_known(system, growth, rate, power):
     found = perform("degrees", system)
     assert (found["growth"], found["dynamical_degree"], found["power"]) == (growth, rate, power)
     assert found["status"] == ("explained" if found["degrees"][1] > 1 else "recurrence")
-    assert found["degrees"] == list(degree_growth(system.system).degrees)
     assert found["reached"] == len(found["degrees"]) - 1
 
 
 @pytest.mark.parametrize(
     ("asked", "status", "degrees"),
     [
-        ({"terms": 3}, "terms", [1, 3, 9, 27]),
         ({"terms": 2, "eps": "1/7"}, "terms", [1, 3, 9]),
         ({"max_degree": 10}, "degree", [1, 3, 9]),
     ],
@@ -134,17 +97,10 @@ def test_degrees_end_where_they_are_told_to(asked, status, degrees):
     assert (found["status"], found["degrees"]) == (status, degrees)
 
 
-def test_a_growth_that_is_not_known_is_called_so():
-    found = perform("degrees", of_catalogue("clebsch_first_flow"), terms=1)
-    assert (found["growth"], found["dynamical_degree"], found["recurrence"]) == ("unknown", None, None)
-
-
 # Formulas
 
 
-@pytest.mark.parametrize(
-    ("system", "count", "verdict"), [(TOP, 2, "proved"), (NAHM, 1, "proved"), (RIVALS, 0, None), (LORENZ, 0, None)]
-)
+@pytest.mark.parametrize(("system", "count", "verdict"), [(TOP, 2, "proved"), (LORENZ, 0, None)])
 def test_integrals_are_counted_and_given(system, count, verdict):
     found = perform("find-integrals", system)
     assert (found["integrals"], found["codimension"], found["verdict"]) == (count, count, verdict)
@@ -198,7 +154,7 @@ def test_a_member_commutes_with_its_associated_maps_and_others_with_nothing():
 # Singularities, cycles, exponents
 
 
-@pytest.mark.parametrize(("system", "word"), [(TOP, "confined"), (WEIERSTRASS, "confined"), (RIVALS, "not confined")])
+@pytest.mark.parametrize(("system", "word"), [(WEIERSTRASS, "confined"), (RIVALS, "not confined")])
 def test_confinement_is_known(system, word):
     found = perform("singularities", system)
     assert (found["confinement"], found["status"]) == (word, "complete")
@@ -285,13 +241,9 @@ def test_a_scan_may_be_by_densities_and_modulo_given_primes():
         ("scan", TOP, {"over": "b"}, "found the symbol 'b'"),
         ("scan", TOP, {"over": "a1", "by": "luck"}, "expected one of degrees, integrals, density"),
         ("scan", TOP, {"over": "a1", "primes": "11,13"}, "expected at least three"),
-        ("find-integrals", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
-        ("find-integrals", member(), {"symbolic": "a"}, "found"),
         ("degrees", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
-        ("singularities", member(4), {}, "found a system of dimension 8, expected at most 6"),
         ("singularities", TOP, {"steps": 0}, "found 0 steps, expected 1 to 10000"),
         ("cycles", TOP, {"prime": 2}, "found the prime 2"),
-        ("cycles", TOP, {"prime": 2**61 - 1}, "found the prime 2305843009213693951, expected one from 3 to"),
         ("cycles", TOP, {"prime": 31, "steps": 5}, "found steps = 5 without samples"),
         ("cycles", TOP, {"prime": 7, "eps": "1/7"}, "the prime 7 divides 1/7"),
         ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found 1 steps after 0, expected at least 2"),
@@ -303,64 +255,6 @@ def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
 
 
 # Batches
-
-
-SMALL = """
-[experiments.degrees]
-task = "degrees"
-system = ["euler_top", "lorenz", "lotka_volterra", "harmonic"]
-options = { max_degree = 300, seconds = 20 }
-[experiments.members]
-task = "degrees"
-system = "family"
-axes = { m = [1, 2], seed = [1, 2] }
-[experiments.integrals]
-task = "find-integrals"
-system = ["euler_top", "nahm_tetrahedral", "lotka_volterra"]
-[experiments.scaled]
-task = "find-density"
-system = "euler_top"
-axes = { "parameters.a1" = [2, 3] }
-[experiments.cycles]
-task = "cycles"
-system = ["weierstrass", "lotka_volterra"]
-axes = { prime = [101, 103], eps = ["1/7"] }
-[experiments.wrong]
-task = "cycles"
-system = "weierstrass"
-axes = { prime = [2] }
-"""
-
-
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    db = tmp_path_factory.mktemp("laboratory") / "small.db"
-    assert len(list(km.run(SMALL, db, jobs=2))) == 4 + 4 + 3 + 2 + 4 + 1
-    return db
-
-
-def test_a_batch_has_the_results_of_the_tasks(small):
-    with Store.open(small, readonly=True) as store:
-        rows = list(store.rows())
-    assert Counter(str(row.record.outcome) for row in rows) == {"ok": 17, "failed": 1}
-    assert next(row.record.message for row in rows if not row.record.is_ok).startswith("found the prime 2")
-    growth = [row.record.result["growth"] for row in rows if row.experiment == "degrees"]
-    assert growth == ["quadratic", "exponential", "exponential", "bounded"]
-    assert all(row.record.verdict == "proved" for row in rows if row.experiment == "scaled")
-
-
-def test_batches_are_grouped_by_what_was_found(small):
-    with Store.open(small, readonly=True) as store:
-        by_growth = summarise(store.rows(), ("task", "growth"))
-        by_count = summarise(store.rows(), ("integrals",))
-        by_law = summarise(store.rows(), ("name", "integrable_bound"))
-    assert {group.values: group.tasks for group in by_growth.groups if group.values[0] == "degrees"} == {
-        ("degrees", "bounded"): 1,
-        ("degrees", "exponential"): 2,
-        ("degrees", "quadratic"): 5,
-    }
-    assert [group.values[0] for group in by_count.groups] == [0, 1, 2, None]
-    assert {("weierstrass", "compatible"), ("lotka_volterra", "not compatible")} <= {g.values for g in by_law.groups}
 
 
 @pytest.mark.slow

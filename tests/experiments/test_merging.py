@@ -1,7 +1,5 @@
 """One database made of two: copies, shards in any order, results that contradict each other."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
@@ -42,7 +40,6 @@ def test_a_merge_into_an_empty_database_is_a_copy(path):
 
 MINE_AND_THEIRS = [
     (None, ok(1), ok(1), Merged(0, 1, 0, 0)),
-    (None, failed(1), failed(1), Merged(0, 1, 0, 0)),
     (ok(1), None, ok(1), Merged(0, 0, 0, 0)),
     (failed(1), ok(1), ok(1), Merged(0, 0, 1, 0)),
     (ok(1), failed(1), ok(1), Merged(0, 0, 0, 0)),
@@ -50,7 +47,6 @@ MINE_AND_THEIRS = [
     (ok(1), replace(ok(1), seconds=9.0, host="there"), ok(1), Merged(0, 0, 0, 0)),
     (ok(1, "1/2"), ok(1, "1/3"), ok(1, "1/2"), Merged(0, 0, 0, 1, (task(1).key,))),
     (ok(1, verdict="proved"), ok(1, verdict="refuted"), ok(1, verdict="proved"), Merged(0, 0, 0, 1, (task(1).key,))),
-    (ok(1, verdict=None), ok(1, verdict="refuted"), ok(1, verdict=None), Merged(0, 0, 0, 1, (task(1).key,))),
 ]
 
 
@@ -105,17 +101,7 @@ def test_a_database_is_not_merged_with_itself_nor_with_anything_else(path, store
         store.merge(path.with_name("text"))
 
 
-def test_a_database_that_is_being_written_can_be_merged(path):
-    source = path.with_name("source.db")
-    with Store.open(source, create=True) as other, Store.open(path, create=True) as store:
-        other.plan("a", "1", LIMITS, tasks(1, 2), {})
-        other.add([ok(1)])
-        assert store.merge(source) == Merged(2, 1, 0, 0)
-        other.add([ok(2)])
-        assert store.merge(source) == Merged(0, 1, 0, 0)
-
-
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(plan=st.lists(numbers, max_size=15), bad=st.sets(numbers), parts=st.integers(1, 3))
 def test_shards_merged_in_any_order_are_the_whole(plan, bad, parts):
     def run(path: Path, shard: tuple[int, int]) -> Path:

@@ -3,10 +3,8 @@
 Whatever is no value of an option is told in a sentence (InputError), with what was found and what was expected.
 """
 
-from __future__ import annotations
-
 import json
-from datetime import date, datetime, time
+from datetime import date, time
 from typing import Any
 
 import pytest
@@ -20,38 +18,24 @@ from kahanmaps.experiments.options import FAMILY, VOCABULARY, Option, show
 from kahanmaps.experiments.registry import task_kinds
 
 ALL = {**VOCABULARY, **FAMILY}
-PRIME = 2**61 - 1
 
 # Option, ways to write one value, the canonical text.
 SAME = [
     ("eps", [0.1, "0.1", "1/10", "2/20", " 1/10 ", ".1", "1e-1", fmpq(1, 10)], "1/10"),
     ("eps", [5, "5", "5.0", "10/2", "+5"], "5"),
-    ("eps", ["-1/3", "-2/6"], "-1/3"),
     ("steps", [5, "5", "5.0", "10/2"], 5),
     ("seed", [0, "0", "-0", "0.0"], 0),
-    ("seed", [2**63 - 1, "9223372036854775807"], 2**63 - 1),
     ("start", ["1/2,-1/3", "1/2, -1/3", " 0.5 ,-2/6"], "1/2,-1/3"),
     ("at", [5, "5", "5.0", "5,5"], "5"),
-    ("at", ["3,10", "10, 3", "3,10,3"], "3,10"),
     ("sections", ["1,2", "2,1", "2,1,2"], "1,2"),
     ("prime", [7, "7", "7.0", " 7"], "7"),
-    ("prime", [PRIME, str(PRIME)], str(PRIME)),
-    ("report", [True], True),
-    ("method", ["doubling"], "doubling"),
     ("arithmetic", ["mod:7"], "mod:7"),
     ("chi", ["t^2 - 2", "t^2-2", "2*t^2 - 4", "(t^2 - 2)", "t*t - 2"], "t^2 - 2"),
     ("chi", ["(t - 1)*(t + 1/2)", "t^2 - t/2 - 1/2"], "t^2 - 1/2*t - 1/2"),
     ("eigenvalues", ["1,0.5", "1, 1/2"], "1,1/2"),
     ("signs", ["1,-1", "+1, -1"], "1,-1"),
-    ("signs", ["-1,1"], "-1,1"),
     ("symbolic", ["a1,a2", "a2, a1", " a1 ,a2,a1"], "a1,a2"),
-    ("over", ["a1,eps", "eps, a1", "a1,eps,a1"], "a1,eps"),
     ("seconds", [60, "60", "60.0", "120/2"], 60),
-    ("terms", [8, "8"], 8),
-    ("max_degree", [0, "0"], 0),
-    ("samples", [100, "1e2"], 100),
-    ("transient", [0, "0"], 0),
-    ("shape", ["quadratic"], "quadratic"),
 ]
 
 
@@ -75,19 +59,13 @@ def test_one_value_has_one_canonical_form_however_it_is_written(name, written, c
     ("name", "canonical", "made"),
     [
         ("eps", "1/10", fmpq(1, 10)),
-        ("steps", 5, 5),
         ("start", "1/2,-1/3", (fmpq(1, 2), fmpq(-1, 3))),
         ("at", "3,10", (3, 10)),
-        ("sections", "2", (2,)),
         ("signs", "1,-1", (1, -1)),
         ("prime", "7", 7),
-        ("report", True, True),
-        ("method", "doubling", "doubling"),
         ("chi", "t^2 - 2", fmpq_poly([-2, 0, 1])),
         ("eigenvalues", "1,1/2", (fmpq(1), fmpq(1, 2))),
         ("symbolic", "a1,a2", ["a1", "a2"]),
-        ("over", "a1,eps", ["a1", "eps"]),
-        ("seconds", 60, 60),
     ],
 )
 def test_an_option_makes_what_the_library_wants(name, canonical, made):
@@ -106,46 +84,32 @@ def test_a_rational_option_gives_the_number_back(value):
     ("name", "value", "words"),
     [
         ("eps", 0, "found 0, expected another number: at eps = 0 the Kahan map is the identity"),
-        ("eps", "0/5", "found 0, expected another number"),
         ("eps", True, "found true, expected a number"),
-        ("eps", [1], "found [1], expected a number"),
-        ("eps", {"a": 1}, "found {'a': 1}, expected a number"),
         ("eps", date(1979, 5, 27), "found 1979-05-27, expected a number"),
         ("eps", "nan", "found 'nan', expected an integer, p/q or a decimal such as 0.1"),
-        ("eps", "1_000", "found '1_000', expected an integer, p/q or a decimal such as 0.1"),
         ("eps", "", "found nothing, expected an integer, p/q or a decimal such as 0.1"),
         ("eps", "1/0", "found the denominator 0, expected a nonzero integer"),
         ("eps", "1e10001", "found the power of ten '10001', expected at most 10000 in size"),
         ("steps", "1/2", "found 1/2, expected a whole number from 0 to 1000000000"),
-        ("steps", -1, "found -1, expected a whole number from 0 to 1000000000"),
         ("steps", 10**9 + 1, "found 1000000001, expected a whole number from 0 to 1000000000"),
-        ("every", 0, "found 0, expected a whole number from 1 to 1000000000"),
-        ("seed", 2**63, "found 9223372036854775808, expected a whole number from 0 to 9223372036854775807"),
         ("m", 17, "found 17, expected a whole number from 1 to 16"),
         ("report", 1, "found 1, expected true or false"),
-        ("report", "true", "found 'true', expected true or false"),
         (
             "method",
             "dubling",
             "found 'dubling', expected one of generic, normal-form, doubling; did you mean doubling?",
         ),
-        ("method", 5, "found 5, expected one of generic, normal-form, doubling"),
         ("start", 1, 'found 1, expected numbers separated by commas in one text, e.g. "1/2,-1/3"'),
         ("start", "1,,2", "entry 2: found nothing, expected an integer, p/q or a decimal such as 0.1"),
         ("start", "", "found nothing, expected a point"),
         ("at", "1.5", "found 3/2, expected whole numbers from 0 to 10^18, separated by commas in one text"),
-        ("at", -1, "found -1, expected whole numbers from 0 to 10^18"),
         ("at", 10**18 + 1, "found 1000000000000000001, expected whole numbers from 0 to 10^18"),
-        ("at", True, "found true, expected a number"),
-        ("at", "3,,4", "entry 2: found nothing"),
         ("sections", "1,11", "found 11, expected whole numbers from 1 to 10"),
         ("signs", "1,0", "found 0, expected 1 or -1"),
         ("prime", 4, "4"),
         ("prime", 1, "found 1, expected a prime of at most 192 bits"),
-        ("prime", "-7", "found -7, expected a prime of at most 192 bits"),
         ("prime", 2**200, "expected a prime of at most 192 bits"),
         ("arithmetic", "mod:4", "4"),
-        ("arithmetic", "mod:07", "found 'mod:07', expected exact, float, mod:P or ball:BITS"),
         ("arithmetic", "mod:" + "7" * 3000, "expected exact, float, mod:P or ball:BITS"),
         ("arithmetic", "ball:1000000000", "1000000000"),
         ("arithmetic", 7, "found 7, expected exact, float, mod:P or ball:BITS"),
@@ -155,16 +119,9 @@ def test_a_rational_option_gives_the_number_back(value):
         ("chi", "t^17", "found a polynomial of degree 17, expected at most 16"),
         ("chi", 2, "found 2, expected a polynomial in t, as text"),
         ("eigenvalues", ",".join(["1"] * 17), "found 17 numbers, expected at most 16"),
-        ("draw", "genric", "did you mean generic?"),
         ("symbolic", "a,eps", "found eps, expected names of parameters: without a value of eps it is in all formulas"),
         ("symbolic", "a,,b", "found the name '', expected names of parameters in one text"),
-        ("symbolic", "a b", "found the name 'a b', expected names"),
         ("symbolic", 1, "found 1, expected names of parameters in one text"),
-        ("seconds", 0, "found 0, expected a whole number from 1 to 1000000"),
-        ("seconds", "1/2", "found 1/2, expected a whole number from 1"),
-        ("terms", 0, "found 0, expected a whole number from 1 to 10000"),
-        ("samples", 0, "found 0, expected a whole number from 1 to 100000"),
-        ("shape", "linaer", "did you mean linear?"),
     ],
 )
 def test_what_is_no_value_is_told_in_a_sentence(name, value, words):
@@ -175,8 +132,7 @@ def test_what_is_no_value_is_told_in_a_sentence(name, value, words):
 @pytest.mark.parametrize(
     "value",
     [
-        None, True, -7, 10**4000, "", " ", "\x1b[31m", "1..2", "a" * 10_000, [], [1], {}, {"a": {}},
-        date(1979, 5, 27), time(7, 32), datetime(1979, 5, 27, 7, 32),
+        None, True, -7, 10**4000, "", "\x1b[31m", "1..2", "a" * 10_000, [1], {}, time(7, 32),
     ],
     ids=lambda value: show(value)[:12],
 )  # fmt: skip

@@ -1,7 +1,5 @@
 """Recipes: plain data that say how to come by a system, the same for the same system, and what is made of them."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -41,12 +39,9 @@ def again(file: SystemFile, **parameters: str) -> SystemFile:
     ("values", "member"),
     [
         ({"m": 2}, lambda: draw_with_eigenvalues(random_eigenvalues(2, 0), 0)),
-        ({"m": 3, "seed": 7}, lambda: draw_with_eigenvalues(random_eigenvalues(3, 7), 7)),
         ({"m": 3, "seed": 7, "size": 5}, lambda: draw_with_eigenvalues(random_eigenvalues(3, 7), 7, 5)),
-        ({"m": 3, "seed": 7, "draw": "generic"}, lambda: draw_generic(3, 7)),
         ({"m": 3, "seed": 7, "draw": "generic", "size": 4}, lambda: draw_generic(3, 7, 4)),
         ({"eigenvalues": "1/2,-3", "seed": 7}, lambda: draw_with_eigenvalues([fmpq(1, 2), -3], 7)),
-        ({"chi": "t^2 - 2", "seed": 7}, lambda: draw_with_chi(fmpq_poly([-2, 0, 1]), 7)),
         ({"chi": "2*t^2 - 4", "seed": 7, "size": 3}, lambda: draw_with_chi(fmpq_poly([-2, 0, 1]), 7, 3)),
     ],
 )
@@ -56,14 +51,7 @@ def test_a_random_member_is_the_one_that_the_library_draws(values, member):
 
 def test_signs_pick_an_associated_system():
     plain, other = drawn(m=2, seed=1).member, drawn(m=2, seed=1, signs="1,-1").member
-    assert plain is not None
-    assert other is not None
     assert (other.A, other.H, other.signs) == (plain.A, plain.H, (1, -1))
-
-
-def test_as_many_signs_as_factors_are_needed():
-    with pytest.raises(InputError, match="signs"):
-        drawn(m=2, seed=1, signs="1,-1,1")
 
 
 def test_a_recipe_without_a_size_of_the_member_is_told():
@@ -82,9 +70,9 @@ def test_a_recipe_of_a_member_is_complete():
 # Files
 
 
-@pytest.mark.parametrize("name", names())
-def test_every_system_of_the_catalogue_comes_back_equal(name):
-    assert again(load(name)) == load(name)
+def test_every_system_of_the_catalogue_comes_back_equal():
+    for name in names():
+        assert again(load(name)) == load(name)
 
 
 def test_documents_are_known_by_what_the_file_says():
@@ -98,9 +86,7 @@ def test_documents_are_known_by_what_the_file_says():
     ("text", "is_same"),
     [
         (ROTOR + CATALOG, True),  # what is told about a system is not the system
-        (ROTOR + CATALOG.replace("it turns", "it rests"), True),
-        (ROTOR.replace('"2"', "2.0"), True),
-        ("# a remark\n" + ROTOR, True),
+        ("# a remark\n" + ROTOR.replace('"2"', "2.0"), True),
         (ROTOR.replace('"2"', '"3"'), False),
         (ROTOR.replace("-x*y", "x*y"), False),
         (ROTOR.replace("rotor", "motor"), False),  # reports print the name
@@ -112,13 +98,8 @@ def test_a_recipe_is_another_one_when_the_file_says_something_else(text, is_same
     assert (recipe_of(parse_system(text), {}) == recipe_of(parse_system(ROTOR), {})) is is_same
 
 
-@pytest.mark.parametrize("reference", ["./lorenz.toml", "lorenz.toml", "sub/../lorenz.toml"])
-def test_a_path_is_relative_to_the_folder(tmp_path, reference):
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "lorenz.toml").write_text(ROTOR)
-    assert find_file(reference, tmp_path).name == "rotor"
-
-
-def test_a_name_is_that_of_the_catalogue(tmp_path):
-    (tmp_path / "lorenz").write_text(ROTOR)
-    assert find_file("lorenz", tmp_path).name == "lorenz"
+@pytest.mark.parametrize(("reference", "name"), [("lorenz", "lorenz"), ("./rotor.toml", "rotor")])
+def test_a_word_is_a_name_of_the_catalogue_and_a_path_is_relative_to_the_folder(tmp_path, reference, name):
+    for file in ("lorenz", "rotor.toml"):
+        (tmp_path / file).write_text(ROTOR)
+    assert find_file(reference, tmp_path).name == name

@@ -3,8 +3,6 @@
 Tests register names of their own and take them away again: the registry is one for the whole process.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any
@@ -59,22 +57,13 @@ def f(seed: int = 0):
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_the_library_has_the_tasks_that_are_documented(name):
-    assert task_kind(name).name == name
-    assert f"`{name}`" in DOCUMENTATION.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("name", LIBRARY)
-def test_every_task_has_a_summary_on_one_line(name):
-    summary = task_kind(name).summary
-    assert summary[-1] in ".?"
-    assert 10 < len(summary) <= 110
-
-
-@pytest.mark.parametrize("name", LIBRARY)
-def test_defaults_are_canonical_and_none_stands_for_not_given(name):
     kind = task_kind(name)
+    assert kind.name == name
+    assert kind.summary[-1] in ".?"
+    assert 10 < len(kind.summary) <= 110
     for key, default in kind.defaults.items():
         assert default is None or kind.options[key].read(default) == default
+    assert f"`{name}`" in DOCUMENTATION.read_text(encoding="utf-8")
 
 
 def test_a_signature_says_what_a_task_can_be_asked():
@@ -138,9 +127,7 @@ def test_tasks_of_ones_own_are_brought_in_by_the_environment(modules, monkeypatc
     ("text", "words"),
     [
         (None, "ModuleNotFoundError: No module named 'own_one'"),
-        ("import nothing_of_the_sort", "ModuleNotFoundError: No module named 'nothing_of_the_sort'"),
         ("def f(:", "SyntaxError: invalid syntax"),
-        ("1/0", "ZeroDivisionError: division by zero"),
         (TASK.replace("NAME", "orbit"), "TypeError: there are two tasks of the name orbit"),
         (TASK.replace("seed", "sed"), "TypeError: task NAME: sed is not an option; did you mean seed"),
     ],

@@ -1,42 +1,35 @@
 """Running batches: what comes out does not depend on how it was run, and nothing that is killed loses a record."""
 
-from __future__ import annotations
-
-import io
-import random
-import signal
-import sqlite3
-import subprocess
-import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
 import pytest
+from small_databases import exported
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.results.export import write_jsonl
 from kahanmaps.experiments.results.records import Job, Outcome, Record, Task
 from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running.run import Batch, run
 from kahanmaps.experiments.spec import SpecError, parse_spec
 
-HERE = Path(__file__).parent
+pytestmark = pytest.mark.usefixtures("fault_tasks")
 MIXED = """
 name = "mixed"
 limits = { time = "30 s", memory = "150 MB" }
 [experiments.faults]
 task = "fault"
-axes = { order = [2, 6, 8, 11], seed = "0..1" }
+axes = { order = [2, 6, 8], seed = "0..1" }
 [experiments.space]
 task = "family-space"
 system = "family"
-axes = { m = "2..3", seed = "0..4" }
+axes = { m = 2, seed = "0..2" }
 [experiments.top]
 task = "check-integrals"
 system = ["euler_top", "lorenz", "henon_heiles"]
-axes = { time_step = ["1/5", "0.3"] }
+axes = { time_step = "1/5" }
 """
 PAUSES = """
 [experiments.pause]
@@ -46,34 +39,16 @@ axes = {{ seed = "0..{last}" }}
 """
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _fault_tasks() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.syspath_prepend(str(HERE))
-        monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
-        monkeypatch.setenv("PYTHONPATH", str(HERE))
-        yield
-
-
-def exported(db: Path) -> str:
-    """The results of a database without times and places, in the order of the plan."""
-    stream = io.StringIO()
-    with Store.open(db, readonly=True) as store:
-        write_jsonl(store.rows(), stream, stable=True)
-    return stream.getvalue()
-
-
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
+def undisturbed(fault_tasks, tmp_path_factory) -> str:
     """What MIXED gives, one child at a time."""
     db = tmp_path_factory.mktemp("undisturbed") / "results.db"
     records = list(run(MIXED, db))
-    assert len(records) == 8 + 10 + 6
-    assert {record.outcome for record in records} == {
-        Outcome.OK,
-        Outcome.CRASHED,
-        Outcome.FAILED,
-        Outcome.OUT_OF_MEMORY,
+    assert Counter(record.outcome for record in records) == {
+        Outcome.OK: 3 + 3 + 2,
+        Outcome.CRASHED: 1,
+        Outcome.FAILED: 1 + 1,
+        Outcome.OUT_OF_MEMORY: 1,
     }
     return exported(db)
 
@@ -81,21 +56,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_interruptions(
     undisturbed: str, tmp_path: Path
 ):
-    for name in ("top", "faults", "space"):
-        found = run(MIXED, tmp_path / "b.db", jobs=2, only=[name])
-        assert len(list(islice(found, 3))) == 3
-        found.close()  # type: ignore[attr-defined]
+    found = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
+    assert len(list(islice(found, 2))) == 2
+    found.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
-
-
-def test_shards_merged_are_the_whole(undisturbed: str, tmp_path: Path):
-    counts = [len(list(run(MIXED, tmp_path / f"{i}.db", jobs=2, shard=(i, 3)))) for i in (1, 2, 3)]
-    assert counts == [8, 8, 8]
-    with Store.open(tmp_path / "all.db", create=True) as store:
-        for i in (2, 3, 1):
-            store.merge(tmp_path / f"{i}.db")
-    assert exported(tmp_path / "all.db") == undisturbed
 
 
 def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path: Path):
@@ -107,17 +72,14 @@ def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path: Path):
     found.close()  # type: ignore[attr-defined]
 
 
-def test_a_second_run_does_nothing(tmp_path: Path):
-    text = PAUSES.format(milliseconds=1, last=5)
-    assert len(list(run(text, tmp_path / "a.db"))) == 6
-    assert list(run(text, tmp_path / "a.db")) == []
-
-
 def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
-    assert len(list(run(PAUSES.format(milliseconds=1, last=5), tmp_path / "a.db"))) == 6
+    text = PAUSES.format(milliseconds=1, last=5)
+    (tmp_path / "spec.toml").write_text(text)
+    assert len(list(run(tmp_path / "spec.toml", tmp_path / "a.db"))) == 6
+    for spec in (str(tmp_path / "spec.toml"), text, parse_spec(text)):
+        assert list(run(spec, tmp_path / "a.db")) == []
     new = list(run(PAUSES.format(milliseconds=1, last=8), tmp_path / "a.db"))
-    assert len(new) == 3
-    assert len(list(run(PAUSES.format(milliseconds=2, last=5), tmp_path / "a.db"))) == 6
+    assert sorted(record.result["seed_squared"] for record in new if record.result) == [36, 49, 64]
 
 
 def test_failed_tasks_are_done_again_when_that_is_asked_for(tmp_path: Path):
@@ -126,19 +88,6 @@ def test_failed_tasks_are_done_again_when_that_is_asked_for(tmp_path: Path):
     assert list(run(text, tmp_path / "a.db")) == []
     again = list(run(text, tmp_path / "a.db", retry_failed=True))
     assert [record.outcome for record in again] == [Outcome.FAILED] * 2
-
-
-def test_without_a_database_records_come_all_the_same():
-    records = list(run(PAUSES.format(milliseconds=1, last=5), jobs=2))
-    assert sorted(record.result["seed_squared"] for record in records if record.result) == [0, 1, 4, 9, 16, 25]
-
-
-def test_a_spec_may_be_a_path_a_text_or_an_object(tmp_path: Path):
-    text = PAUSES.format(milliseconds=1, last=1)
-    path = tmp_path / "spec.toml"
-    path.write_text(text)
-    keys = [sorted(record.key for record in run(spec)) for spec in (text, path, str(path), parse_spec(text))]
-    assert keys[0] == keys[1] == keys[2] == keys[3]
 
 
 def test_wrong_specs_and_missing_files_are_told(tmp_path: Path):
@@ -245,40 +194,3 @@ def test_jobs_are_taken_one_by_one_as_they_are_needed():
 
     assert len(list(islice(Batch(endless(), Scripted()), 100))) == 100
     assert taken < 110
-
-
-def killed_and_completed(folder: Path, kills: int, last: int, seed: int) -> None:
-    """Run a batch, kill -9 its parent at random instants, complete it, compare with an undisturbed run."""
-    text = PAUSES.format(milliseconds=4, last=last)
-    spec = folder / "spec.toml"
-    spec.write_text(text)
-    list(run(text, folder / "calm.db", jobs=2))
-    command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
-    rng = random.Random(seed)
-    killed = 0
-    while killed < kills:
-        process = subprocess.Popen([*command, "-q"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-        try:
-            process.wait(rng.uniform(0.05, 1.2))
-        except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGKILL)
-            killed += 1
-        else:
-            assert process.stderr is not None
-            assert process.returncode == 0, process.stderr.read().decode()
-            (folder / "wild.db").unlink()  # done before it could be killed: once more from the start
-        process.communicate()
-    done = sum(1 for _ in run(text, folder / "wild.db", jobs=2))
-    assert exported(folder / "wild.db") == exported(folder / "calm.db")
-    assert sqlite3.connect(folder / "wild.db").execute("PRAGMA integrity_check").fetchone() == ("ok",)
-    assert not list(folder.glob("*.db-*"))
-    assert done <= last + 1
-
-
-def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path):
-    killed_and_completed(tmp_path, kills=4, last=300, seed=1)
-
-
-@pytest.mark.slow
-def test_a_batch_that_is_killed_fifty_times_comes_to_the_same_end(tmp_path: Path):
-    killed_and_completed(tmp_path, kills=50, last=12_000, seed=2)

@@ -4,8 +4,6 @@ A task whose own code or libraries die (SIGSEGV, SIGABRT, ...) is recorded as cr
 are the machine's doing. The tasks are those of fault_tasks.py.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os
@@ -18,16 +16,15 @@ from pathlib import Path
 from signal import Signals
 
 import pytest
+from small_databases import exported
 
-from kahanmaps.experiments.results.export import write_jsonl
 from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, Task
 from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running.children import TRIES, LocalChildren, is_from_outside
 from kahanmaps.experiments.running.group import main as do_group
 from kahanmaps.experiments.running.run import Batch, run
 
-HERE = Path(__file__).parent
-OUTSIDE = [Signals.SIGTERM, Signals.SIGQUIT, Signals.SIGHUP, Signals.SIGKILL, Signals.SIGUSR1]
+pytestmark = pytest.mark.usefixtures("fault_tasks")
 OWN = [Signals.SIGSEGV, Signals.SIGABRT, Signals.SIGFPE, Signals.SIGBUS, Signals.SIGILL, Signals.SIGSYS]
 OWN += [Signals.SIGTRAP, Signals.SIGXCPU, Signals.SIGXFSZ]
 ALWAYS = 99
@@ -39,11 +36,8 @@ axes = { order = [15], seed = [0, 99] }
 
 
 @pytest.fixture(autouse=True)
-def _fault_tasks(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def _tries(monkeypatch, tmp_path):
     (tmp_path / "tries").mkdir()
-    monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
-    monkeypatch.setenv("PYTHONPATH", str(HERE))
     monkeypatch.setenv("FAULT_TRIES", str(tmp_path / "tries"))
 
 
@@ -67,23 +61,12 @@ def done(jobs: Sequence[Job], children: int = 2) -> dict[str, Record]:
 # Which signals
 
 
-@pytest.mark.parametrize("number", list(Signals))
-def test_the_signals_of_a_task_itself_are_those_of_faults_and_limits(number: Signals):
-    assert is_from_outside(-number) == (number not in OWN)
-
-
-@pytest.mark.parametrize("status", [None, 0, 1, 7, 137])
-def test_what_no_signal_ended_was_not_ended_from_outside(status: int | None):
-    assert not is_from_outside(status)
+def test_the_signals_of_a_task_itself_are_those_of_faults_and_limits():
+    assert {number for number in Signals if not is_from_outside(-number)} == set(OWN)
+    assert not any(map(is_from_outside, (None, 0, 1, 7, 137)))
 
 
 # Children
-
-
-def test_a_task_whose_child_is_killed_from_outside_is_done_at_the_next_try(tmp_path: Path):
-    records = done([signalled(number, 1) for number in OUTSIDE])
-    assert all(record.is_ok for record in records.values())
-    assert [tries(tmp_path, number, 1) for number in OUTSIDE] == [2] * len(OUTSIDE)
 
 
 def test_a_task_whose_child_is_killed_from_outside_again_and_again_is_lost_and_not_crashed(tmp_path: Path):
@@ -104,13 +87,7 @@ def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
     assert tries(tmp_path, signal.SIGABRT, ALWAYS) == 2
 
 
-def test_ctrl_c_does_not_reach_a_child(tmp_path: Path):
-    (record,) = done([signalled(signal.SIGINT, ALWAYS)]).values()
-    assert record.is_ok
-    assert tries(tmp_path, signal.SIGINT, ALWAYS) == 1
-
-
-@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.03, 0.06, 0.1, 0.15])
+@pytest.mark.parametrize("seconds", [0.0, 0.05, 0.15])
 def test_ctrl_c_does_not_reach_a_child_that_begins(tmp_path: Path, seconds: float):
     """There Python has no place for it: it ended in a fatal error with status 1, or in RuntimeError."""
     children = LocalChildren(1, {}.__getitem__)
@@ -130,8 +107,7 @@ def test_ctrl_c_does_not_reach_a_child_that_begins(tmp_path: Path, seconds: floa
         children.close()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGSEGV])
-def test_a_child_that_dies_while_it_has_nothing_to_do_costs_no_task(number: Signals):
+def test_a_child_that_dies_while_it_has_nothing_to_do_costs_no_task():
     children = LocalChildren(1, {}.__getitem__)
     try:
         for times in (0, 1):
@@ -139,7 +115,7 @@ def test_a_child_that_dies_while_it_has_nothing_to_do_costs_no_task(number: Sign
             (record,) = children.wait(20.0)
             assert record.is_ok
             if times == 0:
-                os.kill(children._children[0].process.pid, number)
+                os.kill(children._children[0].process.pid, signal.SIGSEGV)
                 children._children[0].process.wait(5)
     finally:
         children.close()
@@ -161,13 +137,6 @@ def test_the_group_command_hands_a_lost_task_back_at_once_for_another_machine_to
 
 
 # What remains of it
-
-
-def exported(db: Path) -> str:
-    stream = io.StringIO()
-    with Store.open(db, readonly=True) as store:
-        write_jsonl(store.rows(), stream, stable=True)
-    return stream.getvalue()
 
 
 def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path):
@@ -194,7 +163,6 @@ def test_a_task_that_is_lost_when_it_is_tried_again_keeps_the_failure_it_had(tmp
         store.add([Record(task.key, Outcome.FAILED, message="before")])
         store.add([Record(task.key, Outcome.LOST)])
         (found,) = store.find(task.key)
-        assert found.record is not None
         assert (found.record.outcome, found.record.message, found.attempts) == (Outcome.FAILED, "before", 1)
 
 
@@ -203,11 +171,7 @@ def test_a_task_that_is_lost_when_it_is_tried_again_keeps_the_failure_it_had(tmp
 
 @pytest.mark.parametrize(
     ("number", "first"),
-    [
-        pytest.param(number, first, marks=[] if (number, first) == (Signals.SIGTERM, "children") else pytest.mark.slow)
-        for number in (Signals.SIGINT, *OUTSIDE)
-        for first in ("parent", "children")
-    ],
+    [(Signals.SIGTERM, "children"), (Signals.SIGINT, "parent"), (Signals.SIGKILL, "parent")],
 )
 def test_a_signal_to_a_batch_and_all_its_children_changes_no_result(tmp_path: Path, number: Signals, first: str):
     text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..29" }\n'

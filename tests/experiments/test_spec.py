@@ -1,7 +1,5 @@
 """Specs: what they say becomes tasks, with one key for one question; nothing is enumerated before it is asked for."""
 
-from __future__ import annotations
-
 import json
 import re
 import time
@@ -12,7 +10,7 @@ import pytest
 from helpers import rationals
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, UNIVERSAL, mistakes, only, option, task_of, tasks
+from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, mistakes, only, option, task_of, tasks
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.experiment import DEFAULT_LIMITS
@@ -59,7 +57,7 @@ def test_the_seed_of_the_family_is_that_of_the_task():
     found = tasks(SPACE + 'system = "family"\naxes = {m = 2, seed = "3..4"}')
     assert [task.value("seed") for task in found] == [3, 4]
     start = tasks(FAMILY + "axes = {m = 2, seed = [3], eps = 1}")[0]
-    assert start.system is not None
+
     assert (start.options["seed"], start.system["family"]["seed"]) == (3, 3)
 
 
@@ -67,8 +65,6 @@ def test_the_seed_of_the_family_is_that_of_the_task():
     ("axes", "eps"),
     [
         ("time_step = 0.2", ["1/10"]),
-        ('time_step = ["1/5", "1/3"]', ["1/10", "1/6"]),
-        ('time_step = "1..3"', ["1/2", "1", "3/2"]),
         ('time_step = [7, "1..2"]', ["7/2", "1/2", "1"]),
     ],
 )
@@ -95,16 +91,14 @@ def test_rows_of_a_zip_may_not_repeat_nor_values_of_other_axes(line, message):
         only(LORENZ + f"{line}\naxes = {{eps = 1, parameters = {{s = [1, 1, 2], r = [5, 5, 6]}}}}")
 
 
-@pytest.mark.parametrize("name", ["eps", "time_step"])
-@pytest.mark.parametrize("zipped", ["eps", "time_step"])
+@pytest.mark.parametrize(("name", "zipped"), [("eps", "time_step"), ("time_step", "eps"), ("time_step", "time_step")])
 def test_a_zip_may_name_eps_or_the_time_step(name, zipped):
     text = LORENZ + f'zip = [["{zipped}", "seed"]]\naxes = {{{name} = [1, 2], seed = [3, 4]}}'
     assert option(text, "seed") == [3, 4]
 
 
-@pytest.mark.parametrize("where", ["axes.parameters", "options.parameters"])
-def test_parameters_of_a_system_may_be_given(where):
-    task = task_of(LORENZ + f"axes.eps = 1\n{where}.s = 0.5")
+def test_parameters_of_a_system_may_be_given():
+    task = task_of(LORENZ + "axes.eps = 1\noptions.parameters.s = 0.5")
     assert [task.value(f"parameters.{name}") for name in "srb"] == ["1/2", "28", "8/3"]
 
 
@@ -121,11 +115,9 @@ def test_paths_of_systems_are_relative_to_the_folder_of_the_spec(folder, tmp_pat
 @pytest.mark.parametrize(
     ("system", "names"),
     [
-        ('"rotor.toml"', ["rotor"]),
         ('["rotor.toml", "lorenz"]', ["rotor", "lorenz"]),
         ('"members/*.toml"', ["one", "two"]),
-        ('["lorenz", "members/t*.toml"]', ["lorenz", "two"]),
-        ('"*/[a-o]*.toml"', ["one"]),
+        ('["lorenz", "*/[p-z]*.toml"]', ["lorenz", "two"]),
     ],
 )
 def test_systems_are_names_paths_patterns_or_lists_of_these(folder, system, names):
@@ -133,25 +125,13 @@ def test_systems_are_names_paths_patterns_or_lists_of_these(folder, system, name
     assert [task.system["name"] for task in found if task.system] == names
 
 
-def test_a_catalogue_name_is_not_a_file_of_the_folder(folder, monkeypatch):
-    (folder / "lorenz").write_text(ROTOR)
-    monkeypatch.chdir(folder)
-    task = task_of(LORENZ + "axes = {eps = 1}", folder=folder)
-    assert task.value("parameters.s") == "10"
-
-
 def test_a_second_system_is_a_recipe_like_the_first(folder):
     text = COMMUTE + 'system = "lotka_volterra"\naxes = {other = ["harmonic", "rotor.toml"]}'
     found = tasks(text, folder=folder)
     spec = parse_spec(text, folder=folder)
     assert [task.options["other"]["name"] for task in found] == ["harmonic", "rotor"]
-    assert all(task.options["other"]["document"] in spec.documents for task in found)
-
-
-def test_documents_hold_every_system_that_a_task_names(folder):
-    spec = parse_spec(LORENZ.replace('"lorenz"', '["lorenz", "*/*.toml"]') + "axes = {eps = 1}", folder=folder)
-    named = {task.system["document"] for task in spec.experiments[0].tasks() if task.system}
-    assert named == set(spec.documents)
+    named = {task.options["other"]["document"] for task in found}
+    assert named | {task.system["document"] for task in found} == set(spec.documents)
     assert all(isinstance(json.loads(text), dict) for text in spec.documents.values())
 
 
@@ -161,27 +141,26 @@ def test_documents_hold_every_system_that_a_task_names(folder):
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + 'axes = {eps = "1/10"}'),
         (LORENZ + "axes = {eps = 0.1}", LORENZ + 'options = {eps = "2/20"}'),
         (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {time_step = 2e-1}"),
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {eps = [0.1]}"),
         (LORENZ + "axes = {eps = 1000.5}", LORENZ + "axes = {eps = 1_000.5}"),
-        (LORENZ + "axes = {eps = 5}", LORENZ + "axes = {eps = 5.0}"),
         (LORENZ + "axes = {eps = 1, steps = 5}", LORENZ + 'axes = {steps = "5.0", eps = "1"}'),
         (LORENZ + "axes = {eps = 1}", LORENZ + 'axes = {eps = 1, steps = 100, arithmetic = "exact", seed = 0}'),
-        (LORENZ + "axes = {eps = 1}", LORENZ + 'axes = {eps = 1, parameters = {s = 10, b = "16/6"}}'),
-        (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1}\nlimits = {time = 5, memory = 1000}"),
+        (
+            LORENZ + "axes = {eps = 1}",
+            LORENZ + 'axes = {eps = 1, parameters = {s = 10, b = "16/6"}}\nlimits = {time = 5, memory = 1000}',
+        ),
         (LORENZ + 'axes = {eps = 1, start = "1/2, -1/3, 0"}', LORENZ + 'axes = {eps = 1, start = "0.5,-2/6,0"}'),
-        (LORENZ + 'axes = {eps = 1, at = "3, 5"}', LORENZ + 'axes = {eps = 1, at = "5,3"}'),
+
         (LORENZ + "axes = {eps = 1, max_digits = 9}", LORENZ + "axes = {eps = 1}\nlimits = {digits = 9}"),
         (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, draw = "eigenvalues", size = 2}'),
-        (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + "axes = {eps = 1, m = 2, seed = 0}"),
+
         (
             FAMILY + 'axes = {eps = 1, m = 2, draw = "generic"}',
             FAMILY + 'axes = {eps = 1, m = 2, draw = "generic", size = 1}',
         ),
         (FAMILY + 'axes = {eps = 1, chi = "t^2-2"}', FAMILY + 'axes = {eps = 1, chi = "2*t^2 - 4", size = 1}'),
-        (FAMILY + 'axes = {eps = 1, eigenvalues = "1, 0.5"}', FAMILY + 'axes = {eps = 1, eigenvalues = "1,1/2"}'),
+
         ('[experiments.b]\ntask = "orbit"\nsystem = ["lorenz"]\naxes = {eps = 1}', LORENZ + "axes = {eps = 1}"),
     ],
 )  # fmt: skip
@@ -192,32 +171,25 @@ def test_the_same_question_has_the_same_key(one, other):
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {eps = 0.2}"),
         (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {time_step = 0.1}"),
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {eps = -0.1}"),
-        (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1, seed = 1}"),
         (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1}\nlimits = {digits = 9}"),
         (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1, parameters = {s = 11}}"),
-        (LORENZ + "axes = {eps = 1}", LORENZ.replace("lorenz", "riccati") + "axes = {eps = 1}"),
         (LORENZ + "axes = {eps = 1}", LORENZ.replace("orbit", "heights") + "axes = {eps = 1}"),
         (LORENZ + 'axes = {eps = 1, start = "1,2,3"}', LORENZ + 'axes = {eps = 1, start = "1,3,2"}'),
-        (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + "axes = {eps = 1, m = 3}"),
         (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, draw = "generic"}'),
         (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, signs = "1,-1"}'),
         (FAMILY + 'axes = {eps = 1, eigenvalues = "1,2"}', FAMILY + 'axes = {eps = 1, eigenvalues = "2,1"}'),
-        (FAMILY + 'axes = {eps = 1, chi = "t^2 - 2"}', FAMILY + 'axes = {eps = 1, chi = "t^2 - 3"}'),
         (
             COMMUTE + 'system = "lorenz"\naxes = {other = "euler_top"}',
             COMMUTE + 'system = "euler_top"\naxes = {other = "lorenz"}',
         ),
-        (UNIVERSAL + "axes = {m = 2}", UNIVERSAL + "axes = {m = 2, controls = true}"),
     ],
 )
 def test_different_questions_have_different_keys(one, other):
     assert task_of(one).key != task_of(other).key
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(rationals(1000).filter(lambda eps: eps != 0), st.integers(1, 50), st.integers(0, 30))
 def test_the_key_does_not_depend_on_how_numbers_are_written(eps, factor, steps):
     p, q = int(eps.p), int(eps.q)
@@ -230,30 +202,15 @@ def test_the_key_does_not_depend_on_how_numbers_are_written(eps, factor, steps):
     assert {task_of(form).key for form in forms} == {task_of(plain).key}
 
 
-def test_a_system_file_that_says_something_else_gives_other_keys(folder):
-    text = LORENZ.replace("lorenz", "rotor.toml") + "axes = {eps = 1}"
-    before = task_of(text, folder=folder).key
-    (folder / "rotor.toml").write_text(ROTOR.replace("-x*y", "x*y"))
-    assert task_of(text, folder=folder).key != before
-
-
 @pytest.mark.parametrize(
-    "rewritten",
-    [
-        ROTOR.replace('"2"', "2"),
-        ROTOR.replace('"2"', "2.0"),
-        "# a remark\n" + ROTOR.replace("\n", "\r\n"),
-        ROTOR + '[catalog]\ntitle = "Rotor"\nfacts = ["Measured: it turns."]\n',
-    ],
+    ("rewritten", "is_same"),
+    [("# a remark\n" + ROTOR.replace("\n", "\r\n").replace('"2"', "2.0"), True), (ROTOR.replace("-x*y", "x*y"), False)],
 )
-def test_a_system_file_that_says_the_same_gives_the_same_keys(folder, rewritten):
+def test_keys_depend_on_what_a_system_file_says_and_not_on_how(folder, rewritten, is_same):
     text = LORENZ.replace("lorenz", "rotor.toml") + "axes = {eps = 1}"
     before = task_of(text, folder=folder).key
     (folder / "rotor.toml").write_text(rewritten)
-    assert task_of(text, folder=folder).key == before
-
-
-# Experiments as sequences
+    assert (task_of(text, folder=folder).key == before) is is_same
 
 
 # Definitions
@@ -262,11 +219,9 @@ def test_a_system_file_that_says_the_same_gives_the_same_keys(folder, rewritten)
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        (LORENZ + "axes = {eps = [0.1, 1]}", LORENZ + 'axes = {eps = ["1/10", "1.0"]}'),
         (LORENZ + "axes = {eps = [0.1, 1]}", LORENZ + "axes = {time_step = [0.2, 2]}"),
         (LORENZ + "axes = {eps = [0.1, 1]}", LORENZ + "axes = {eps = [0.1, 1]}\noptions = {steps = 100}"),
         (LORENZ + 'axes = {eps = 1, seed = "0..5 step 2"}', LORENZ + 'axes = {eps = 1, seed = "0..4 step 2"}'),
-        (LORENZ + 'axes = {eps = 1, seed = "0..4"}', LORENZ + 'axes = {eps = 1, seed = "0..4 step 1"}'),
         (LORENZ + "axes = {eps = [1, 2]}", LORENZ.replace(".a]", ".b]") + "axes = {eps = [1, 2]}\nlimits = {time = 1}"),
         (LORENZ + "axes = {eps = [1, 2]}", LORENZ + "axes = {eps = [1, 2]}\noptions = {parameters = {s = 10}}"),
         (FAMILY + "axes = {eps = 1, m = [2, 3]}", FAMILY + "axes = {eps = 1, m = [2, 3]}\noptions = {size = 2}"),
@@ -280,11 +235,8 @@ def test_experiments_that_say_the_same_have_the_same_definition(one, other):
     "other",
     [
         LORENZ + 'axes = {eps = [1, 2], seed = "0..3"}',
-        LORENZ + 'axes = {eps = [1, 3], seed = "0..2"}',
         LORENZ + 'axes = {eps = [2, 1], seed = "0..2"}',
         LORENZ + 'axes = {seed = "0..2", eps = [1, 2]}',
-        LORENZ + 'axes = {eps = [1, 2], steps = "0..2"}',
-        LORENZ + 'axes = {eps = [1, 2], seed = "0..2"}\noptions = {steps = 5}',
         LORENZ + 'axes = {eps = [1, 2], seed = "0..2"}\nlimits = {digits = 5}',
         LORENZ + 'axes = {eps = [1, 2], seed = "0..4 step 2"}',
         LORENZ.replace("lorenz", "euler_top") + 'axes = {eps = [1, 2], seed = "0..2"}',
@@ -308,8 +260,8 @@ def test_a_range_and_the_list_of_its_values_are_two_definitions_of_the_same_task
 @pytest.mark.parametrize(
     ("time", "seconds"),
     [
-        ("90", 90.0), ("1.5", 1.5), ('"90 s"', 90.0), ('"90s"', 90.0), ('"1.5 min"', 90.0), ('"2 h"', 7200.0),
-        ('"1 d"', 86400.0), ('"none"', None), ("1e3", 1000.0), ('"1e3 s"', 1000.0), ("0.001", 0.001), ('" 5 "', 5.0),
+        ("1.5", 1.5), ('"90s"', 90.0), ('"1.5 min"', 90.0), ('"2 h"', 7200.0), ('"1 d"', 86400.0), ('"none"', None),
+        ("1e3", 1000.0), ("0.001", 0.001), ('" 5 "', 5.0),
     ],
 )  # fmt: skip
 def test_a_limit_of_time_is_in_seconds_unless_it_says_otherwise(time, seconds):
@@ -344,8 +296,6 @@ def test_the_limits_of_an_experiment_come_before_those_of_all():
 @pytest.mark.parametrize(
     ("axes", "told"),
     [
-        ('eps = 0.1, seed = "0..1000000000000000000"', "a has 1 eps x 1,000,000,000,000,000,001 seed"),
-        ('eps = [1, 2, 3], seed = "0..1e6"', "a has 3 eps x 1,000,001 seed"),
         ('seed = "1..1e18", steps = "1..1e9", eps = "1..1e18"', "x 1,000,000,000 steps x"),
         ('eps = "1..1e6", seed = "1..1e6", steps = "1..5"', "a has 1,000,000 eps+seed x 5 steps"),
     ],
@@ -371,9 +321,3 @@ def test_more_tasks_may_be_allowed_and_are_not_enumerated():
     assert experiment[10**18].options["seed"] == 10**18
     assert [task.options["seed"] for task in islice(experiment.tasks(), 2)] == [0, 1]
     assert len(experiment.definition) < 1000
-
-
-@pytest.mark.parametrize("name", ["time", "memory", "system", "digits", "limits"])
-def test_an_experiment_may_be_called_as_a_key_is(name: str):
-    table = f'[experiments.{name}]\ntask = "family-space"\nsystem = "family"\naxes = {{m = "2..3"}}'
-    assert [experiment.name for experiment in parse_spec(table).experiments] == [name]

@@ -1,10 +1,6 @@
 """Summaries: groups and their order, counts, quantiles that are values which occur, and the tables made of them."""
 
-from __future__ import annotations
-
-import random
 from fractions import Fraction
-from math import ceil
 
 import pytest
 from hypothesis import given
@@ -57,17 +53,6 @@ def test_tasks_are_counted_by_outcome_and_verdict():
     assert group.verdicts == {"proved": 2, "supported": 0, "refuted": 1, "undecided": 0}
 
 
-def test_columns_of_zeros_are_left_out():
-    table = summarise([row({}, verdict="proved"), row(outcome=Outcome.CRASHED)]).counts()
-    assert table.columns == ("tasks", "ok", "crashed", "proved")
-    assert table.rows == (("2", "1", "1", "1"),)
-
-
-def test_true_and_false_are_counted_and_are_no_numbers():
-    (group,) = summarise([row({"is_whole": value}) for value in (True, False, True)], stable=True).groups
-    assert (group.flags, group.numbers) == ({"is_whole": (2, 1)}, {})
-
-
 # Quantiles
 
 
@@ -98,22 +83,9 @@ def test_quantiles_are_those_of_a_naive_implementation(values):
     assert found.is_same == (len(set(exact)) == 1)
 
 
-# By hand: of 1 to 20 the 5 % value has rank 1, of 1 to 21 rank ceil(1.05) = 2.
-@pytest.mark.parametrize(
-    ("count", "expected"),
-    [
-        (1, [1, 1, 1, 1, 1, 1, 1]),
-        (2, [1, 1, 1, 1, 2, 2, 2]),
-        (20, [1, 1, 5, 10, 15, 19, 20]),
-        (21, [1, 2, 6, 11, 16, 20, 21]),
-        (1000, [1, 50, 250, 500, 750, 950, 1000]),
-    ],
-)
-def test_quantiles_of_the_first_integers(count, expected):
-    values = list(range(1, count + 1))
-    random.Random(count).shuffle(values)
-    assert list(numbers_of(values).quantiles.values()) == expected
-    assert expected[3] == ceil(count / 2)
+def test_quantiles_of_the_first_integers():
+    # By hand: of 1 to 21 the 5 % value has rank ceil(1.05) = 2, the 25 % value rank ceil(5.25) = 6.
+    assert list(numbers_of(list(range(21, 0, -1))).quantiles.values()) == [1, 2, 6, 11, 16, 20, 21]
 
 
 def test_numbers_that_are_equal_as_floats_are_told_apart():
@@ -122,17 +94,10 @@ def test_numbers_that_are_equal_as_floats_are_told_apart():
     assert [quantiles[name] for name in ("min", "median", "max")] == [1 / 3, near, third]
 
 
-@pytest.mark.parametrize(
-    "text", ["", "1/0", "1e99999", "0x10", "1_000", " 1", "nan", "inf", "1" * 2001, "[1 +/- 2]", "١"]
-)
+@pytest.mark.parametrize("text", ["", "1/0", "1e99999", "0x10", "1_000", "nan", "1" * 2001, "١"])
 def test_other_texts_are_no_numbers(text):
     (group,) = summarise([row({"x": text, "y": 1})], stable=True).groups
     assert list(group.numbers) == ["y"]
-
-
-def test_nested_numbers_have_dotted_names_and_lists_are_left_alone():
-    (group,) = summarise([row({"heights": {"max": 8}, "list": [1, 2], "none": None})], stable=True).groups
-    assert list(group.numbers) == ["heights.max"]
 
 
 def test_seconds_and_memory_are_summarised_unless_stable():
@@ -149,12 +114,6 @@ def test_seconds_and_memory_are_summarised_unless_stable():
     ]
     (group,) = summarise(rows, stable=True).groups
     assert list(group.numbers) == ["a", "result.seconds"]
-
-
-def test_what_is_grouped_by_is_no_number_unless_asked_for():
-    rows = [row({"m": 2, "x": 1}), row({"m": 2, "x": 3})]
-    assert list(summarise(rows, ["m"], stable=True).groups[0].numbers) == ["x"]
-    assert list(summarise(rows, ["m"], ["m"]).groups[0].numbers) == ["m"]
 
 
 # Groups
@@ -186,7 +145,7 @@ def test_rows_are_grouped_by_options_parts_of_the_recipe_and_results():
     assert keys(rows, "m") == [3, None]
     assert keys(rows, "eps", "m") == [("1/10", 3), ("1/7", None)]
     assert keys(rows, "parameters.a") == ["1/2", None]
-    assert keys(rows, "dimension") == [6, 8]
+    assert keys([*rows, missing()], "dimension") == [6, 8, None]
     assert keys(rows, "document") == ["d1", None]
     assert keys(rows, "system") == ["d1 a=1/2", "family m=3"]
 
@@ -198,14 +157,6 @@ def test_a_name_is_an_option_before_a_part_of_the_recipe_before_a_result():
     assert keys(rows, "m") == [one.value("m")] == [3]
     names = ("option.seed", "family.seed", "result.seed", "result.m", "result.task")
     assert keys(rows, *names) == [(1, 2, 3, 4, 5)]
-
-
-def test_a_missing_task_has_no_value_of_a_result():
-    rows = [row({"dimension": 6}), missing()]
-    assert [(group.values, group.missing) for group in summarise(rows, ["dimension"]).groups] == [
-        ((6,), 0),
-        ((None,), 1),
-    ]
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,6 @@
 Verdicts, periods, ranks and last points are compared with the functions of the library themselves.
 """
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 from typing import Any
@@ -15,7 +13,7 @@ from task_helpers import made, member, perform
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
-from kahanmaps.checks.claims import Report, Verdict
+from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
@@ -27,6 +25,7 @@ from kahanmaps.experiments.results.records import canonical
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.heights import height_growth
+from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
@@ -62,67 +61,47 @@ def structure(system: SystemFile) -> Any:
 # Checks
 
 
-CHECKS = [
-    ("check-commute", MEMBER, {}, lambda: check_commute(MEMBER)),
-    ("check-commute", MEMBER, {"eps": "1/3"}, lambda: check_commute(MEMBER, None, Settings(eps="1/3"))),
-    ("check-commute", LORENZ, {"other": TOP}, lambda: check_commute(LORENZ, TOP)),
-    (
-        "check-commute",
-        TOP,
-        {"other": TOP, "eps": 1, "eps2": "1/7", "seed": 5},
-        lambda: check_commute(TOP, TOP, Settings(eps=1, seed=5), fmpq(1, 7)),
-    ),
-    ("check-integrals", MEMBER, {}, lambda: check_integrals(MEMBER)),
-    ("check-integrals", TOP, {"steps": 3}, lambda: check_integrals(TOP, Settings(steps=3))),
-    ("check-integrals", WRONG, {}, lambda: check_integrals(WRONG)),
-    ("check-measure", RIVALS, {"error_bits": 60}, lambda: check_measure(RIVALS, Settings(error_bits=60))),
-    ("check-measure", WRONG, {}, lambda: check_measure(WRONG)),
-    ("check-poisson", MEMBER, {"start": "1,2,3,4"}, lambda: check_poisson(MEMBER, Settings(start=(1, 2, 3, 4)))),
-    ("verify", MEMBER, {"sections": "2,6"}, lambda: verify(MEMBER, Settings(), VerifyOptions((2, 6)))),
-    (
-        "verify",
-        MEMBER,
-        {"sections": 2, "controls": True, "eps": "1/3"},
-        lambda: verify(MEMBER, Settings(eps="1/3"), VerifyOptions((2,), controls=True)),
-    ),
-    ("verify", MEMBER, {"sections": 4, "ball_bits": 64}, lambda: verify(MEMBER, None, VerifyOptions((4,), 3, 64))),
-    ("verify-universal", None, {"m": 1, "sections": 6}, lambda: verify_universal(1, None, VerifyOptions((6,)))),
-    (
-        "verify-universal",
-        None,
-        {"m": 2, "sections": 2, "controls": True, "order": 1},
-        lambda: verify_universal(2, None, VerifyOptions((2,), 1, None, True)),
-    ),
-]  # fmt: skip
-over_checks = pytest.mark.parametrize(("name", "system", "asked", "call"), CHECKS)
-
-
-@over_checks
-def test_a_check_counts_the_claims_of_the_report(name, system, asked, call):
-    result, report = perform(name, system, **asked), call()
+@pytest.mark.parametrize(
+    ("name", "system", "asked", "call"),
+    [
+        ("check-commute", MEMBER, {"eps": "1/3"}, lambda: check_commute(MEMBER, None, Settings(eps="1/3"))),
+        (
+            "check-commute",
+            TOP,
+            {"other": TOP, "eps": 1, "eps2": "1/7", "seed": 5},
+            lambda: check_commute(TOP, TOP, Settings(eps=1, seed=5), fmpq(1, 7)),
+        ),
+        ("check-integrals", TOP, {"steps": 3}, lambda: check_integrals(TOP, Settings(steps=3))),
+        ("check-integrals", WRONG, {}, lambda: check_integrals(WRONG)),
+        ("check-measure", RIVALS, {"error_bits": 60}, lambda: check_measure(RIVALS, Settings(error_bits=60))),
+        ("check-poisson", MEMBER, {"start": "1,2,3,4"}, lambda: check_poisson(MEMBER, Settings(start=(1, 2, 3, 4)))),
+        (
+            "verify",
+            MEMBER,
+            {"sections": 2, "controls": True, "eps": "1/3"},
+            lambda: verify(MEMBER, Settings(eps="1/3"), VerifyOptions((2,), controls=True)),
+        ),
+        ("verify", MEMBER, {"sections": 4, "ball_bits": 64}, lambda: verify(MEMBER, None, VerifyOptions((4,), 3, 64))),
+        (
+            "verify-universal",
+            None,
+            {"m": 2, "sections": 2, "controls": True, "order": 1},
+            lambda: verify_universal(2, None, VerifyOptions((2,), 1, None, True)),
+        ),
+    ],
+)
+def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(name, system, asked, call):
+    result, report = perform(name, system, report=True, **asked), call()
     assert result["verdict"] == str(report.verdict)
+    assert result["report"] == json.loads(json.dumps(report.to_json()))
     counted = [f for f in report.findings if f.applies and not f.control]
     controls = [f for f in report.findings if f.control]
-    assert result["claims"] == len(counted) == sum(result[str(verdict)] for verdict in Verdict)
+    assert result["claims"] == len(counted)
     assert all(result[str(verdict)] == sum(f.verdict is verdict for f in counted) for verdict in Verdict)
-    assert (result["controls"], result["controls_refuted"]) == (
-        len(controls),
-        sum(f.verdict is Verdict.REFUTED for f in controls),
-    )
-
-
-@over_checks
-def test_a_check_keeps_the_whole_report_if_asked_to(name, system, asked, call):
-    plain: Report = call()
-    assert perform(name, system, report=True, **asked)["report"] == json.loads(json.dumps(plain.to_json()))
-
-
-@over_checks
-def test_what_does_not_hold_is_kept_with_its_witness(name, system, asked, call):
-    doubtful = [f for f in call().findings if f.applies and not f.control and f.verdict.holds is not True]
-    kept = perform(name, system, **asked).get("doubtful", [])
-    assert kept == [json.loads(json.dumps(f.to_json())) for f in doubtful]
-    assert all(claim["witness"] for claim in kept if claim["verdict"] == "refuted")
+    refuted = sum(f.verdict is Verdict.REFUTED for f in controls)
+    assert (result["controls"], result["controls_refuted"]) == (len(controls), refuted)
+    doubtful = [f for f in counted if f.verdict.holds is not True]
+    assert result.get("doubtful", []) == [json.loads(json.dumps(f.to_json())) for f in doubtful]
 
 
 def test_an_orbit_that_was_asked_for_and_ended_early_is_told():
@@ -137,7 +116,6 @@ def test_an_orbit_that_was_asked_for_and_ended_early_is_told():
 @pytest.mark.parametrize(
     ("system", "generic", "associated"),
     [
-        (MEMBER, True, 2),
         (member(3, draw="generic", seed=7), True, None),
         (member(2, eigenvalues="1,1"), False, 1),
         (made(load("paper_m3_irreducible")), True, 1),
@@ -166,22 +144,28 @@ def last_of(system: SystemFile, field: Field, steps: int, start: Any = None) -> 
     return ",".join(list(walk)[-1].text)
 
 
-@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", f"mod:{2**89 - 1}", "ball:200"])
-@pytest.mark.parametrize("system", [LORENZ, TOP], ids=["lorenz", "top"])
-def test_an_orbit_ends_where_the_library_does(system, arithmetic):
+@pytest.mark.parametrize("arithmetic", ["exact", f"mod:{2**89 - 1}", "ball:200"])
+def test_an_orbit_ends_where_the_library_does(arithmetic):
     kind, _, number = arithmetic.partition(":")
     field = {"exact": lambda: QQ, "mod": lambda: GF(int(number)), "ball": lambda: RR(int(number))}[kind]()
-    result = perform("orbit", system, eps="0.1", steps=5, arithmetic=arithmetic)
-    expected = last_of(system, field, 5)
+    result = perform("orbit", LORENZ, eps="0.1", steps=5, arithmetic=arithmetic)
+    expected = last_of(LORENZ, field, 5)
     assert result["last_sha256"] == sha256(expected.encode()).hexdigest()
     assert result.get("last", expected) == expected
     assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
 
 
-@pytest.mark.parametrize("asked", [{"steps": 6}, {"at": "6"}, {"at": "2,6"}, {"at": 6, "method": "doubling"}])
-@pytest.mark.parametrize("method", [None, "generic", "normal-form"])
-def test_every_method_comes_to_the_same_point(method, asked):
-    asked = {"method": method, **asked} if method else asked
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"steps": 6},
+        {"steps": 6, "method": "generic"},
+        {"at": "2,6"},
+        {"at": 6, "method": "normal-form"},
+        {"at": 6, "method": "doubling"},
+    ],
+)
+def test_every_method_comes_to_the_same_point(asked):
     result = perform("orbit", MEMBER, eps="1/10", **asked)
     assert result["last_sha256"] == sha256(last_of(MEMBER, QQ, 6).encode()).hexdigest()
     assert result["reached"] == 6
@@ -195,27 +179,10 @@ def test_an_orbit_of_machine_numbers_is_that_of_the_library():
     assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
 
 
-def test_a_member_is_walked_in_normal_form_also_by_machine_numbers():
-    results = [
-        perform("orbit", MEMBER, eps="1/100", steps=3, start="0.1,0.2,-0.1,0.3", arithmetic="float", **asked)
-        for asked in ({}, {"method": "generic"})
-    ]
-    assert [result["method"] for result in results] == ["normal-form", "generic"]
-    ends = [[float(entry) for entry in result["last"].split(",")] for result in results]
-    assert ends[0] == pytest.approx(ends[1], rel=1e-10)  # three steps of small numbers lose a few bits of 53
-
-
-def test_a_long_orbit_modulo_a_prime_is_reached_directly():
-    result = perform("orbit", MEMBER, eps="1/10", at=10**18, arithmetic="mod:10007")
-    assert (result["method"], result["reached"]) == ("doubling", 10**18)
-
-
-@pytest.mark.parametrize(("steps", "digits"), [(0, 1), (2, None)])
-def test_an_exact_orbit_counts_digits(steps, digits):
-    result = perform("orbit", LORENZ, eps="1/10", steps=steps, start="1,2,3")
-    walk = Orbit(KahanMap(LORENZ.system, "1/10"), (1, 2, 3), steps)
+def test_an_exact_orbit_counts_digits():
+    result = perform("orbit", LORENZ, eps="1/10", steps=2, start="1,2,3")
+    walk = Orbit(KahanMap(LORENZ.system, "1/10"), (1, 2, 3), 2)
     assert result["digits"] == list(walk)[-1].digits
-    assert digits is None or result["digits"] == digits
 
 
 def test_an_iterate_beyond_the_budget_leaves_the_start_as_the_last_point():
@@ -237,7 +204,7 @@ def test_a_short_last_point_is_kept_and_a_long_one_known_by_its_hash():
     assert len(canonical(long)) < 1000
 
 
-@pytest.mark.parametrize("name", ["orbit", "heights", "period"])
+@pytest.mark.parametrize("name", ["orbit", "period"])
 def test_a_start_is_drawn_from_the_seed_unless_given(name):
     drawn = perform(name, MEMBER, eps="1/10", seed=5)
     point = ",".join(map(str, start_of(MEMBER, 5)))
@@ -259,7 +226,6 @@ def test_heights_are_those_of_the_library(system, steps, growth):
 
 
 def test_an_ensemble_is_that_of_the_library():
-    from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
 
     found = perform("ensemble", load("lorenz"), eps="1/10", orbits=50, box="1/2", steps=300, seed=4)
     run = FloatEnsemble(load("lorenz").system, "1/10", starts_in_box(50, 3, 0.5, 4), kernel="numpy")
@@ -269,32 +235,18 @@ def test_an_ensemble_is_that_of_the_library():
     ]
     assert 0 < found["completed"] < 50
     assert found["largest_drift"] is None  # nothing is known to be conserved
+    # Rounding errors of 200 steps are 10^-9 here.
+    found = perform("ensemble", MEMBER, eps="1/10", orbits=20, steps=200)
+    assert (found["method"], found["completed"], 0 < found["largest_drift"] < 1e-6) == ("normal-form", 20, True)
 
 
-def test_the_drift_of_an_ensemble_is_small_in_normal_form():
-    found = perform("ensemble", member(), eps="1/10", orbits=20, steps=200)
-    assert (found["method"], found["completed"]) == ("normal-form", 20)
-    assert 0 < found["largest_drift"] < 1e-6  # rounding errors of 200 steps; they are 10^-9 here
-
-
-@pytest.mark.parametrize("prime", [None, "10007", 10007, 2**61 - 1])
+@pytest.mark.parametrize("prime", [None, 10007])
 def test_a_period_is_that_of_the_library(prime):
     found = period_of(structure(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
     result = perform("period", MEMBER, eps="1/10", **({} if prime is None else {"prime": prime}))
     assert result["period"] == (None if found.period is None else str(found.period))
     assert (result["status"], result["meets_pole"]) == (found.status, found.meets_pole)
     assert result["planes"] == [plane.text for plane in found.planes]
-
-
-def test_a_period_is_that_of_the_orbit_itself():
-    # Of a start whose orbit meets no pole: walked step by step modulo a small prime.
-    for seed in range(50):
-        found = perform("period", MEMBER, eps="1/10", prime=101, seed=seed)
-        if found["meets_pole"] is False and found["period"] is not None:
-            walked = perform("orbit", MEMBER, eps="1/10", arithmetic="mod:101", steps=20_000, seed=seed)
-            assert str(walked["period"]) == found["period"]
-            return
-    raise AssertionError("every orbit meets a pole")
 
 
 # What cannot be done
@@ -306,18 +258,13 @@ def test_a_period_is_that_of_the_orbit_itself():
         ("check-commute", LORENZ, {}, "kind \\[family\\]"),
         ("check-commute", LORENZ, {"other": RIVALS}, "lorenz has dimension 3 and lotka_volterra 2"),
         ("check-commute", TOP, {"other": TOP, "eps2": 1}, "a second step needs the first one as well"),
-        ("check-integrals", LORENZ, {}, "no integral of lorenz is known or claimed"),
-        ("check-measure", LORENZ, {}, "lorenz"),
-        ("check-poisson", LORENZ, {}, "needs a Hamiltonian system"),
         ("verify", LORENZ, {}, "lorenz"),
         ("verify-universal", None, {"m": 9}, "9"),
         ("family-space", LORENZ, {}, "lorenz is of kind \\[system\\], expected one of kind \\[family\\]"),
         ("orbit", LORENZ, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 3"),
-        ("orbit", LORENZ, {"eps": 1, "start": "1,2", "arithmetic": "float"}, "found a point with 2 coordinates"),
         ("orbit", LORENZ, {"eps": 1, "at": 5, "method": "doubling"}, "needs a normal form, and there is none"),
         ("orbit", LORENZ, {"eps": 1, "at": 5, "arithmetic": "float"}, "need exact, mod:P or ball:BITS arithmetic"),
         ("orbit", MEMBER, {"eps": "1/7", "arithmetic": "mod:7"}, "the prime 7 divides the denominator of 1/7"),
-        ("heights", LORENZ, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 3"),
         ("period", LORENZ, {"eps": 1}, "no period of lorenz can be computed"),
         ("period", MEMBER, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 4"),
         ("period", MEMBER, {"eps": "1/7", "prime": 7}, "the prime 7 divides the denominator of 1/7"),

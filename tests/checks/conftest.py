@@ -1,0 +1,11 @@
+"""Fixtures that several files of tests share."""
+
+import pytest
+
+from kahanmaps.checks import judge
+
+
+@pytest.fixture
+def at_points_only(monkeypatch):
+    """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_expand.py."""
+    monkeypatch.setattr(judge, "expansion", lambda *_: None)
