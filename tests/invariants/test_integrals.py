@@ -4,11 +4,8 @@ For f = J grad H with any cubic H and any constant skew J, "modified H" is H + (
 f. It is conserved, tends to H with a defect of order eps^2, and is -1/6 of the paper's H~ where that is defined.
 """
 
-from fractions import Fraction
-
 import pytest
 from check_helpers import (
-    Dual,
     claim,
     dot,
     exact,
@@ -28,7 +25,6 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.systems.hamiltonian import standard_structure
@@ -84,43 +80,19 @@ def test_modified_h_is_minus_one_sixth_of_the_papers_integral(drawn, eps):
     assert modified == paper / -6
 
 
-@some
-@given(with_points(dims=(2, 4), homogeneous=True, standard=True), nonzero)
-def test_the_papers_integral_is_the_symplectic_product_of_a_point_and_its_image_over_eps(drawn, eps):
-    hamiltonian, x = drawn
-    image = kahan_step(hamiltonian.system, fraction(eps), exact(*x))
-    assume(image is not None)
-    here, m = exact(*x), hamiltonian.dim // 2
-    product = sum(here[i] * image[m + i] - here[m + i] * image[i] for i in range(m))
-    assert fraction(PaperIntegral(hamiltonian).value(QQ, eps, x)) == product / fraction(eps)
-
-
 @pytest.mark.parametrize(
     "hamiltonian",
     [
         HENON,
+        hamiltonian_of("q p", "q^3 + p^2"),
         hamiltonian_of("q p", "q^3", [[0, 2], [-2, 0]]),
         hamiltonian_of("x y z", "x^3", [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]),
     ],
-    ids=["quadratic terms", "J doubled", "odd dimension"],
+    ids=["quadratic terms", "p^2", "J doubled", "odd dimension"],
 )
 def test_the_papers_integral_is_refused_for_inhomogeneous_h_and_other_j(hamiltonian):
     with pytest.raises(InputError, match="homogeneous H and the standard J only"):
         PaperIntegral(hamiltonian)
-
-
-def gradients(member: FamilyMember, x: tuple[Fraction, ...], eps: Fraction) -> list[list[Fraction]]:
-    """The gradients of x^T J (A^T)^k x~ for k < m, x~ the image of x, from dual numbers."""
-    rows: list[list[Fraction]] = [[] for _ in range(member.m)]
-    for j in range(member.dim):
-        moved = [Dual(entry, Fraction(int(i == j))) for i, entry in enumerate(x)]
-        image = kahan_step(member.chosen.system, eps, moved)
-        assert image is not None
-        matrix = rows_of(standard_structure(member.dim))
-        for row in rows:
-            row.append(dot(moved, [dot(line, image) for line in matrix]).b)
-            matrix = times(matrix, transposed(rows_of(member.A)))
-    return rows
 
 
 @pytest.mark.parametrize("power", [1, 2])
@@ -147,7 +119,7 @@ def test_an_integral_of_the_commutant_is_called_after_the_power(power, matrix):
 # Claimed functions
 
 
-@pytest.mark.parametrize("text", ["(x - 2*eps*y)/(1 - eps^2*x^2)", "3/7", "y^3/eps"])
+@pytest.mark.parametrize("text", ["(x - 2*eps*y)/(1 - eps^2*x^2)", "3/7"])
 @given(points(2, rationals(9)), nonzero)
 def test_a_claimed_function_has_the_value_that_its_text_says(text, x, eps):
     function = claim(text, "x y")

@@ -12,11 +12,9 @@ from check_helpers import (
     function_value,
     hamiltonians,
     kahan_jacobian,
-    kahan_step,
     slope,
     unit,
 )
-from flint import fmpq
 from helpers import LOTKA_VOLTERRA, fraction, points, rationals, systems_with_points
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -61,18 +59,6 @@ def hamiltonian_with_point(draw):
 
 
 @some
-@given(hamiltonian_with_point(), nonzero)
-def test_hamiltonian_maps_preserve_the_determinant_density(drawn, eps):
-    hamiltonian, x = drawn
-    system, step = hamiltonian.system, fraction(eps)
-    image, jacobian = kahan_step(system, step, exact(*x)), kahan_jacobian(system, step, exact(*x))
-    assume(image is not None)
-    phi = DeterminantDensity(system)
-    after = fraction(phi.value(QQ, eps, tuple(fmpq(entry.numerator, entry.denominator) for entry in image)))
-    assert after == fraction(phi.value(QQ, eps, x)) * determinant(jacobian)
-
-
-@some
 @given(hamiltonian_with_point(), nonzero, st.data())
 def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, eps, data):
     # det(I - eps f') is even in eps: the law, with dPhi multiplied out, holds for any two points x and y in place of
@@ -84,11 +70,9 @@ def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, ep
     assert phi.value(QQ, eps, y) * below == phi.value(QQ, eps, x) * above
 
 
-@pytest.mark.parametrize("text", ["x*y", "(x - y)/(x + eps*y)"])
 @given(points(2, rationals(9)), nonzero)
-@settings(max_examples=20)
-def test_a_claimed_density_has_the_value_that_its_text_says(text, x, eps):
-    function = claim(text, "x y")
+def test_a_claimed_density_has_the_value_that_its_text_says(x, eps):
+    function = claim("(x - y)/(x + eps*y)", "x y")
     expected = function_value(function, exact(*x), fraction(eps))
     found = ClaimedDensity(function).value(QQ, eps, x)
     assert (found is None) == (expected is None)

@@ -30,7 +30,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.errors import SingularStep
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.invariants.poisson import HamiltonianTensor, jacobi_defects, poisson_tensor, transformation_sides
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -40,9 +40,7 @@ nonzero = rationals(6).filter(lambda eps: eps != 0)
 
 GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
 MEMBERS = {
-    "two eigenvalues": draw_with_eigenvalues([1, -2], seed=3),
     "irreducible": draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
-    "three eigenvalues": draw_with_eigenvalues([1, -2, 3], seed=3),
     "partly split": draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3),  # (t - 1)(t^2 - 2)
 }
 over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
@@ -134,19 +132,12 @@ def defects_by_differentiation(hamiltonian: CubicHamiltonian, eps: fmpq, x: tupl
     return values
 
 
-@some
-@given(hamiltonian_with_point(dims=(3,)), nonzero)
-def test_the_defects_are_those_found_by_differentiation_in_dimension_three(drawn, eps):
-    hamiltonian, x = drawn
-    assert jacobi_defects(HamiltonianTensor(hamiltonian), QQ, eps, x) == defects_by_differentiation(hamiltonian, eps, x)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_the_defects_are_those_found_by_differentiation_in_dimension_four(seed):
-    x, eps = random_point(4, seed), fmpq(seed + 1, 5)
-    found = jacobi_defects(HamiltonianTensor(GENERIC), QQ, eps, x)
-    assert found == defects_by_differentiation(GENERIC, eps, x)
-    assert any(defect != 0 for defect in found)
+def test_the_defects_are_those_found_by_differentiation_for_another_j():
+    J = [[0, 1, "1/2", -1], [-1, 0, 3, 0], ["-1/2", -3, 0, 2], [1, 0, -2, 0]]
+    hamiltonian, x = hamiltonian_of("x y z w", "x^3 + y^2*w - x*z*w + z^2 - 3*y", J), random_point(4, 2)
+    assert jacobi_defects(HamiltonianTensor(hamiltonian), QQ, fmpq(2, 3), x) == defects_by_differentiation(
+        hamiltonian, fmpq(2, 3), x
+    )
 
 
 @over_members

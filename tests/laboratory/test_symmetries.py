@@ -189,3 +189,11 @@ def test_signed_permutations_that_were_not_judged_in_time_are_told(monkeypatch):
     late = linear_symmetries(QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"]), seconds=1e-9)
     assert (late.signed, late.order) == ([], None)
     assert "the time is over: not all were tried" in "; ".join(late.undecided)
+
+
+@pytest.mark.parametrize(("rhs", "shift"), [(("2*x - 1", "2*y - 1"), 1), (("2*x + 1", "2*y + 1"), -1)])
+def test_symmetries_without_a_translation_come_first(rhs, shift):
+    found = [t for t in linear_symmetries(system("x y", *rhs)).signed if not t.reversing]
+    assert [bool(any(t.r)) for t in found] == [False] * 2 + [True] * 6
+    (both,) = [t.r for t in found if t.S == fmpq_mat([[-1, 0], [0, -1]])]
+    assert both == (shift, shift)
