@@ -1,5 +1,9 @@
 """Running batches: what comes out does not depend on how it was run, and nothing that is killed loses a record."""
 
+import random
+import sqlite3
+import subprocess
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -194,3 +198,25 @@ def test_jobs_are_taken_one_by_one_as_they_are_needed():
 
     assert len(list(islice(Batch(endless(), Scripted()), 100))) == 100
     assert taken < 110
+
+
+@pytest.mark.parametrize(("kills", "last"), [(3, 200), pytest.param(50, 12_000, marks=pytest.mark.slow)])
+def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path, kills: int, last: int):
+    text = PAUSES.format(milliseconds=4, last=last)
+    (tmp_path / "spec.toml").write_text(text)
+    list(run(text, tmp_path / "calm.db", jobs=2))
+    wild, command = tmp_path / "wild.db", [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml"]
+    rng, killed = random.Random(kills), 0
+    while killed < kills:
+        process = subprocess.Popen([*command, "--db", wild, "-j", "2", "-q"], cwd=tmp_path)
+        try:
+            assert process.wait(rng.uniform(0.05, 1.2)) == 0
+            wild.unlink()  # done before it could be killed: once more from the start
+        except subprocess.TimeoutExpired:
+            process.kill()
+            killed += 1
+            process.wait()
+    assert sum(1 for _ in run(text, wild, jobs=2)) <= last + 1
+    assert exported(wild) == exported(tmp_path / "calm.db")
+    assert sqlite3.connect(wild).execute("PRAGMA integrity_check").fetchone() == ("ok",)
+    assert not list(tmp_path.glob("*.db-*"))
