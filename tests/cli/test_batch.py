@@ -367,3 +367,9 @@ def test_two_batches_do_not_write_to_one_database(batch, start):
     assert done.status == 2
     assert "another batch is writing to study.db" in done.err
     assert batch("status --db study.db").status == 0  # looking is allowed
+
+
+def test_a_source_that_is_not_there_is_told_before_a_target_is_made(kahanmaps, tmp_path):
+    outcome = kahanmaps(f"batch merge {tmp_path}/all.db {tmp_path}/no.db")
+    assert (outcome.status, "no.db" in outcome.err) == (2, True)
+    assert not (tmp_path / "all.db").exists()

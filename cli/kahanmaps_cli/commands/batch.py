@@ -237,6 +237,8 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
     Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
     """
+    for source in sources:  # one that cannot be read is told before an empty target is made
+        lib.Store.open(source, readonly=True).close()
     with lib.Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]
     conflicts = sum(found.conflicts for _, found in merged)
