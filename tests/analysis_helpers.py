@@ -1,7 +1,5 @@
 """What the tests of whole analyses share: an answer known from elsewhere, and how an analysis differs from it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Rational functions written out, beside their bounds (tests of kahanmaps.algebra.bounds and of all it bounds)."""
 
-from __future__ import annotations
-
 import math
 
 from flint import fmpq, fmpq_mpoly

@@ -1,7 +1,5 @@
 """Settings for all tests."""
 
-from __future__ import annotations
-
 import gc
 import signal
 from collections.abc import Iterator

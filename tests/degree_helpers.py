@@ -1,7 +1,5 @@
 """Degrees of iterates computed slowly, by other means than the library: polynomials on a line, and their gcd."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

@@ -3,8 +3,6 @@
 Strategies draw plain data, so that hypothesis can shrink a failure to something one can compute by hand.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Collection, Iterable, Sequence
 from fractions import Fraction

@@ -15,8 +15,6 @@ promised, are listed with their reasons in tests/mutants.toml. The exit status i
 the others. Docstrings, annotations, messages, seeds, times and what only prints are left as they are.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import hashlib

@@ -3,8 +3,6 @@
 python tests/notebook_runner.py
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys

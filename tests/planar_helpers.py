@@ -1,7 +1,5 @@
 """Planes of the normal form for several test files: starts of every kind, and orbits by nothing but Python and gcds."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator, Sequence
 from functools import lru_cache

@@ -3,8 +3,6 @@
 Formulas are read here by Python with fractions, not by the library that wrote them.
 """
 
-from __future__ import annotations
-
 import ast
 import operator
 import random

@@ -1,7 +1,5 @@
 """docs/audit.md says what `kahanmaps verify` finds: its table is the output of the command that it names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

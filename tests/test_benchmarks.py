@@ -1,7 +1,5 @@
 """The benchmarks measure the same thing: all contestants that are present compute the same numbers, on a tiny case."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 What is made of the code is looked at as the Markdown that Sphinx is given; one slow test builds the pages.
 """
 
-from __future__ import annotations
-
 import posixpath
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """What stands for a map in the functions of `import kahanmaps`, and numbers of other libraries."""
 
-from __future__ import annotations
-
 import sys
 from decimal import Decimal
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Formulas and numbers of Python as equations, parameters and claims: exactly, or refused in words."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

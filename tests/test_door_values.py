@@ -1,7 +1,5 @@
 """Values of Python: maps and systems are equal, copied, pickled and shown in short; wrong arguments are named."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

@@ -1,7 +1,5 @@
 """Messages of errors: no more of a long text than anybody reads, and the name of the file that was being read."""
 
-from __future__ import annotations
-
 import errno
 
 import pytest

@@ -1,7 +1,5 @@
 """The examples do what stands beside them: every script prints its .out file, and the demo runs through."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

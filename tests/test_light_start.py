@@ -4,8 +4,6 @@ Loading is what a user waits for: numpy costs about as long as all of `--help` m
 an interpreter of its own, since the one that runs the tests has loaded everything already.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

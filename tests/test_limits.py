@@ -1,7 +1,5 @@
 """The limits of searches and checks: what keeps to one is done in full; what is one larger is left out and told."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from math import comb, log2

@@ -5,8 +5,6 @@ grow like those of a map with one integral, and the second integral of the top i
 the same command drew, with the same seed, for the system before.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from math import prod
 

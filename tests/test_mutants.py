@@ -1,7 +1,5 @@
 """The changes that `make mutants` tries: which ones there are, where there are none, and that samples come again."""
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from pathlib import Path

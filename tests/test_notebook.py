@@ -3,8 +3,6 @@
 Pictures are only asked to be there: their bytes depend on the version of matplotlib.
 """
 
-from __future__ import annotations
-
 import nbformat
 import pytest
 from notebook_runner import NOTEBOOK, executed

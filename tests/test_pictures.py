@@ -1,7 +1,5 @@
 """The pictures of the documentation: each carries its command, and stands in some page below that command."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from dataclasses import replace

@@ -3,8 +3,6 @@
 A block of TOML that opens with the comment `# NAME.toml` is that file, for all sessions of its page.
 """
 
-from __future__ import annotations
-
 import doctest
 import re
 import shlex

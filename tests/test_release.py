@@ -1,7 +1,5 @@
 """The release: wheel and source distribution are built, and what is installed from them works by itself."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import tarfile

@@ -3,8 +3,6 @@
 Chromium runs without a window. Its log of the network tells what a page asks for, the printed page what is readable.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

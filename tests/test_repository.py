@@ -1,7 +1,5 @@
 """Housekeeping: what is true of every file of the project."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re

@@ -1,7 +1,5 @@
 """The study of examples/members: its spec is sound, its committed results are those of all tasks, its script runs."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Files are written whole or not at all: beside their place, and put there when they are complete."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

@@ -6,8 +6,6 @@ default) and what is compiled to machine code is tried by a new pytest instead, 
 though some of it had run before the fork.
 """
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import functools

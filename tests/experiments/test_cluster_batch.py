@@ -1,7 +1,5 @@
 """`batch run --scheduler` with a real scheduler and workers: the same results as at home, whatever is killed."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import signal

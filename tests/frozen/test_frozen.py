@@ -14,8 +14,6 @@ and why. The answers are right as far as the other tests know: here they need no
     {"fast": {"degrees @ --terms 5 --json": null}}      # a new answer: null, and then the same
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -1,7 +1,5 @@
 """The components of the zeros of forms over GF(p), told apart by factors on surfaces."""
 
-from __future__ import annotations
-
 import pytest
 from flint import Ordering, fmpq_mpoly_ctx, nmod_poly
 

@@ -1,7 +1,5 @@
 """Inverse maps by elimination: they lead back, and maps that have none are told from those that have one."""
 
-from __future__ import annotations
-
 import pytest
 from flint import fmpq
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Which way an orbit is computed, for every arithmetic and wish, and what cannot be had."""
 
-from __future__ import annotations
-
 import pytest
 from planar_helpers import structure_and_system
 

@@ -5,8 +5,6 @@ computed, at the same step, for starts near poles as for others; numbers that st
 step is.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import pytest

@@ -1,7 +1,5 @@
 """Members of the family for the tests of the paper's claims: every kind of spectrum, for every m that is quick."""
 
-from __future__ import annotations
-
 import random
 from functools import cache
 from typing import Any

@@ -4,8 +4,6 @@ A bound is compared with the numerator, in lowest terms, of what it is a bound o
 input, where the two sides differ, written out as rational functions of x and eps.
 """
 
-from __future__ import annotations
-
 import pytest
 from bound_helpers import covers, lowest, true_size
 from paper.members import member

@@ -5,8 +5,6 @@ false one holds with probability below 2^-50; sides are compared here, not by th
 names has to refute it on every one of these members, but for m = 1, where some hypotheses cannot be broken.
 """
 
-from __future__ import annotations
-
 import random
 from collections import Counter
 from itertools import pairwise

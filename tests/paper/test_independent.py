@@ -5,8 +5,6 @@ computed a second time in independent.py. Letters are compared one by one, then 
 the independent numbers alone, next to a neighbour that fails.
 """
 
-from __future__ import annotations
-
 import random
 from fractions import Fraction
 from itertools import combinations

@@ -5,8 +5,6 @@ proved, and one that compares nothing proves nothing. Every identity that is pro
 a changed right-hand side, which must be refuted both at random points and in normal form.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

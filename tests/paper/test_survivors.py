@@ -1,7 +1,5 @@
 """The table of what survives: what is proved, what is refuted, and that the counterexamples are smallest and right."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

@@ -5,8 +5,6 @@ stand random points over GF(p) with an error bound. Where chi has repeated roots
 undecided and say why; nothing is refuted there but misprints.
 """
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from fractions import Fraction

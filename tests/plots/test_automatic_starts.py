@@ -1,7 +1,5 @@
 """Chosen starts: the same ones every time, different orbits, and orbits that stay where the system lets them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

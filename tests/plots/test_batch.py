@@ -1,7 +1,5 @@
 """Batches drawn: bars that add up, boxes that are the quantiles of the summary, dots for all of few numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

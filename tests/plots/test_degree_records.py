@@ -1,7 +1,5 @@
 """Degrees read from what `kahanmaps degrees --json` wrote: the same ones, and nothing else."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps.documents.catalog import load

@@ -1,7 +1,5 @@
 """Densities: every point is counted once, in the cell it lies in, whatever the portions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Drift: errors against exact ones, bins that hide nothing, honest zeros and ends, and the picture of them."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

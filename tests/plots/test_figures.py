@@ -1,7 +1,5 @@
 """Figures: the size asked for, the same bytes every time, whole files or none, matplotlib's settings left alone."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ElementTree
 from functools import cache

@@ -1,7 +1,5 @@
 """What a portrait shows of the differential equation, against curves and equilibria that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Growth drawn: the degrees and heights that were measured, the laws they follow, and what is estimated."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

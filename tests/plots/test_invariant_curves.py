@@ -1,7 +1,5 @@
 """Invariant curves: planes and orbits agree with the exact map, dots lie on their curves, and wrong ones do not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Level curves: their vertices lie on the level, poles make no curves, orbits of the map lie on those of integrals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from flint import fmpq

@@ -1,7 +1,5 @@
 """Plane cubics: all of the real curve is found, every vertex lies on it; symmetric coordinates are what they claim."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Functions of points in doubles: coordinates, expressions and integrals, many points at a time, NaN at poles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from flint import fmpq

@@ -1,7 +1,5 @@
 """Portraits: the numbers that are shown, and what is in the figure that shows them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

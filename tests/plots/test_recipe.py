@@ -1,7 +1,5 @@
 """A picture tells how it was made: the recipe goes into PDF, SVG and PNG and comes out as it went in."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps.errors import InputError

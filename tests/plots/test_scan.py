@@ -1,7 +1,5 @@
 """The plane of two parameters: curves and points of a scan, a colour for each block."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

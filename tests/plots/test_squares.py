@@ -1,7 +1,5 @@
 """Squares of two maps: exact points, both outcomes, missing points; and what the picture shows of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

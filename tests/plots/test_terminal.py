@@ -1,7 +1,5 @@
 """A figure as characters: dots where the picture has ink, texts in between, nothing outside the frame asked for."""
 
-from __future__ import annotations
-
 import pytest
 
 from kahanmaps.errors import InputError

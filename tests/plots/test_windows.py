@@ -1,7 +1,5 @@
 """Windows: all points where they are together, most of them where some are far away; and which axes are chosen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
