@@ -169,7 +169,7 @@ with Store.open(path) as store:
     with Store.open(path) as store:  # and the lock is free
         # At most the one result for which the process was killed before it could say so.
         assert 0 <= 10_000 - store.count_pending() - len(acknowledged) <= 1
-    assert len(acknowledged) > 2
+    assert acknowledged
 
 
 def test_a_kill_while_a_plan_is_replaced_leaves_the_old_one(path):
