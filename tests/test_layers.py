@@ -7,6 +7,7 @@ packages may be imported inside functions, where they cost only those who call t
 from __future__ import annotations
 
 import ast
+from collections import deque
 from collections.abc import Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -87,9 +88,9 @@ def _imports(body: list[ast.stmt], package: list[str], only_while_loading: bool 
 
     With `only_while_loading`, leaves out what loading the file does not run: functions and `if TYPE_CHECKING`.
     """
-    waiting: list[ast.AST] = list(body)
+    waiting: deque[ast.AST] = deque(body)
     while waiting:
-        node = waiting.pop(0)
+        node = waiting.popleft()
         if isinstance(node, ast.Import):
             for name in node.names:
                 yield node.lineno, name.name
