@@ -214,6 +214,7 @@ def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
     assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified_H", "relative error of $H$"]
     assert [len(lines(axes)) for axes in figure.axes] == [3, 3]
     assert len({line.get_linestyle() for line in figure.axes[0].lines}) == 3
+    assert all(line.get_ydata().max() < axes.get_ylim()[1] for axes in figure.axes for line in axes.lines)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Kahan", "RK4", "implicit midpoint"]
     assert figure.legends[0].get_title().get_text() == r"time step $2\varepsilon = 1/10$"
 
