@@ -92,6 +92,21 @@ def test_one_member_speaks_for_others_only_as_long_as_their_degrees_agree(three_
     assert not _goes_on(points["(3, 2)"], None, family)
 
 
+def test_a_curve_in_a_plane_of_parameters_is_found_beside_the_surface_through_it():
+    text = """variables = ["x", "y"]
+parameters = {a = 1, b = 1, c = 0}
+[map]
+image = ["y", "x + (c - 1)*y^2 + (a*b + 1)*y^3"]
+inverse = ["y - (c - 1)*x^2 - (a*b + 1)*x^3", "x"]
+"""
+    found = scan(parse_system(text), ["a", "b", "c"], primes=(11, 13, 17), terms=2)
+    assert {one.text: one.degrees for one in found.components} == {
+        "a*b + 1 = 0": (2, 4),
+        "a*b + 1 = 0, c - 1 = 0": (1, 1),
+    }
+    assert not any(found.left)
+
+
 def test_the_conditions_of_lotka_volterra_in_space_are_found():
     found = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
     conditions = {one.text: one for one in found.components}
