@@ -76,6 +76,7 @@ def test_functions_get_letters_that_no_variable_begins_with():
     names = ["F", "G", "K", "U", "V", "W"]
     functions = ring([*names, *(f"{name}~" for name in names)]).gens()
     minors = RatioOfIterates(Lift(1, -1, 2), functions, (0, 11), (0, 1))
+    assert minors.text.startswith("(FF11*FF0~ - FF0*FF11~)/(FF1*FF0~ - FF0*FF1~), ")  # as `sides` are
     assert minors.text.endswith("FF0 = F, FF1 = G, FF11 = W~")
     assert minors.latex.endswith(r"FF_0 = F,\quad FF_1 = G,\quad FF_{11} = \tilde{W}")
 
