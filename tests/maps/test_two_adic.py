@@ -55,6 +55,25 @@ def test_the_solution_is_found_in_lowest_terms(n, of_W, of_X):
         assert short_solution(matrix, right, 2 * expected.bits) == expected
 
 
+@pytest.mark.parametrize("n", [3, 4, 6])
+def test_a_prime_that_one_combination_lacks_is_found_at_a_coordinate(n):
+    # The weights of the combination are 1, 10, 100, ...; the first coordinate alone lacks the prime as well.
+    rng, p = random.Random(n), 10_007
+    for _ in range(3):
+        X = [p * long(rng), *(long(rng) for _ in range(n - 1))]
+        X[1] = -10 * X[2] - sum(10 ** (k - 1) * X[k] for k in range(3, n)) + p * long(rng)
+        matrix, right = with_solution(X, long(rng, p**2), rng, 20)
+        expected = by_flint(matrix, right)
+        assert expected.denominator % p == 0
+        assert short_solution(matrix, right, expected.bits) == expected
+
+
+def test_a_solution_may_be_much_shorter_than_the_entries():
+    rng = random.Random(1)
+    matrix, right = with_solution([3, -1, 2, 5], 7, rng, 3000)
+    assert short_solution(matrix, right, 10) == by_flint(matrix, right)
+
+
 @pytest.mark.parametrize("bits", [1, 8, 200])
 @pytest.mark.parametrize("n", range(2, 8))
 def test_a_longer_solution_is_never_answered_wrongly(n, bits):
