@@ -44,7 +44,7 @@ class IntegerSteps:
                     sign = 1 if j < n else -1
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
-        self._growth = inf  # the bits of the last image over those of its equation
+        self._growth = inf  # the bits of the last image over those of its point
         self._is_diagonal = all(i == j or not terms[i][j] for i in range(n) for j in range(n))
         self._constant = self._constant_rows()
 
@@ -53,13 +53,13 @@ class IntegerSteps:
         matrix, right = self._equation(point)
         if self._is_diagonal:
             return _quotients(matrix, right)
-        size, found = max(entry.bit_length() for entry in matrix.entries()), None
-        is_long = self._dim > _CRAMER_DIMENSION and size * self._dim**2 >= _LONG
+        found = None
+        is_long = self._dim > _CRAMER_DIMENSION and point.bits * self._dim**2 >= _LONG
         if is_long and self._growth < _SLOW_GROWTH:
-            found = short_solution(matrix, right, int(size * self._growth) + size // 64)
+            found = short_solution(matrix, right, int(point.bits * (self._growth + 1 / 64)))
         if found is None:
             found = self._solution(matrix, right, point.denominator**self._degree)
-        self._growth = found.bits / size if found is not None and size else inf
+        self._growth = inf if found is None else found.bits / point.bits
         return found
 
     def _solution(self, matrix: fmpz_mat, right: fmpz_mat, scale: fmpz) -> IntegerPoint | None:
@@ -103,7 +103,7 @@ def _monomial(X: Sequence[fmpz], exponents: Exponents) -> fmpz:
 
 
 _CRAMER_DIMENSION = 3
-# Solutions modulo powers of 2 are faster than FLINT's own solver where an entry has more than _LONG / n^2 bits, and
+# Solutions modulo powers of 2 are faster than FLINT's own solver where a point has more than _LONG / n^2 bits, and
 # numbers grow by less than _SLOW_GROWTH in a step (measured in dimension n = 4 to 10).
 _LONG = 120_000
 _SLOW_GROWTH = 1.5
