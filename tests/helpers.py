@@ -4,8 +4,10 @@ Strategies draw plain data, so that hypothesis can shrink a failure to something
 """
 
 import random
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
+from functools import wraps
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.documents.catalog import titles
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -26,6 +29,9 @@ SMALLEST_LARGE_PRIME = 2**63 + 29
 
 EXACT_FIELDS: list[Field] = [QQ, GF(2), GF(7), GF(2**61 - 1), GF(SMALLEST_LARGE_PRIME)]
 FIELDS: list[Field] = [*EXACT_FIELDS, RR(128)]
+
+# Of what is in the catalogue, by name, without reading it all.
+DIMENSION = {name: dim for name, (dim, _) in titles().items()}
 
 # For tests that run once a field: fewer examples each, and GF(2), where most matrices are singular, is tolerated.
 some = settings(max_examples=25, suppress_health_check=[HealthCheck.filter_too_much])
@@ -169,6 +175,34 @@ def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
     """The cases as parameters of a test; those not among `which` are left to the thorough runs."""
     seldom = ((case if isinstance(case, tuple) else (case,), case in which) for case in cases)
     return [pytest.param(*values, marks=() if often else THOROUGH) for values, often in seldom]
+
+
+def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """One test of a long table whose cases take no time: each is tried, and those that fail are told together.
+
+    As pytest.mark.parametrize, which makes a test of each case, and takes longer than such a case.
+    """
+    wanted, rows = names.split(", "), list(cases)
+
+    def of_all(test: Callable[..., None]) -> Callable[..., None]:
+        @wraps(test)
+        def run(**fixtures: Any) -> None:
+            wrong = []
+            for row in rows:
+                values = row if len(wanted) > 1 else (row,)
+                try:
+                    test(**fixtures, **dict(zip(wanted, values, strict=True)))
+                except (Exception, pytest.fail.Exception) as error:
+                    wrong.append(f"{row!r:.300}\n    {type(error).__name__}: {error}")
+            assert rows
+            assert not wrong, f"{len(wrong)} of {len(rows)} cases\n" + "\n".join(wrong)
+
+        own = signature(test)
+        left = [parameter for name, parameter in own.parameters.items() if name not in wanted]
+        run.__signature__ = own.replace(parameters=left)  # type: ignore[attr-defined]  # what pytest reads
+        return run
+
+    return of_all
 
 
 def table(path: Path) -> dict[str, list[str]]:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat
-from helpers import quick
+from helpers import DIMENSION, quick
 from search_helpers import random_system, system, value_of
 
 from kahanmaps.algebra.written.text import parse_rational_function
@@ -27,7 +27,7 @@ density_verdict = partial(verdict_on, is_density=True)
 
 # lorenz and kirchhoff_generic: searched as far as dimension and time allow, nothing found
 WITHOUT = ("lorenz", "kirchhoff_generic")
-SMALL_ONES = [name for name in names() if load(name).system.dim <= 4 and name not in WITHOUT]
+SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4 and name not in WITHOUT]
 
 
 @cache

@@ -4,7 +4,7 @@ import random
 
 import pytest
 from flint import arb, fmpq
-from helpers import quick
+from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +17,7 @@ from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
-PLANAR = [name for name in (*names(), *map_names()) if load(name).dim == 2]
+PLANAR = [name for name in (*names(), *map_names()) if DIMENSION[name] == 2]
 POSITIVE = ["lotka_volterra", "fibonacci", "hietarinta_viallet", "zander_120", "lotka_volterra_symplectic_euler"]
 
 

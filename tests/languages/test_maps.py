@@ -4,6 +4,7 @@ import re
 
 import pytest
 from flint import fmpq
+from helpers import DIMENSION
 from language_helpers import run_python
 
 import kahanmaps as km
@@ -13,7 +14,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.languages.convert import convert
 from kahanmaps.languages.language import LANGUAGES
 
-FILES = {name: load(name) for name in map_names() if load(name).dim < 4}
+FILES = {name: load(name) for name in map_names() if DIMENSION[name] < 4}
 FILES["adjusted"] = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y + eps*x^2", "y^2 - eps"]', "adjusted")
 PARTS = ["map", "map-formulas", "inverse"]
 EPS = "1/3"
