@@ -231,7 +231,7 @@ def test_what_was_left_out_is_named_stage_by_stage():
 
 def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow():
     map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
-    found = [sweep(map_, 2, 13, None, 5, 99, seed=seed) for seed in ("a", "a", "b")]
+    found = [sweep(map_, 2, 13, None, 4, 99, seed=seed) for seed in ("a", "a", "b")]
     assert found[0] == found[1]
     assert found[0].classes == found[2].classes  # lines in special position were replaced
     assert found[0].accidents > 0  # of which there are some modulo 13
