@@ -3,10 +3,11 @@
 Strategies draw plain data, so that hypothesis can shrink a failure to something one can compute by hand.
 """
 
+import ast
 import random
 from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
-from functools import wraps
+from functools import cache, wraps
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ SMALLEST_LARGE_PRIME = 2**63 + 29
 
 EXACT_FIELDS: list[Field] = [QQ, GF(2), GF(7), GF(2**61 - 1), GF(SMALLEST_LARGE_PRIME)]
 FIELDS: list[Field] = [*EXACT_FIELDS, RR(128)]
+
+parsed = cache(ast.parse)  # several tests read all files of the project
 
 # Of what is in the catalogue, by name, without reading it all.
 DIMENSION = {name: dim for name, (dim, _) in titles().items()}

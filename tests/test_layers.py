@@ -9,11 +9,11 @@ from __future__ import annotations
 import ast
 from collections import deque
 from collections.abc import Iterator
-from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from helpers import parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -40,8 +40,6 @@ KERNELS = ("kahanmaps/maps/floats/numba_kernel.py", "kahanmaps/maps/kept_code.py
 
 
 _PARTS = ("body", "orelse", "finalbody", "handlers", "cases")  # of statements, where statements stand
-
-parsed = cache(ast.parse)  # several tests read all files
 
 
 def python_files() -> list[Path]:

@@ -413,17 +413,21 @@ def test_a_complex_step_is_that_of_the_formulas(name):
         )
 
 
-@pytest.mark.parametrize(
-    ("name", "parts", "count", "width"),
-    quick(
-        [(n, p, c, w) for n in ("lines", "cubes", "general") for p in (2, 4) for c in (1, 2, 5) for w in (1, 3, 300)],
-        [("lines", 2, 3, 1), ("cubes", 2, 2, 5), ("general", 2, 1, 3), ("lines", 4, 3, 1), ("lines", 4, 2, 300)],
-    ),
-)
-def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(name, parts, count, width):
-    pytest.importorskip("numba")
-    from kahanmaps.maps.floats.numba_kernel import _sweep
+RUNS = [(n, p, c, w) for n in ("lines", "cubes", "general") for p in (2, 4) for c in (1, 2, 5) for w in (1, 3, 300)]
 
+
+@pytest.mark.parametrize(("name", "parts", "count", "width"), RUNS)
+@pytest.mark.parametrize("compiled", quick([False, True], [False]), ids=["as Python", "compiled"])
+def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(
+    name, parts, count, width, compiled, monkeypatch
+):
+    pytest.importorskip("numba")
+    from kahanmaps.maps.floats import numba_kernel
+
+    if not compiled:  # the loops as they are written; only the formulas in them are compiled, which takes no seconds
+        loops = {own: loop for own, loop in vars(numba_kernel).items() if hasattr(loop, "py_func")}
+        for own, loop in loops.items():
+            monkeypatch.setattr(numba_kernel, own, loop.py_func)
     kind = {"lines": LINES, "cubes": CUBES, "general": GENERAL}[name]
     if (kind == GENERAL and count > 1) or (kind == CUBES and parts == 4):
         return  # there are no such runs
@@ -436,10 +440,8 @@ def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(name, p
         for rows, after in zip(run.of(expected), image, strict=True):
             rows[:] = after
     flat = state.ravel().copy()
-    for sweep in (_sweep, _sweep.py_func):
-        found = flat.copy()
-        sweep(found, width, np.array(run), np.array([k]), 3, usual)
-        assert np.array_equal(found.reshape(state.shape), expected)
+    numba_kernel._sweep(flat, width, np.array(run), np.array([k]), 3, usual)
+    assert np.array_equal(flat.reshape(state.shape), expected)
     assert usual.all()
 
 
