@@ -181,3 +181,21 @@ def table(path: Path) -> dict[str, list[str]]:
         elif line:
             lines.append(line)
     return found
+
+
+def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:
+    """[[W, X], [Y, W^T]] with random integers from -bound to bound in W and in the skew blocks X and Y."""
+    W = [[rng.randint(-bound, bound) for _ in range(m)] for _ in range(m)]
+    X, Y = _random_skew(m, rng, bound), _random_skew(m, rng, bound)
+    upper = [[*W[i], *X[i]] for i in range(m)]
+    lower = [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)]
+    return fmpq_mat(upper + lower)
+
+
+def _random_skew(m: int, rng: random.Random, bound: int) -> list[list[int]]:
+    skew = [[0] * m for _ in range(m)]
+    for i in range(m):
+        for j in range(i):
+            skew[i][j] = rng.randint(-bound, bound)
+            skew[j][i] = -skew[i][j]
+    return skew

@@ -39,6 +39,7 @@ from kahanmaps.display.latex import latex_name as latex_name
 from kahanmaps.display.latex import latex_polynomial as latex_polynomial
 from kahanmaps.display.latex import latex_rational_function as latex_rational_function
 from kahanmaps.display.markup import code as code
+from kahanmaps.display.markup import eps_phrase as eps_phrase
 from kahanmaps.display.markup import markdown as markdown
 from kahanmaps.display.report_text import details as details
 from kahanmaps.display.report_text import headline as headline
@@ -145,7 +146,9 @@ from kahanmaps.languages.convert import convert as convert
 from kahanmaps.maps.convention import CONVENTION as CONVENTION
 from kahanmaps.maps.convention import convention as convention
 from kahanmaps.maps.convention import eps_record as eps_record
-from kahanmaps.maps.convention import eps_words as eps_words
+from kahanmaps.maps.convention import eps_share as eps_share
+from kahanmaps.maps.convention import eps_told as eps_told
+from kahanmaps.maps.convention import time_step as time_step
 from kahanmaps.maps.floats.doubles import FloatArray as FloatArray
 from kahanmaps.maps.floats.doubles import to_float as to_float
 from kahanmaps.maps.floats.doubles import to_floats as to_floats

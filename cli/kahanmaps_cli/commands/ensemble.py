@@ -129,7 +129,7 @@ def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) ->
     """Tab-separated lines, aligned on a terminal."""
     backward = ", backward" if options["backward"] else ""
     arithmetic = options["arithmetic"]
-    tell(f"# {file.name}{lib.eps_words(lib.eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {arithmetic} arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()

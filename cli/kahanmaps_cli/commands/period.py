@@ -106,7 +106,7 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         data |= {
             "system": file.name,
             "eps": lib.format_number(eps),
-            "time_step": lib.format_number(2 * eps),
+            "time_step": lib.format_number(lib.time_step(eps, file.map)),
             "planes": [],
         }
         for part in structure.form.parts:
@@ -151,7 +151,7 @@ def _message(found: lib.OrbitPeriod) -> str:
 
 
 def _print(file: lib.SystemFile, eps: Any, arithmetic: str, found: lib.OrbitPeriod) -> None:
-    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {arithmetic} arithmetic")
     tell(str(found))
 
 
@@ -169,8 +169,7 @@ def _record(
         str(options["arithmetic"]),
         seed=None,
         structure=structure.text,
-        eps=str(eps),
-        time_step=str(2 * eps),
+        **lib.eps_record(eps, file.map),
         start=lib.plain(options["start"]),
         **lib.attributes(found, "status", "meets_pole"),
         period=_text(found.period),

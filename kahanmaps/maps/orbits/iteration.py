@@ -7,7 +7,7 @@ with every step, so the budget is never absent by accident.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import count
@@ -251,7 +251,7 @@ class Iterates:
         self,
         kahan_map: MapOver,
         start: Sequence[Any],
-        at: Sequence[int],
+        at: Iterable[int],
         *,
         structure: Structure,
         backward: bool = False,

@@ -15,7 +15,7 @@ from flint import fmpq
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, Field, rational
 from kahanmaps.algebra.written.plain import json_float
-from kahanmaps.algebra.written.text import format_number, parse_point
+from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
@@ -34,7 +34,7 @@ from kahanmaps.maps.orbits.iteration import (
     require_steps,
 )
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method, why_no_reduction
-from kahanmaps.maps.orbits.writers import Csv, OutputFull, Writer, form_of, writer_to
+from kahanmaps.maps.orbits.writers import OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
@@ -106,18 +106,20 @@ def orbit(
     require_steps(steps)
     arithmetic = Arithmetic.of(arithmetic)
     start = _numbers(start, arithmetic)
+    far = max(at, default=0) if at is not None else (steps or 0)
+    require_steps(far)
+    wanted = None if at is None else frozenset(at)
+    asked = _Asked(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     if isinstance(given, MapOver):
-        return _orbit_at_one_eps(given, start, eps, steps, arithmetic, backward, max_digits)
+        return _orbit_at_one_eps(asked, arithmetic)
     map_ = as_map(given)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
-    exact_eps = fmpq(1) if eps is None else rational(eps)
-    far = max(at, default=0) if at is not None else (steps or 0)
-    require_steps(far)
+    asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
     if arithmetic.kind == "exact":
-        require_short(exact_eps, [rational(entry) for entry in start], max_digits)
+        require_short(asked.eps, [rational(entry) for entry in start], max_digits)
     if structure is None:
-        structure = _structure(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
+        structure = _structure(asked, method, arithmetic, hamiltonian, member)
     chosen = choose_method(method, arithmetic.kind, structure, at)
     if chosen.name != "doubling" and far > _TOO_FAR:
         raise InputError(
@@ -125,7 +127,6 @@ def orbit(
             f"and there is no other way here: {chosen.reason}"
         )
     used = structure if chosen.name != "generic" and isinstance(structure, Structure) else None
-    asked = _Asked(map_, start, exact_eps, far, at, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     remark = ""
     if arithmetic == Arithmetic("ball"):
         try:
@@ -141,12 +142,12 @@ class _Asked(NamedTuple):
 
     map: Any
     start: Sequence[Any]
-    eps: fmpq
+    eps: Any
     steps: int
-    at: Sequence[int] | None
+    at: frozenset[int] | None
     every: int
     backward: bool
-    max_digits: int | None
+    max_digits: int
     kernel: str | None
 
     def by(self, method: str, structure: Structure | None, numbers: Arithmetic) -> Any:
@@ -161,7 +162,7 @@ class _Asked(NamedTuple):
         over = self.map.at(self.eps, numbers.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and structure is not None:
-            return Iterates(over, self.start, self.at or [], structure=structure, **limits)
+            return Iterates(over, self.start, self.at or (), structure=structure, **limits)
         normal = structure if method == "normal-form" else None
         return Orbit(over, self.start, self.steps, structure=normal, **limits)
 
@@ -191,11 +192,8 @@ class Trajectory:
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
-        return step in self._at if self._at is not None else step % self._asked.every == 0
-
-    @cached_property
-    def _at(self) -> set[int] | None:
-        return None if self._asked.at is None else set(self._asked.at)
+        at = self._asked.at
+        return step in at if at is not None else step % self._asked.every == 0
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
@@ -231,16 +229,11 @@ class Trajectory:
         """
         kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
         names = (*self.variables, *self.integrals)
-        return [
-            {
-                "step": point.step,
-                **{
-                    name: None if text is None else kind(text)
-                    for name, text in zip(names, [*point.text, *self.values(point)], strict=True)
-                },
-            }
-            for point in self.points
-        ]
+        found = []
+        for point in self.points:
+            numbers = [text and kind(text) for text in (*point.text, *self.values(point))]
+            found.append({"step": point.step, **dict(zip(names, numbers, strict=True))})
+        return found
 
     def values(self, point: OrbitPoint) -> list[str | None]:
         """Those of the integrals, as text; None where one is not defined."""
@@ -261,10 +254,7 @@ class Trajectory:
     def to_csv(self, path: str | Path) -> None:
         """Write the points alone, as `kahanmaps orbit -o` does: step and coordinates, exact."""
         with growing_file(path) as stream:
-            writer = Csv(stream, self.variables, list(self.integrals))
-            writer.header({})
-            for point in self.points:
-                writer.point(point.step, point.text, self.values(point))
+            self.write(stream, "csv")
 
     def write(
         self,
@@ -314,10 +304,10 @@ class Trajectory:
             "system": name,
             "variables": list(self.variables),
             **asked.map.written(),
-            **eps_record(asked.eps, asked.map),
+            **({} if isinstance(asked.map, MapOver) else eps_record(asked.eps, asked.map)),
             "arithmetic": str(self.arithmetic),
             "method": self.method,
-            "start": [format_number(rational(entry)) for entry in asked.start],
+            "start": [str(entry) for entry in asked.start],
             "direction": "backward" if asked.backward else "forward",
             "steps": asked.steps,
             "seed": None,
@@ -384,40 +374,31 @@ def _exactly(value: float) -> fmpq:
     return fmpq(*value.as_integer_ratio())
 
 
-def _orbit_at_one_eps(
-    phi: MapOver,
-    start: Sequence[Any],
-    eps: Any,
-    steps: int | None,
-    arithmetic: Arithmetic,
-    backward: bool,
-    max_digits: int | None,
-) -> Trajectory:
+def _orbit_at_one_eps(asked: _Asked, arithmetic: Arithmetic) -> Trajectory:
     """The orbit of a map that has its eps and its field."""
-    if eps is not None or steps is None or arithmetic.kind != "exact":
+    phi = asked.map
+    if asked.eps is not None or asked.at is not None or arithmetic.kind != "exact":
         raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
     kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
-    points = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
-    asked = _Asked(phi, points.start, phi.eps, steps, None, 1, backward, points.max_digits, None)
+    points = Orbit(phi, asked.start, asked.steps, backward=asked.backward, max_digits=asked.max_digits)
+    asked = asked._replace(start=points.start, eps=phi.eps)
     return Trajectory(points, asked, kind, Method("generic", "it is a map at one eps"))
 
 
 def _structure(
-    map_: BirationalMap,
-    start: Sequence[Any],
-    eps: fmpq,
-    steps: int,
+    asked: _Asked,
     method: str | None,
     arithmetic: Arithmetic,
     hamiltonian: CubicHamiltonian | None,
     member: FamilyMember | None,
 ) -> Structure | NoStructure:
     """The normal form, where it may be of use."""
+    map_, eps = asked.map, asked.eps
     if method == "generic":
         return NoStructure("not looked for")
     if not isinstance(map_, Kahan) or map_.system.symbols:
         return NoStructure(f"it is {map_.kind}")
-    if method is None and (reason := _why_not_to_look(map_, start, eps, steps, arithmetic, member)):
+    if method is None and (reason := _why_not_to_look(asked, arithmetic, member)):
         return NoStructure(reason)
     structure = structure_of(map_.system, hamiltonian, member)
     if isinstance(structure, NoStructure):
@@ -428,27 +409,20 @@ def _structure(
     if arithmetic.kind == "ball":
         from kahanmaps.maps.normal_form.iterate import special_start
 
-        reason = special_start(structure, eps, start)
+        reason = special_start(structure, eps, asked.start)
     if arithmetic.kind == "mod":
         reason = why_no_reduction(structure, GF(arithmetic.number), eps)
     return NoStructure(reason) if reason else structure
 
 
-def _why_not_to_look(
-    map_: BirationalMap,
-    start: Sequence[Any],
-    eps: fmpq,
-    steps: int,
-    arithmetic: Arithmetic,
-    member: FamilyMember | None,
-) -> str:
+def _why_not_to_look(asked: _Asked, arithmetic: Arithmetic, member: FamilyMember | None) -> str:
     """Empty, or why looking for a structure would cost more than it can save."""
     few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
-    numbers = [eps, *(rational(entry) for entry in start)]
+    numbers = [asked.eps, *(rational(entry) for entry in asked.start)]
     if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
         few = max(few, 24)
-    if steps <= few:
+    if asked.steps <= few:
         return "not looked for, for so few steps"
-    if member is None and map_.dim > _LARGE_DIMENSION:
-        return f"not looked for in dimension {map_.dim}"
+    if member is None and asked.map.dim > _LARGE_DIMENSION:
+        return f"not looked for in dimension {asked.map.dim}"
     return ""
