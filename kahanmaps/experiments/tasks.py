@@ -27,7 +27,7 @@ from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit

@@ -51,7 +51,7 @@ from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.maps.implicit import MapOver
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 

@@ -37,7 +37,8 @@ from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.equation import Equation, equation_of
 from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint, IntegerSteps
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.integer_steps import IntegerSteps
 from kahanmaps.systems.polynomial import PolynomialField
 
 

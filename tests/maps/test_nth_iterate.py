@@ -24,7 +24,7 @@ from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.rational_iterate import OverBudget
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 

@@ -17,7 +17,7 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planes_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.steps import NormalSteps
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 PAIRS = [
     ("one rational root", "three rational roots"),

@@ -24,7 +24,7 @@ from kahanmaps.maps.normal_form.planar_integers import (
     is_all,
     radical,
 )
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 Block = IntegerBlock | AlgebraBlock
 

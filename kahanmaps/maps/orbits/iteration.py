@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
-from kahanmaps.maps.orbits.integer_steps import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
 if TYPE_CHECKING:
