@@ -37,7 +37,7 @@ UNSPLIT = ("t^3 - t - 1", "t^3 - 7*t + 3", "(t - 1)*(t^2 - 3)", "(t^2 - 2)*(t^2 
 
 def _normal(work: Work, steps: int, deliver: Callable[[PlanesPoint], Any]) -> PlanesPoint:
     last = None
-    for last in islice(NormalSteps(work.structure, work.eps).points(work.start), steps + 1):
+    for last in islice(NormalSteps(work.normal_form, work.eps).points(work.start), steps + 1):
         deliver(last)
     assert last is not None
     return last

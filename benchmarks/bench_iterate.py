@@ -34,7 +34,7 @@ ELLIPTIC = "PARI/GP: ellmul, n T on the elliptic curves alone"
 def iterate(work: Work, n: int) -> tuple[float, PlanesPoint]:
     """The iterate by doublings, from the start in x to primitive triples."""
     # A new one each time, since tables of values are kept for the next iterate.
-    seconds, value = timed(lambda: NthIterate(work.structure, work.eps, QQ).value(work.start, n))
+    seconds, value = timed(lambda: NthIterate(work.normal_form, work.eps, QQ).value(work.start, n))
     assert isinstance(value, PlanesPoint)
     return seconds, value
 
@@ -43,7 +43,7 @@ def step(work: Work, n: int) -> tuple[float, PlanesPoint]:
     """The same by way of all iterates before it."""
 
     def run() -> PlanesPoint:
-        return next(islice(NormalSteps(work.structure, work.eps).points(work.start), n, None))
+        return next(islice(NormalSteps(work.normal_form, work.eps).points(work.start), n, None))
 
     return timed(run, most=3)
 
@@ -60,7 +60,7 @@ def multiplication(point: PlanesPoint) -> float:
 
 def _curves(work: Work) -> list[str]:
     """The coefficients of y^2 + 6 x y + 16 gamma y = x^3 + 3 gamma x^2, on which T = (0, 0), for every plane."""
-    blocks, _ = NormalSteps(work.structure, work.eps).blocks(work.start)
+    blocks, _ = NormalSteps(work.normal_form, work.eps).blocks(work.start)
     gammas = [1 - block.delta for block in blocks]
     return [f"[6, 3*({gamma}), 16*({gamma}), 0, 0]" for gamma in gammas]
 
@@ -87,7 +87,7 @@ def elliptic_curve_modulo(work: Work, n: int, repeat: int = 2000) -> float:
 
 def iterate_modulo(work: Work, n: int) -> tuple[float, list[int]]:
     """The iterate over GF(2^61 - 1) by doublings, x to x."""
-    iterate = NthIterate(work.structure, work.eps, GF(PRIME))
+    iterate = NthIterate(work.normal_form, work.eps, GF(PRIME))
     seconds, value = timed(lambda: iterate.value(work.start, n), enough=0.3, most=100)
     return seconds, [int(entry) for entry in value]
 
@@ -169,8 +169,8 @@ def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
 def in_balls(work: Work, n: int = 10**6, bits: int = 400, check: int = 80) -> list[Row]:
     """One long iterate in balls; a short one has to contain the exact iterate."""
     field = RR(bits)
-    iterate = NthIterate(work.structure, work.eps, field)
-    exact = NthIterate(work.structure, work.eps, QQ).value(work.start, check)
+    iterate = NthIterate(work.normal_form, work.eps, field)
+    exact = NthIterate(work.normal_form, work.eps, QQ).value(work.start, check)
     assert isinstance(exact, PlanesPoint)
     short = iterate.value(work.start, check)
     with field.working():
@@ -195,7 +195,7 @@ def whole_process(n: int = 2000) -> list[Row]:
 
 def alone(n: int) -> None:
     """What `whole_process` starts: prints seconds, megabytes and digits."""
-    value = NthIterate(work().structure, work().eps, QQ).value(work().start, n)
+    value = NthIterate(work().normal_form, work().eps, QQ).value(work().start, n)
     assert isinstance(value, PlanesPoint)
     _, below = value.common()
     used = resource.getrusage(resource.RUSAGE_SELF)

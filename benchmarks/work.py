@@ -21,7 +21,7 @@ from flint import fmpq
 
 from kahanmaps import QuadraticSystem, draw_with_eigenvalues
 from kahanmaps.family.draw import draw_with_chi, parse_chi
-from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 
 Row = dict[str, Any]  # contestant, work, seconds, ratio, note; `group` names the table
 
@@ -45,7 +45,7 @@ class Work:
 
     m: int
     system: QuadraticSystem
-    structure: Structure
+    normal_form: SystemNormalForm
     start: tuple[fmpq, ...]
     eps: fmpq
 
@@ -58,9 +58,9 @@ def work(m: int = 3) -> Work:
     """The common work. For m = 3 every coordinate of the 80th iterate has 35,128 digits above and below."""
     member = draw_with_eigenvalues(EIGENVALUES[:m], seed=SEED)
     system = member.chosen.system
-    structure = structure_of(system, member=member)
-    assert isinstance(structure, Structure)
-    return Work(m, system, structure, tuple(fmpq(*map(int, s.split("/"))) for s in START[: 2 * m]), EPS)
+    normal_form = system_normal_form(system, member=member)
+    assert isinstance(normal_form, SystemNormalForm)
+    return Work(m, system, normal_form, tuple(fmpq(*map(int, s.split("/"))) for s in START[: 2 * m]), EPS)
 
 
 @lru_cache
@@ -68,9 +68,9 @@ def with_chi(chi: str) -> Work:
     """The same for a member with this chi, any polynomial."""
     member = draw_with_chi(parse_chi(chi), seed=SEED)
     system = member.chosen.system
-    structure = structure_of(system, member=member)
-    assert isinstance(structure, Structure)
-    return Work(system.dim // 2, system, structure, work(system.dim // 2).start, EPS)
+    normal_form = system_normal_form(system, member=member)
+    assert isinstance(normal_form, SystemNormalForm)
+    return Work(system.dim // 2, system, normal_form, work(system.dim // 2).start, EPS)
 
 
 def peer(module: str) -> ModuleType:

@@ -54,8 +54,8 @@ from kahanmaps.family.planar import normal_form as normal_form
 from kahanmaps.family.recognise import RecognisedMember as RecognisedMember
 from kahanmaps.family.recognise import recognised_member as recognised_member
 from kahanmaps.family.recognise import recognised_member_of as _recognised_member_of
-from kahanmaps.family.structure import Structure as Structure
-from kahanmaps.family.structure import structure_of as _structure_of
+from kahanmaps.family.system_normal_form import SystemNormalForm as SystemNormalForm
+from kahanmaps.family.system_normal_form import system_normal_form as _system_normal_form
 from kahanmaps.family.tensor import TensorStructure as TensorStructure
 from kahanmaps.family.tensor import tensor_structure as _tensor_structure
 from kahanmaps.invariants.heights import HeightGrowth as HeightGrowth
@@ -144,7 +144,7 @@ check_measure = opened(_check_measure)
 check_poisson = opened(_check_poisson)
 tensor_file = opened(_tensor_file)
 recognised_member_of = opened(_recognised_member_of)
-structure_of = opened(_structure_of)
+system_normal_form = opened(_system_normal_form)
 tensor_structure = opened(_tensor_structure)
 analyze = opened(_analyze)
 cycle_census = opened(_cycle_census)

@@ -15,7 +15,7 @@ from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -221,8 +221,8 @@ def invertible(n: int, seed: int) -> fmpq_mat:
 def structure_and_system(name: str) -> tuple[Any, QuadraticSystem]:
     """The structure of a member of the table below and its system."""
     system, hamiltonian = MEMBERS[name]
-    found = structure_of(system, hamiltonian)
-    assert isinstance(found, Structure)
+    found = system_normal_form(system, hamiltonian)
+    assert isinstance(found, SystemNormalForm)
     return found, system
 
 
@@ -269,15 +269,15 @@ over_members = pytest.mark.parametrize("name", MEMBERS)
 
 
 @lru_cache
-def side_by_side(*names: str) -> tuple[QuadraticSystem, Structure, tuple[fmpq, ...]]:
+def side_by_side(*names: str) -> tuple[QuadraticSystem, SystemNormalForm, tuple[fmpq, ...]]:
     """A system made of the planes of these starts, its structure, and the start for eps = 1/2."""
     system, hamiltonian = _plain([STARTS[name][0] for name in names])
     member = FamilyMember(diagonal([*range(1, len(names) + 1)] * 2), hamiltonian.H)
-    structure = structure_of(system, member=member)
-    assert isinstance(structure, Structure)
+    normal_form = system_normal_form(system, member=member)
+    assert isinstance(normal_form, SystemNormalForm)
     triples = [STARTS[name][1] for name in names]
     start = [fmpq(U, W) for U, _, W in triples] + [fmpq(V, W) for _, V, W in triples]
-    return system, structure, tuple(start)
+    return system, normal_form, tuple(start)
 
 
 def diagonal(entries: Sequence[Any]) -> fmpq_mat:

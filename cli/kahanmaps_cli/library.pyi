@@ -107,8 +107,8 @@ from kahanmaps.family.recognise import recognised_hamiltonian as recognised_hami
 from kahanmaps.family.recognise import recognised_member as recognised_member
 from kahanmaps.family.skew_hamiltonian import chi as chi
 from kahanmaps.family.skew_hamiltonian import diagnosis as diagnosis
-from kahanmaps.family.structure import NoStructure as NoStructure
-from kahanmaps.family.structure import Structure as Structure
+from kahanmaps.family.system_normal_form import NoNormalForm as NoNormalForm
+from kahanmaps.family.system_normal_form import SystemNormalForm as SystemNormalForm
 from kahanmaps.invariants.growth import Growth as Growth
 from kahanmaps.invariants.integrals import ClaimedIntegral as ClaimedIntegral
 from kahanmaps.laboratory.analysis import Analysis as Analysis

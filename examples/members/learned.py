@@ -35,9 +35,9 @@ def member_of(row: Row) -> tuple[int, str, int]:
 def heights_of_gamma(row: Row, result: dict) -> list[float]:
     """The heights of gamma = 1 - disc(h) level^2 in the planes of a member, in bits."""
     file = system_from(row.task.system or {}, {}.__getitem__)
-    structure = km.structure_of(file.system, file.hamiltonian, file.member)
+    normal_form = km.system_normal_form(file.system, file.hamiltonian, file.member)
     start, eps = km.parse_point(result["start"]), km.parse_point(row.task.value("eps"))[0]
-    blocks, _ = NormalSteps(structure, eps).blocks(start)
+    blocks, _ = NormalSteps(normal_form, eps).blocks(start)
     gammas = [fmpq(1) - block.delta for block in blocks]
     return [log2(max(abs(int(gamma.p)), int(gamma.q))) for gamma in gammas]
 

@@ -26,7 +26,7 @@ from kahanmaps.documents.families import family_member
 from kahanmaps.documents.reader import KINDS
 from kahanmaps.documents.toml_text import TomlKind, to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan
@@ -138,11 +138,11 @@ class SystemFile(Displayed):
         return SystemFile(*DocumentReader(dict(self.document), self.name, value).read())
 
     @property
-    def structure(self) -> Structure | NoStructure:
+    def normal_form(self) -> SystemNormalForm | NoNormalForm:
         """The normal form of the system, looked for anew each time, or why there is none."""
         if not self.is_quadratic:
-            return NoStructure(f"it is {self.map.kind}")
-        return structure_of(self.system, self.hamiltonian, self.member)
+            return NoNormalForm(f"it is {self.map.kind}")
+        return system_normal_form(self.system, self.hamiltonian, self.member)
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
         """Raises InputError unless the function is one of the system's variables and eps, in this order."""
@@ -169,8 +169,8 @@ class SystemFile(Displayed):
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
         """A Hamiltonian system."""
-        structure: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
-        section = {"H": format_polynomial(hamiltonian.H), "J": structure}
+        normal_form: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
+        section = {"H": format_polynomial(hamiltonian.H), "J": normal_form}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
         return cls(name, "hamiltonian", {}, Kahan(hamiltonian.system), hamiltonian, None, {}, None, document)
 

@@ -213,7 +213,7 @@ def analysis(
     seed: int = 0,
 ) -> Whole:
     """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
-    from kahanmaps.family.structure import Structure
+    from kahanmaps.family.system_normal_form import SystemNormalForm
     from kahanmaps.laboratory.analysis import analyze
 
     found = analyze(system, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
@@ -229,7 +229,7 @@ def analysis(
         "group_order": None if found.symmetries is None else found.symmetries.order,
         "commuting": None if found.commuting is None else len(found.commuting.nontrivial),
         "confinement": None if not confined else confined.pop() if len(confined) == 1 else "undecided",
-        "in_family": isinstance(found.structure, Structure),
+        "in_family": isinstance(found.normal_form, SystemNormalForm),
         "sentence": final.sentence,
         "unfinished": unfinished,
         "skipped": found.skipped,

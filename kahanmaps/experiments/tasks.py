@@ -23,7 +23,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, Whole, fields, task
 from kahanmaps.family.cubics import cubic_space
-from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
@@ -145,9 +145,9 @@ def orbit(
     numbers = Arithmetic.parse(arithmetic)
     if numbers.kind == "float" and at is not None:
         raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
-    structure: Structure | NoStructure = NoStructure("as asked for")
+    normal_form: SystemNormalForm | NoNormalForm = NoNormalForm("as asked for")
     if method != "generic" and system.is_quadratic:
-        structure = _float_structure(system, method) if numbers.kind == "float" else system.structure
+        normal_form = _float_normal_form(system, method) if numbers.kind == "float" else system.normal_form
     walk = find_orbit(
         system.map,
         point,
@@ -157,7 +157,7 @@ def orbit(
         arithmetic=numbers,
         method=method,
         max_digits=max_digits,
-        structure=structure,
+        normal_form=normal_form,
     )
     reached = deque(walk, 1)
     if not reached:  # of iterates reached directly there may be none
@@ -196,9 +196,9 @@ def ensemble(
     from kahanmaps.maps.floats.fast import to_floats
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
-    structure = _float_structure(system, method)
-    chosen = choose_method(method, "float", structure, None)
-    form = structure.form if chosen.name == "normal-form" and isinstance(structure, Structure) else None
+    normal_form = _float_normal_form(system, method)
+    chosen = choose_method(method, "float", normal_form, None)
+    form = normal_form.form if chosen.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
     # The kernel makes no difference to the numbers, and compiling one takes longer than a short task.
     kernel = "numpy" if orbits * steps < _WORTH_COMPILING else None
     run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
@@ -226,7 +226,7 @@ def heights(
     """How fast the numbers of an orbit grow: the kind of growth, and its constant."""
     point = start if start is not None else _drawn(system, seed)
     growth = height_growth(
-        system.map.at(eps), point, steps, structure=system.structure, every=every, max_digits=max_digits
+        system.map.at(eps), point, steps, normal_form=system.normal_form, every=every, max_digits=max_digits
     )
     found = growth.to_json()
     return {
@@ -241,11 +241,11 @@ def heights(
 @task("period")
 def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = None, seed: int = 0) -> Result:
     """The exact period of an orbit of a member of the family, modulo a prime or over the rationals."""
-    structure = system.structure
-    if isinstance(structure, NoStructure):
-        raise InputError(f"no period of {system.name} can be computed: {structure.reason}")
+    normal_form = system.normal_form
+    if isinstance(normal_form, NoNormalForm):
+        raise InputError(f"no period of {system.name} can be computed: {normal_form.reason}")
     point = start if start is not None else _drawn(system, seed)
-    found = period_of(structure, eps, point, prime)
+    found = period_of(normal_form, eps, point, prime)
     return {
         "start": _text(point),
         "status": found.status,
@@ -290,11 +290,11 @@ def _of_report(report: Report) -> Whole:
     }, report
 
 
-def _float_structure(system: SystemFile, method: str | None) -> Structure | NoStructure:
-    structure = NoStructure("as asked for") if method == "generic" else system.structure
-    if isinstance(structure, Structure) and structure.T is not None:
-        return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
-    return structure
+def _float_normal_form(system: SystemFile, method: str | None) -> SystemNormalForm | NoNormalForm:
+    normal_form = NoNormalForm("as asked for") if method == "generic" else system.normal_form
+    if isinstance(normal_form, SystemNormalForm) and normal_form.T is not None:
+        return NoNormalForm("in machine numbers only J = [[0, I], [-I, 0]] has one")
+    return normal_form
 
 
 def _text(point: Any) -> str:

@@ -48,7 +48,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.written.numerals import wrong_kind
 from kahanmaps.errors import InputError, counted
-from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -60,7 +60,7 @@ _FEWEST_FOR_EXPONENTIAL = 6
 _FEWEST_FOR_LOGARITHMIC = 32
 _NOISE = 4  # bits by which the rise of a quarter may differ from the rule without meaning anything
 _SHOWN = 20
-_NOT_GIVEN = NoStructure("none was given")
+_NOT_GIVEN = NoNormalForm("none was given")
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def height_growth(
     start: Sequence[Any],
     steps: int,
     *,
-    structure: Structure | NoStructure | None = None,
+    normal_form: SystemNormalForm | NoNormalForm | None = None,
     every: int = 1,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
     deadline: float | None = None,
@@ -208,7 +208,7 @@ def height_growth(
 
     It is interrupted after the step in flight when time.monotonic() passes the `deadline`.
 
-    With a `structure` (family.structure.structure_of) the orbit is walked in normal form, and
+    With a `normal_form` (family.system_normal_form) the orbit is walked in normal form, and
     for large `every` its points are reached directly; the numbers are the same. Then every height costs a gcd of
     large numbers, which for long orbits is most of the work: three planes take about 0.2 s for 100 steps, 2 s for 200
     and 8 s for 300, but 0.8 s with `every` = 15, which tells nearly as much.
@@ -233,14 +233,14 @@ def height_growth(
         # One step may take minutes then, and its numbers are that long as a rule.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
         return HeightGrowth((first,), end, every)
-    structure = _NOT_GIVEN if structure is None else structure
-    method = choose_method(None, "exact", structure, None if every == 1 else at).name
-    if method == "doubling" and isinstance(structure, Structure):
-        iterates = Iterates(kahan_map, start, at, structure=structure, max_digits=max_digits)
+    normal_form = _NOT_GIVEN if normal_form is None else normal_form
+    method = choose_method(None, "exact", normal_form, None if every == 1 else at).name
+    if method == "doubling" and isinstance(normal_form, SystemNormalForm):
+        iterates = Iterates(kahan_map, start, at, normal_form=normal_form, max_digits=max_digits)
         heights, end = _reached(iterates, deadline)
     else:
-        form = structure if method == "normal-form" and isinstance(structure, Structure) else None
-        orbit = Orbit(kahan_map, start, at[-1], structure=form, max_digits=max_digits)
+        form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
+        orbit = Orbit(kahan_map, start, at[-1], normal_form=form, max_digits=max_digits)
         heights = [height_of(point) for point in _in_time(orbit, deadline) if point.step % every == 0]
         assert orbit.end is not None
         end = orbit.end

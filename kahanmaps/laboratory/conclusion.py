@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
@@ -204,7 +204,7 @@ def _curves(found: Findings, growth: Growth) -> str:
 
 def _liouville(found: Findings) -> str:
     """By what the map is Liouville integrable, proved; empty where that is not known."""
-    if isinstance(found.structure, Structure) and found.dim > 2:
+    if isinstance(found.normal_form, SystemNormalForm) and found.dim > 2:
         return "as a member of the commuting family"
     for one in found.poisson.tensors if found.poisson is not None and found.dim > 2 else ():
         proved = (one.verdict, one.jacobi, one.involution)

@@ -7,7 +7,7 @@ What is proved stands. Where two measurements exclude each other, neither is a f
 from __future__ import annotations
 
 from kahanmaps.errors import counted
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.findings import Findings
 
@@ -29,7 +29,7 @@ def contradictions(found: Findings) -> list[str]:
     said = []
     if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(found):
         said.append("the degrees seem to grow exponentially, which they cannot where integrals leave curves only")
-    elif growth is Growth.EXPONENTIAL and isinstance(found.structure, Structure):
+    elif growth is Growth.EXPONENTIAL and isinstance(found.normal_form, SystemNormalForm):
         said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
     if found.degrees is not None and found.degrees.enclosure is not None and orbits_lie_on_curves(found):
         said.append("positive algebraic entropy is proved, which excludes an integral")

@@ -8,7 +8,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.family.tensor import TensorStructure
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
@@ -49,7 +49,7 @@ class Findings:
     symmetries: Symmetries | None = None
     commuting: CommutingSystems | None = None
     hamiltonian: ConstantStructures | None = None
-    structure: Structure | NoStructure | None = None  # in coordinates with the centre as origin
+    normal_form: SystemNormalForm | NoNormalForm | None = None  # in coordinates with the centre as origin
     tensor: TensorStructure | None = None  # over which algebra larger than Q it is a system
     further: dict[str, Any] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
@@ -78,16 +78,16 @@ class Findings:
 
     @property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """The origin of the coordinates that `structure` is in; None where H has no centre, or that was not reached."""
+        """The origin of the coordinates of `normal_form`; None where H has no centre, or that was not reached."""
         if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
             return self.hamiltonian.hamiltonian.centre
-        return None if self.structure is None else (fmpq(0),) * self.dim
+        return None if self.normal_form is None else (fmpq(0),) * self.dim
 
     @property
     def integral_count(self) -> int:
         """The number of independent integrals: found, shown by orbits, or given by theorems; see `count_is_exact`."""
         known = self.integrals.codimension if self.integrals is not None else 0
-        family = self.structure.form.m if isinstance(self.structure, Structure) else 0
+        family = self.normal_form.form.m if isinstance(self.normal_form, SystemNormalForm) else 0
         return max(known, family)
 
     @property

@@ -123,18 +123,18 @@ def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
     """The maps of a member that are drawn: two associated ones, and the control J grad H_0 and J grad H_1.
 
     The first is the system itself, the second has the other sign at the last factor of chi. Where m = 1 the control is
-    f with 2 f. Raises InputError where the system is no member, declared or hidden, in its own coordinates.
+    f with 2 f. Raises InputError where the system is no member, declared or recognised, in its own coordinates.
     """
     member = file.member
     if member is None:
         hamiltonian = file.hamiltonian or recognised_hamiltonian(file.system)
-        hidden = None if hamiltonian is None else recognised_member(hamiltonian)
-        if hidden is None or not hidden.is_standard:
+        recognised = None if hamiltonian is None else recognised_member(hamiltonian)
+        if recognised is None or not recognised.is_standard:
             raise InputError(
                 f"{file.name} is of kind [{file.kind}], and one system commutes with itself: give a second system, "
                 "or a member of the commuting family with the standard J, whose associated maps are drawn"
             )
-        member = hidden.member
+        member = recognised.member
     J = standard_structure(member.dim)
     first = member.chosen
     second = member.associate((*member.signs[:-1], -member.signs[-1]))

@@ -10,7 +10,7 @@ from kahanmaps.display.laboratory import eps_sentence, result_html
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import equations_html
 from kahanmaps.errors import counted
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.plots.growth import draw_degrees, draw_heights
 from kahanmaps.reports.page import CHARACTERS, Section, page, statements, text, wide
 from kahanmaps.reports.pictures import Pictures
@@ -32,7 +32,7 @@ def analysis_page(found: Analysis, title: str, recipe: Recipe, pictures: Picture
     lead = text(", ".join(filter(None, words)))
     if found.symbols:
         lead += f"; formulas for every {text(', '.join(found.symbols))}"
-    is_member = isinstance(found.file.structure, Structure)  # in the coordinates that the picture is made in
+    is_member = isinstance(found.file.normal_form, SystemNormalForm)  # in the coordinates that the picture is made in
     orbits = invariant_curves_figure if is_member else portrait_figure
     sections = [
         _verdict(found),

@@ -62,7 +62,7 @@ def test_recognised_members_have_periods(kahanmaps):
     words = " ".join(f"--rhs='{text}'" for text in rhs)
     command = f"--vars x1,x2,x3,x4,x5,x6 {words} --start 1,2,3,4,5,6 --eps 1/11 --arithmetic mod:10007 --json"
     hidden = kahanmaps(f"period {command}").json
-    assert hidden["structure"].startswith("a hidden member")
+    assert hidden["structure"].startswith("a recognised member")
     assert hidden["period"] == kahanmaps(f"period {M3} --arithmetic mod:10007 --json").json["period"]
 
 

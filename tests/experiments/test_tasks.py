@@ -23,7 +23,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import canonical
 from kahanmaps.family.cubics import cubic_space
-from kahanmaps.family.structure import structure_of
+from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
 from kahanmaps.maps.floats.fast import FloatOrbit
@@ -54,8 +54,8 @@ def start_of(system: SystemFile, seed: int = 0) -> Any:
     return next(random_starts(system.system.dim, seed_for(seed, system.system.rhs)))
 
 
-def structure(system: SystemFile) -> Any:
-    return structure_of(system.system, system.hamiltonian, system.member)
+def normal_form(system: SystemFile) -> Any:
+    return system_normal_form(system.system, system.hamiltonian, system.member)
 
 
 # Checks
@@ -218,7 +218,7 @@ def test_a_start_is_drawn_from_the_seed_unless_given(name):
 @pytest.mark.parametrize(("system", "steps", "growth"), [(MEMBER, 40, "quadratic"), (LORENZ, 9, "exponential")])
 def test_heights_are_those_of_the_library(system, steps, growth):
     found = height_growth(
-        KahanMap(system.system, "1/10"), start_of(system), steps, structure=structure(system)
+        KahanMap(system.system, "1/10"), start_of(system), steps, normal_form=normal_form(system)
     ).to_json()
     result = perform("heights", system, eps="1/10", steps=steps)
     assert result["growth"] == found["kind"] == growth
@@ -242,7 +242,7 @@ def test_an_ensemble_is_that_of_the_library():
 
 @pytest.mark.parametrize("prime", [None, 10007])
 def test_a_period_is_that_of_the_library(prime):
-    found = period_of(structure(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
+    found = period_of(normal_form(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
     result = perform("period", MEMBER, eps="1/10", **({} if prime is None else {"prime": prime}))
     assert result["period"] == (None if found.period is None else str(found.period))
     assert (result["status"], result["meets_pole"]) == (found.status, found.meets_pole)

@@ -22,7 +22,7 @@ from planar_helpers import over_members, side_by_side, structure_and_system
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InexactNumber, InputError
-from kahanmaps.family.structure import structure_of
+from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import (
     HeightGrowth,
@@ -88,10 +88,10 @@ def test_machine_floats_have_no_height():
 
 @over_members
 def test_heights_in_normal_form_are_those_of_the_points_of_the_generic_orbit(name):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     start, steps = START[: system.dim], 12
     expected = [height(point.x) for point in Orbit(KahanMap(system, "1/10"), start, steps)]
-    found = growth(system, start, steps, structure=structure)
+    found = growth(system, start, steps, normal_form=normal_form)
     assert found.heights == tuple(expected)
     assert found.method == "normal-form"
     assert growth(system, start, steps).heights == tuple(expected)
@@ -102,9 +102,9 @@ def test_heights_in_normal_form_are_those_of_the_points_of_the_generic_orbit(nam
     [("m = 2", 7, "normal-form"), ("m = 2", 20, "doubling"), ("m = 2, sqrt 2", 2, "normal-form")],
 )
 def test_heights_at_some_steps_are_those_of_all_steps(name, every, method):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     every_step = growth(system, START[:4], 40).heights
-    found = growth(system, START[:4], 40, structure=structure, every=every)
+    found = growth(system, START[:4], 40, normal_form=normal_form, every=every)
     assert found.steps == tuple(range(0, 41, every))
     assert found.heights == every_step[::every]
     assert found.method == method
@@ -126,8 +126,8 @@ CATALOGUE = {
 def test_systems_of_the_catalogue_grow_as_theory_says(name):
     kind, constant, _ = CATALOGUE[name]
     file = load(name)
-    structure = structure_of(file.system, file.hamiltonian, file.member)
-    found = growth(file.system, START[: file.system.dim], 64, structure=structure, max_digits=12_000)
+    normal_form = system_normal_form(file.system, file.hamiltonian, file.member)
+    found = growth(file.system, START[: file.system.dim], 64, normal_form=normal_form, max_digits=12_000)
     assert found.kind is kind
     assert (found.constant is None) == (constant is None)
     if constant is not None and found.end.is_whole:
@@ -202,8 +202,8 @@ def test_controls_grow_as_their_closed_form_says(name):
     ],
 )
 def test_the_level_cubic_of_a_plane_decides_how_heights_grow(name, kind):
-    system, structure, start = side_by_side(name)
-    assert growth(system, start, 64, "1/2", structure=structure).kind is kind
+    system, normal_form, start = side_by_side(name)
+    assert growth(system, start, 64, "1/2", normal_form=normal_form).kind is kind
 
 
 # Constants
@@ -244,11 +244,11 @@ def constant_at(gamma: fmpq, doublings: int = 8) -> Fraction:
     "name", quick(["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"], ["m = 1", "m = 2"])
 )
 def test_the_constant_of_a_member_is_the_sum_of_the_canonical_heights_of_its_planes(name):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     start = [fmpq(1, 2), fmpq(1, 3), fmpq(-1, 5), fmpq(2, 7), fmpq(3, 4), fmpq(-2, 3)][: system.dim]
-    blocks, _ = NormalSteps(structure, fmpq(1, 10)).blocks(start)
+    blocks, _ = NormalSteps(normal_form, fmpq(1, 10)).blocks(start)
     expected = sum(map(translation_constant, blocks))
-    found = growth(system, start, 60, structure=structure)
+    found = growth(system, start, 60, normal_form=normal_form)
     assert found.kind is Q
     assert abs(found.constant / expected - 1) < Fraction(1, 2000)  # measured: at most 2 parts in 10^4
     # Control: the constants of the planes are not so small that one of them might be missing.
@@ -340,8 +340,8 @@ def test_a_singular_end_leaves_the_decision_to_what_is_there_and_is_told_where_t
 
 
 def test_a_period_is_seen_in_jumps_too():
-    structure, system = structure_and_system("m = 2")
-    found = growth(system, [0] * 4, 500, structure=structure, every=100)
+    normal_form, system = structure_and_system("m = 2")
+    found = growth(system, [0] * 4, 500, normal_form=normal_form, every=100)
     assert (found.method, found.kind) == ("doubling", P)
 
 

@@ -192,7 +192,7 @@ def test_what_is_said_of_integrals(profile, others, expected):
         theorems="Prop. 1",
         **search,
     )
-    lines = integrals.statements(SimpleNamespace(integrals=found, relations=(), structure=None, pencil=None))
+    lines = integrals.statements(SimpleNamespace(integrals=found, relations=(), normal_form=None, pencil=None))
     assert [(str(line.status), line.text) for line in lines] == expected
 
 

@@ -55,7 +55,7 @@ def test_a_member_in_other_coordinates_is_recognised_with_what_follows(name):
     assert recognised_member_of(system) is None  # not as long as these coordinates are kept
     found, m = analysed(system), member.m
     lines = proved(found)
-    (line,) = (line for line in lines if line.startswith("belongs to the commuting family: a hidden member"))
+    (line,) = (line for line in lines if line.startswith("belongs to the commuting family: a recognised member"))
     assert line.endswith(" + T y")
     assert f"{m} independent integrals, as a member of the commuting family" in lines
     ending = f"{m} integrals in involution, as a member of the commuting family"
@@ -75,7 +75,7 @@ def test_the_matrices_that_are_given_are_those_of_the_system(name):
     record = found.to_json()
     assert mistakes("analyze", record) == []
     hamiltonian = constant_structures(system).hamiltonian
-    A, T, J = found.structure.A, found.structure.T, hamiltonian.J
+    A, T, J = found.normal_form.A, found.normal_form.T, hamiltonian.J
     assert J == T * standard_structure(system.dim) * T.transpose()
     assert A.transpose() * J == J * A
     about = hamiltonian.about(found.centre)
@@ -92,7 +92,7 @@ def test_the_matrices_that_are_given_are_those_of_the_system(name):
 def test_a_cubic_that_is_no_member_is_not_taken_for_one():
     text = "x1^3 + 2*x2^3 + 3*x3^3 + 4*x4^3 + x1*x2*x3 + x1^2*x4"
     found = analysed(elsewhere(parse_polynomial(text, default_variables(4)), 1))
-    assert found.structure.reason.startswith("only the multiples of I satisfy")
+    assert found.normal_form.reason.startswith("only the multiples of I satisfy")
     assert found.to_json()["member"] is found.to_json()["family"] is None
     assert not any("commuting family" in line for line in proved(found))
     assert "Liouville" not in found.conclusion.sentence
@@ -101,14 +101,14 @@ def test_a_cubic_that_is_no_member_is_not_taken_for_one():
 def test_a_cubic_without_a_centre_is_none():
     H = MEMBERS["m = 2, split"].H
     found = analysed(elsewhere(H + H.context().gens()[0] ** 2, 3))
-    assert (found.centre, found.structure.reason) == (None, "H is not a homogeneous cubic")
+    assert (found.centre, found.normal_form.reason) == (None, "H is not a homogeneous cubic")
 
 
 def test_a_member_with_a_repeated_root_is_said_to_be_one_and_no_more():
     found = analysed(elsewhere(parse_polynomial("x1^2*x2", default_variables(4)), 3))
     lines = [line for line in proved(found) if "commuting family" in line]
     assert [line.split(", in coordinates")[0] for line in lines] == [
-        "belongs to the commuting family: a hidden member of the family, chi = (t - 1)^2"
+        "belongs to the commuting family: a recognised member of the family, chi = (t - 1)^2"
     ]
     assert found.to_json()["member"] is None
 
@@ -121,4 +121,4 @@ def test_degrees_that_seem_exponential_do_not_go_with_a_member():
         "the degrees seem to grow exponentially, which they cannot for a member of the commuting family"
     ]
     assert found.conclusion.kind == "undecided"
-    assert contradictions(replace(found, structure=None)) == []
+    assert contradictions(replace(found, normal_form=None)) == []

@@ -10,7 +10,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import RR
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.family.structure import structure_of
+from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.orbits.iteration import Iterates, Orbit
@@ -42,10 +42,10 @@ def test_stepping_is_as_accurate_as_asked_for(steps, digits):
 @pytest.mark.parametrize("digits", [15, 60])
 def test_jumps_are_as_accurate_as_asked_for(at, digits):
     system = NEAR.chosen.system
-    structure = structure_of(system, member=NEAR)
+    normal_form = system_normal_form(system, member=NEAR)
 
     def orbit_with(bits):
-        return Iterates(KahanMap(system, "1/20", RR(bits)), START, at, structure=structure)
+        return Iterates(KahanMap(system, "1/20", RR(bits)), START, at, normal_form=normal_form)
 
     orbit = orbit_with(bits_for(orbit_with, digits))
     assert all(worst(point.x) <= 10.0**-digits for point in orbit)

@@ -4,16 +4,16 @@ import pytest
 from planar_helpers import structure_and_system
 
 from kahanmaps.errors import InputError
-from kahanmaps.family.structure import NoStructure
+from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.orbits.methods import choose_method
 
 SPLIT, _ = structure_and_system("m = 2")
 UNSPLIT, _ = structure_and_system("m = 2, sqrt 2")
-NONE = NoStructure("H is not a homogeneous cubic")
+NONE = NoNormalForm("H is not a homogeneous cubic")
 
 
 @pytest.mark.parametrize(
-    ("wish", "arithmetic", "structure", "at", "expected"),
+    ("wish", "arithmetic", "normal_form", "at", "expected"),
     [
         (None, "exact", NONE, None, "generic"),
         (None, "mod", NONE, (10**9,), "generic"),
@@ -44,14 +44,14 @@ NONE = NoStructure("H is not a homogeneous cubic")
         (None, "exact", SPLIT, (), "normal-form"),
     ],
 )
-def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, structure, at, expected):
-    found = choose_method(wish, arithmetic, structure, at)
+def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, normal_form, at, expected):
+    found = choose_method(wish, arithmetic, normal_form, at)
     assert found.name == expected
     assert found.text == f"method {expected}: {found.reason}"
 
 
 @pytest.mark.parametrize(
-    ("wish", "arithmetic", "structure", "at", "words"),
+    ("wish", "arithmetic", "normal_form", "at", "words"),
     [
         ("fastest", "exact", SPLIT, None, "expected one of generic, normal-form, doubling"),
         ("doubling", "exact", NONE, (3,), "needs a normal form, and there is none: H is not"),
@@ -61,6 +61,6 @@ def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, structure, 
         ("normal-form", "mod", SPLIT, None, "modulo P there are the methods generic and doubling"),
     ],
 )
-def test_what_cannot_be_had_is_refused(wish, arithmetic, structure, at, words):
+def test_what_cannot_be_had_is_refused(wish, arithmetic, normal_form, at, words):
     with pytest.raises(InputError, match=words):
-        choose_method(wish, arithmetic, structure, at)
+        choose_method(wish, arithmetic, normal_form, at)

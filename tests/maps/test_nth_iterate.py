@@ -17,7 +17,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi
-from kahanmaps.family.structure import structure_of
+from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import iterate, rational_iterate, tau_table
 from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
@@ -59,10 +59,10 @@ def reached(found, start, n):
 @pytest.mark.parametrize("prime", quick([3, 5, 7, 11, 101, 10007, 2**61 - 1, 2**89 - 1], [3, 11, 2**61 - 1]))
 @over_members
 def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     field, rng, eps = GF(prime), random.Random(prime), "3/13"
     try:
-        found = NthIterate(structure, eps, field)
+        found = NthIterate(normal_form, eps, field)
     except BadPrime:
         assert prime in (3, 5)  # of S or T
         return
@@ -80,9 +80,9 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
 @pytest.mark.parametrize("prime", quick([5, 7, 31, 10007, 2**61 - 1, 2**89 - 1], [5, 2**89 - 1]))
 @pytest.mark.parametrize("name", ["m = 2", "m = 3, another J", "m = 2, sqrt 2", "m = 3, a cubic field"])
 def test_modulo_a_prime_huge_iterates_compose(name, prime):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     try:
-        found = NthIterate(structure, "3/13", GF(prime))
+        found = NthIterate(normal_form, "3/13", GF(prime))
     except BadPrime:
         assert prime == 5
         return
@@ -104,10 +104,10 @@ def test_modulo_a_prime_huge_iterates_compose(name, prime):
 
 @over_members
 def test_over_q_it_is_the_point_of_the_orbit(name):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     start = random_point(system.dim, 6, height=3)
     points, _ = walked(system, "1/10", QQ, start, 27)
-    found = NthIterate(structure, "1/10", QQ)
+    found = NthIterate(normal_form, "1/10", QQ)
     for n in (0, 1, 7, 16, 17, 24, 25, 27):
         assert coordinates(found.value(start, n)) == points[n]
 
@@ -125,11 +125,11 @@ def poles():
 def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
     cubic, start = STARTS[name]
     U, V, W = before(cubic, start, more)
-    system, structure, (_, u, _, v) = side_by_side(name, "a double root")
+    system, normal_form, (_, u, _, v) = side_by_side(name, "a double root")
     start = (fmpq(U, W), u, fmpq(V, W), v)
     points, end = walked(system, "1/2", QQ, start, 60)
     assert (end.status, end.steps) == ("singular", last)
-    found = NthIterate(structure, "1/2", QQ)
+    found = NthIterate(normal_form, "1/2", QQ)
     for n in (last + 1, last + 2, last + 3, 57):
         with pytest.raises(SingularStep, match=f"no value at step {last}$"):
             found.value(start, n)
@@ -141,8 +141,8 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
 def test_the_pole_of_an_orbit_of_planes_is_where_it_is(more):
     name = "a pole at step 2"
     U, V, W = before(*STARTS[name], more)
-    _, structure, (_, u, _, v) = side_by_side(name, "a double root")
-    planes = rational_iterate.RationalOrbit(structure, fmpq(1, 2), (fmpq(U, W), u, fmpq(V, W), v), None)._planes
+    _, normal_form, (_, u, _, v) = side_by_side(name, "a double root")
+    planes = rational_iterate.RationalOrbit(normal_form, fmpq(1, 2), (fmpq(U, W), u, fmpq(V, W), v), None)._planes
     pole = more + 2
     with pytest.raises(SingularStep, match=f"no value at step {pole - 1}$"):
         planes.point(pole)
@@ -155,10 +155,10 @@ def test_the_pole_of_an_orbit_of_planes_is_where_it_is(more):
 
 @over_members
 def test_balls_enclose_the_exact_iterate(name):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     # Large numbers, so that the sixteen steps before the doublings already cost some hundred bits.
     start, field = random_point(system.dim, 6, height=3), RR(2000)
-    exact, found = NthIterate(structure, "1/10", QQ), NthIterate(structure, "1/10", field)
+    exact, found = NthIterate(normal_form, "1/10", QQ), NthIterate(normal_form, "1/10", field)
     for n in (0, 1, 10, 24, 30):
         try:
             balls = found.value(start, n)
@@ -171,9 +171,9 @@ def test_balls_enclose_the_exact_iterate(name):
 
 
 def test_balls_too_wide_to_decide_say_so():
-    structure, system = structure_and_system("m = 2")
+    normal_form, system = structure_and_system("m = 2")
     with pytest.raises(PrecisionLost):
-        NthIterate(structure, "1/10", RR(10)).value(random_point(system.dim, 1), 10**12)
+        NthIterate(normal_form, "1/10", RR(10)).value(random_point(system.dim, 1), 10**12)
 
 
 # What is refused.
@@ -181,15 +181,15 @@ def test_balls_too_wide_to_decide_say_so():
 
 @pytest.mark.parametrize("field", [QQ, GF(101), RR(64)], ids=repr)
 def test_a_negative_number_of_steps_is_refused(field):
-    structure, system = structure_and_system("m = 2")
+    normal_form, system = structure_and_system("m = 2")
     with pytest.raises(InputError, match="found the step -1, expected 0 or more"):
-        NthIterate(structure, "1/10", field).value([1] * system.dim, -1)
+        NthIterate(normal_form, "1/10", field).value([1] * system.dim, -1)
 
 
 @pytest.mark.parametrize("name", ["m = 2", "m = 2, sqrt 2"])
 def test_what_would_be_too_long_is_refused_with_the_first_step_that_is_too_long(name):
-    structure, system = structure_and_system(name)
-    found, start = NthIterate(structure, "1/10", QQ), random_point(system.dim, 6, height=3)
+    normal_form, system = structure_and_system(name)
+    found, start = NthIterate(normal_form, "1/10", QQ), random_point(system.dim, 6, height=3)
     points, _ = walked(system, "1/10", QQ, start, 40)
     bits = [IntegerPoint.from_rationals(point).bits for point in points]
     with pytest.raises(OverBudget) as refused:
@@ -203,11 +203,11 @@ def test_what_would_be_too_long_is_refused_with_the_first_step_that_is_too_long(
 
 def test_a_wrong_doubling_is_noticed(monkeypatch):
     # Every iterate over Q is compared with the orbit modulo a random prime.
-    structure, _ = structure_and_system("m = 2")
+    normal_form, _ = structure_and_system("m = 2")
     iterate = tau_table.iterate
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        NthIterate(structure, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
+        NthIterate(normal_form, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
 
 
 # A rational plane beside one over Q(i).
@@ -222,16 +222,16 @@ def beside_complex_planes(name: str, steps: int):
     H += a * x[0] ** 3 + b * x[0] ** 2 * x[3] + c * x[0] * x[3] ** 2 + d * x[3] ** 3
     hamiltonian = CubicHamiltonian(H, standard_structure(6))
     start = (fmpq(U, W), fmpq(1, 9), fmpq(0), fmpq(V, W), fmpq(0), fmpq(1, 7))
-    return hamiltonian.system, structure_of(hamiltonian.system, hamiltonian), start
+    return hamiltonian.system, system_normal_form(hamiltonian.system, hamiltonian), start
 
 
 @pytest.mark.parametrize("steps", [2, 10, 17, 24])
 def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
-    system, structure, start = beside_complex_planes("a pole at step 2", steps)
+    system, normal_form, start = beside_complex_planes("a pole at step 2", steps)
     last = steps + 1
     points, end = walked(system, "1/2", QQ, start, last + 2)
     assert (end.status, end.steps) == ("singular", last)
-    found = NthIterate(structure, "1/2", QQ)
+    found = NthIterate(normal_form, "1/2", QQ)
     assert coordinates(found.value(start, last)) == points[last]
     for n in (last + 1, last + 2, last + 3, last + 4):
         with pytest.raises(SingularStep, match=f"step {last}$"):
@@ -241,7 +241,7 @@ def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
 @pytest.mark.parametrize("name", STARTS)
 def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
     """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
-    _, structure, start = side_by_side(name)
+    _, normal_form, start = side_by_side(name)
     kinds = {
         "h = 0": "at rest",
         "the origin": "at rest",
@@ -252,7 +252,7 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
         "a triple root": "on a singular level",
     }
     expected = next((f"the start is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
-    assert special_start(structure, fmpq(1, 2), start) == expected
+    assert special_start(normal_form, fmpq(1, 2), start) == expected
 
 
 @pytest.mark.parametrize(("block", "start", "period"), [((0, 0, 0, 1), (0, 1, 1), 5)])
@@ -274,23 +274,23 @@ def test_around_a_cycle_only_the_rest_of_the_steps_is_walked(block, start, perio
 
 
 def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
-    structure, _ = structure_and_system("m = 2")
+    normal_form, _ = structure_and_system("m = 2")
     start = [1, 2, 3, fmpq(1, 4)]
-    wanted = coordinates(NthIterate(structure, "1/10", QQ).value(start, 30))
+    wanted = coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30))
     steps_modulo, random_prime = rational_iterate._steps_modulo, rational_iterate._random_prime
     drawn = [1000003, 1000033, 1000037]  # with a pole at step 2, as if these divided W there
     monkeypatch.setattr(rational_iterate, "_random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
     monkeypatch.setattr(
         rational_iterate, "_steps_modulo", lambda *at: (2, (1, 1, 0)) if at[2] < 2**20 else steps_modulo(*at)
     )
-    assert coordinates(NthIterate(structure, "1/10", QQ).value(start, 30)) == wanted
+    assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == wanted
     assert drawn == []
 
 
 def test_modulo_a_prime_an_iterate_without_a_value_is_named():
-    structure, system = structure_and_system("m = 2")
+    normal_form, system = structure_and_system("m = 2")
     field, rng, told = GF(31), random.Random(4), set()
-    found = NthIterate(structure, "3/13", field)
+    found = NthIterate(normal_form, "3/13", field)
     for _ in range(40):
         start = tuple(map(field.convert, [rng.randrange(31) for _ in range(system.dim)]))
         points, end = walked(system, "3/13", field, start, 40)

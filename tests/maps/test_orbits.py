@@ -225,11 +225,11 @@ def test_an_interrupted_orbit_ends_after_the_point_in_hand(field):
 # In normal form.
 
 
-def both(system, structure, eps, start, steps, field=QQ, **options):
+def both(system, normal_form, eps, start, steps, field=QQ, **options):
     """Points and end of an orbit walked without and with a structure."""
     answers = []
-    for known in (None, structure):
-        orbit = Orbit(KahanMap(system, eps, field), start, steps, structure=known, **options)
+    for known in (None, normal_form):
+        orbit = Orbit(KahanMap(system, eps, field), start, steps, normal_form=known, **options)
         answers.append(([point.text for point in orbit], orbit.end))
     return answers
 
@@ -237,8 +237,8 @@ def both(system, structure, eps, start, steps, field=QQ, **options):
 @over_members
 @pytest.mark.parametrize("backward", [False, True], ids=["forward", "backward"])
 def test_with_a_structure_the_points_and_the_end_are_the_same(name, backward):
-    structure, system = structure_and_system(name)
-    plain, fast = both(system, structure, "1/10", random_point(system.dim, 3), 9, backward=backward)
+    normal_form, system = structure_and_system(name)
+    plain, fast = both(system, normal_form, "1/10", random_point(system.dim, 3), 9, backward=backward)
     assert fast == plain
 
 
@@ -257,8 +257,8 @@ ENDS = [
 
 @pytest.mark.parametrize(("names", "status"), ENDS, ids=str)
 def test_with_a_structure_every_end_is_the_same(names, status):
-    system, structure, start = side_by_side(*names)
-    (plain, end), (fast, fast_end) = both(system, structure, fmpq(1, 2), start, 10)
+    system, normal_form, start = side_by_side(*names)
+    (plain, end), (fast, fast_end) = both(system, normal_form, fmpq(1, 2), start, 10)
     assert fast_end == end
     assert end.status == status
     assert fast == plain
@@ -266,11 +266,11 @@ def test_with_a_structure_every_end_is_the_same(names, status):
 
 @pytest.mark.parametrize(("name", "backward"), [("m = 2", False), ("m = 2, i", False), ("m = 3, partly split", True)])
 def test_balls_with_a_structure_enclose_the_orbit_and_stay_narrow(name, backward):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     start = tuple(fmpq(k + 1, 7) for k in range(system.dim))
     bits = 500
     phi = KahanMap(system, "1/10", RR(bits))
-    balls = [point.x for point in Orbit(phi, start, 100, structure=structure, backward=backward)]
+    balls = [point.x for point in Orbit(phi, start, 100, normal_form=normal_form, backward=backward)]
     assert len(balls) == 101
     assert min(ball.rel_accuracy_bits() for x in balls[1:] for ball in x) > bits / 2
     for point in Orbit(KahanMap(system, "1/10"), start, 30, backward=backward, max_digits=2000):
@@ -281,8 +281,8 @@ def test_balls_with_a_structure_enclose_the_orbit_and_stay_narrow(name, backward
 
 
 def test_iterates_given_up_within_the_first_jump_end_after_step_0(monkeypatch):
-    structure, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [30, 60], structure=structure)
+    normal_form, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [30, 60], normal_form=normal_form)
 
     def points():
         iterates._busy_in = get_ident()
@@ -297,24 +297,25 @@ def test_iterates_given_up_within_the_first_jump_end_after_step_0(monkeypatch):
 @pytest.mark.parametrize("field", [QQ, GF(2**89 - 1)], ids=repr)
 @pytest.mark.parametrize(("name", "backward"), [("m = 3, another J", True), ("m = 2, sqrt 2", False)])
 def test_iterates_are_points_of_the_orbit(name, field, backward):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     phi, start = KahanMap(system, "1/10", field), random_point(system.dim, 3, height=3)
     points = [point.text for point in Orbit(phi, start, 27, backward=backward)]
-    iterates = Iterates(phi, start, [27, 0, 3, 26, 3], structure=structure, backward=backward)
+    iterates = Iterates(phi, start, [27, 0, 3, 26, 3], normal_form=normal_form, backward=backward)
     assert [(point.step, point.text) for point in iterates] == [(n, points[n]) for n in (0, 3, 26, 27)]
     assert iterates.end == OrbitEnd("completed", 27, "4 iterates reached directly")
 
 
 def test_iterates_stop_at_a_pole_on_the_way_over_q():
-    system, structure, start = side_by_side("a pole at step 3", "level 0")
-    iterates = Iterates(KahanMap(system, "1/2"), start, [0, 2, 30, 40], structure=structure)
+    system, normal_form, start = side_by_side("a pole at step 3", "level 0")
+    iterates = Iterates(KahanMap(system, "1/2"), start, [0, 2, 30, 40], normal_form=normal_form)
     assert [point.step for point in iterates] == [0, 2]
     assert iterates.end == OrbitEnd("singular", 2, "step 30 cannot be reached: the map has no value at step 2")
 
 
 def test_iterates_stop_where_numbers_would_be_too_long():
-    structure, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [5, 10**5, 10**6], structure=structure, max_digits=1000)
+    normal_form, system = structure_and_system("m = 2")
+    start, kahan = [1, 2, 3, 4], KahanMap(system, "1/10")
+    iterates = Iterates(kahan, start, [5, 10**5, 10**6], normal_form=normal_form, max_digits=1000)
     assert [point.step for point in iterates] == [5]
     assert (iterates.end.status, iterates.end.steps) == ("budget", 5)
     assert iterates.end.message.startswith("step 100000 cannot be reached: step ")
@@ -322,15 +323,15 @@ def test_iterates_stop_where_numbers_would_be_too_long():
 
 
 def test_iterates_of_balls_too_wide_say_so():
-    structure, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10", RR(10)), [1, "1/3", 3, "1/7"], [1, 10**12], structure=structure)
+    normal_form, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10", RR(10)), [1, "1/3", 3, "1/7"], [1, 10**12], normal_form=normal_form)
     assert [point.step for point in iterates] == [1]
     assert (iterates.end.status, iterates.end.steps) == ("precision", 1)
 
 
 def test_iterates_are_interrupted_between_two():
-    structure, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10", GF(101)), [1, 2, 3, 4], [1, 2, 3], structure=structure)
+    normal_form, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10", GF(101)), [1, 2, 3, 4], [1, 2, 3], normal_form=normal_form)
     for point in iterates:
         if point.step == 2:
             iterates.interrupt()
@@ -338,14 +339,14 @@ def test_iterates_are_interrupted_between_two():
 
 
 def test_iterates_before_the_start_are_refused():
-    structure, system = structure_and_system("m = 2")
+    normal_form, system = structure_and_system("m = 2")
     with pytest.raises(InputError, match="found -3 steps"):
-        Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [1, -3], structure=structure)
+        Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [1, -3], normal_form=normal_form)
 
 
 def test_an_iterate_in_flight_is_given_up_when_a_signal_asks_for_it():
-    structure, system = structure_and_system("m = 2")
-    orbit = Iterates(KahanMap(system, "1/10"), random_point(4, 3), [5, 3000], structure=structure, max_digits=10**9)
+    normal_form, system = structure_and_system("m = 2")
+    orbit = Iterates(KahanMap(system, "1/10"), random_point(4, 3), [5, 3000], normal_form=normal_form, max_digits=10**9)
     seen = []
 
     def handler(signum, frame):

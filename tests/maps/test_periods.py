@@ -197,11 +197,11 @@ def test_with_the_number_of_points_modulo_small_primes_the_order_of_T_is_the_sam
     [("m = 2", 29), ("m = 2, another J", 31), ("m = 2, i", 31), ("m = 2, i", 29), ("m = 2, sqrt 2", 13)],
 )
 def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pole(name, prime):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     kahan, rng, ends = KahanMap(system, "1/10", GF(prime)), random.Random(4), Counter()
     for _ in range(20):
         start = [rng.randrange(prime) for _ in range(4)]
-        found = period_of(structure, "1/10", start, prime)
+        found = period_of(normal_form, "1/10", start, prime)
         if not isinstance(found.period, int) or found.period > 3000:
             continue
         orbit = Orbit(kahan, start, found.period)
@@ -212,7 +212,7 @@ def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pol
             assert orbit.end.period == found.period == lcm(*(plane.period for plane in found.planes))
         ends[orbit.end.status] += 1
     assert ends["periodic"] > 0
-    assert period_of(structure, "1/10", [1, 2, 3, 4]).status == "aperiodic"
+    assert period_of(normal_form, "1/10", [1, 2, 3, 4]).status == "aperiodic"
 
 
 def test_modulo_2_the_map_is_the_identity_where_there_is_a_normal_form():

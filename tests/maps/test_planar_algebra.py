@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.family.draw import draw_with_chi, parse_chi
-from kahanmaps.family.structure import structure_of
+from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planar_algebra, rational_iterate, tau_table
 from kahanmaps.maps.normal_form.iterate import NthIterate
@@ -57,7 +57,7 @@ def random_block(name: str, seed: int) -> AlgebraBlock:
 
 def member_of(text: str, seed: int = 5):
     member = draw_with_chi(parse_chi(text), seed=seed)
-    return structure_of(member.chosen.system, member=member), member.chosen.system
+    return system_normal_form(member.chosen.system, member=member), member.chosen.system
 
 
 @over_fields
@@ -84,10 +84,11 @@ def test_an_entry_is_as_long_as_the_heights_ask_for(name):
 
 @pytest.mark.parametrize("chi", ["t^2 - 10^400*t + 3", "t^2 - 10^700", "t^7 - t - 1"])
 def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_generic_steps(chi):
-    structure, system = member_of(chi)
+    normal_form, system = member_of(chi)
     start = random_point(system.dim, 1, height=3)
     generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, max_digits=None)]
-    planes = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, structure=structure, max_digits=None)]
+    in_planes = Orbit(KahanMap(system, "1/10"), start, 4, normal_form=normal_form, max_digits=None)
+    planes = [point.value for point in in_planes]
     assert [point.rationals() for point in planes] == [point.rationals() for point in generic]
 
 
@@ -95,10 +96,10 @@ def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_gener
 @few
 @given(seed=st.integers(0, 10**6), eps=st.sampled_from(["1/10", "-7/3", "20957/262577", "1000000000"]))
 def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
-    structure, system = member_of(chi)
+    normal_form, system = member_of(chi)
     start = random_point(system.dim, seed, height=3)
     generic = [point.value for point in Orbit(KahanMap(system, eps), start, 8, max_digits=None)]
-    found = list(islice(NormalSteps(structure, fmpq(eps)).points(start), 9))
+    found = list(islice(NormalSteps(normal_form, fmpq(eps)).points(start), 9))
     assert [point.integer_point() for point in found] == generic
     assert [point.lowest_terms() for point in found] == [point.lowest_terms() for point in generic]
     assert all(point.height <= point.bits + point._assembly.excess for point in found)
@@ -106,43 +107,43 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
 
 @pytest.mark.parametrize("chi", ["t^2 - 10", "(t - 1)*(t^2 - 3)", "(t^2 - 2)*(t^2 + t + 1)"])
 def test_the_nth_iterate_is_the_point_of_the_orbit(chi):
-    structure, system = member_of(chi)
+    normal_form, system = member_of(chi)
     start = random_point(system.dim, 4)
-    points = list(islice(NormalSteps(structure, fmpq(1, 10)).points(start), 121))
+    points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(start), 121))
     for n in (30, 77, 120):
-        found = NthIterate(structure, "1/10", rational_iterate.QQ).value(start, n)
+        found = NthIterate(normal_form, "1/10", rational_iterate.QQ).value(start, n)
         assert found == points[n] != points[n - 1]
         assert hash(found) == hash(points[n])
         assert found.lowest_terms() == points[n].lowest_terms()
 
 
 def test_a_plane_at_rest_stays():
-    structure, system = member_of("(t - 1)*(t^2 - 3)")
-    X, Y = structure.form.coordinates(random_point(system.dim, 1))
+    normal_form, system = member_of("(t - 1)*(t^2 - 3)")
+    X, Y = normal_form.form.coordinates(random_point(system.dim, 1))
     for factor in (fmpq_poly([-1, 1]), fmpq_poly([-3, 0, 1])):
-        chi = structure.form.chi
-        start = structure.form.point(X * factor % chi, Y * factor % chi)
+        chi = normal_form.form.chi
+        start = normal_form.form.point(X * factor % chi, Y * factor % chi)
         generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 8, max_digits=None)]
-        assert [p.integer_point() for p in islice(NormalSteps(structure, fmpq(1, 10)).points(start), 9)] == generic
+        assert [p.integer_point() for p in islice(NormalSteps(normal_form, fmpq(1, 10)).points(start), 9)] == generic
 
 
 def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):
     # That the tests can fail: primes above which two prime ideals divide W are in no list of fixed primes.
-    structure, system = member_of("t^2 - 10")
-    points = list(islice(NormalSteps(structure, fmpq(1, 10)).points(random_point(system.dim, 4)), 60))
+    normal_form, system = member_of("t^2 - 10")
+    points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(random_point(system.dim, 4)), 60))
     expected = [point.lowest_terms() for point in points]
     fraction = AlgebraBlock.fraction
     monkeypatch.setattr(AlgebraBlock, "fraction", lambda self, P: (*fraction(self, P)[:2], fraction(self, P)[1] ** 0))
-    points = list(islice(NormalSteps(structure, fmpq(1, 10)).points(random_point(system.dim, 4)), 60))
+    points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(random_point(system.dim, 4)), 60))
     assert [point.lowest_terms() for point in points] != expected
 
 
 def test_a_wrong_iterate_does_not_pass(monkeypatch):
-    structure, system = member_of("t^2 - 10")
+    normal_form, system = member_of("t^2 - 10")
     iterate = tau_table.iterate
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        NthIterate(structure, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 700)
+        NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 700)
 
 
 @over_fields

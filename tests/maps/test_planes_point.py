@@ -30,46 +30,46 @@ PAIRS = [
 ]
 
 
-def walk(system, structure, eps, start, steps):
+def walk(system, normal_form, eps, start, steps):
     """Pairs of a point made of planes and the point of the Kahan map."""
     phi, x = KahanMap(system, eps), tuple(map(fmpq, start))
-    for point in islice(NormalSteps(structure, fmpq(eps)).points(start), steps + 1):
+    for point in islice(NormalSteps(normal_form, fmpq(eps)).points(start), steps + 1):
         yield point, x
         x = step_or_none(phi, x)
 
 
 def cases():
     for name in ("m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 2, another J", "m = 3, another J"):
-        structure, system = structure_and_system(name)
-        yield pytest.param(system, structure, fmpq(1, 10), random_point(system.dim, 3), id=name)
-        yield pytest.param(system, structure, fmpq(-6, 7), random_point(system.dim, 4), id=f"{name}, eps = -6/7")
+        normal_form, system = structure_and_system(name)
+        yield pytest.param(system, normal_form, fmpq(1, 10), random_point(system.dim, 3), id=name)
+        yield pytest.param(system, normal_form, fmpq(-6, 7), random_point(system.dim, 4), id=f"{name}, eps = -6/7")
     for names in PAIRS:
-        system, structure, start = side_by_side(*names)
-        yield pytest.param(system, structure, fmpq(1, 2), start, id=" | ".join(names))
-    structure, system = structure_and_system("m = 3")
+        system, normal_form, start = side_by_side(*names)
+        yield pytest.param(system, normal_form, fmpq(1, 2), start, id=" | ".join(names))
+    normal_form, system = structure_and_system("m = 3")
     equal = [fmpq(1, 6)] * 6  # all W share their primes
-    yield pytest.param(system, structure, fmpq(1, 2), equal, id="the same denominators")
+    yield pytest.param(system, normal_form, fmpq(1, 2), equal, id="the same denominators")
 
 
-over_cases = pytest.mark.parametrize(("system", "structure", "eps", "start"), list(cases()))
+over_cases = pytest.mark.parametrize(("system", "normal_form", "eps", "start"), list(cases()))
 
 
 @over_cases
-def test_coordinates_are_reduced_with_positive_denominators(system, structure, eps, start):
-    for point, x in walk(system, structure, eps, start, 9):
+def test_coordinates_are_reduced_with_positive_denominators(system, normal_form, eps, start):
+    for point, x in walk(system, normal_form, eps, start, 9):
         assert point.lowest_terms() == [(entry.p, entry.q) for entry in x]
 
 
 @over_cases
-def test_the_integer_point_is_in_lowest_terms(system, structure, eps, start):
-    for point, x in walk(system, structure, eps, start, 6):
+def test_the_integer_point_is_in_lowest_terms(system, normal_form, eps, start):
+    for point, x in walk(system, normal_form, eps, start, 6):
         assert point.integer_point() == IntegerPoint.from_rationals(x)
 
 
 @pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"])
 def test_the_bits_are_about_those_of_the_longest_integer(name):
-    structure, system = structure_and_system(name)
-    *_, (point, x) = walk(system, structure, fmpq(1, 10), random_point(system.dim, 3), 20)
+    normal_form, system = structure_and_system(name)
+    *_, (point, x) = walk(system, normal_form, fmpq(1, 10), random_point(system.dim, 3), 20)
     # some per cent: what the W have in common, and the fixed numbers that x is put together with
     assert 0.93 < point.bits / IntegerPoint.from_rationals(x).bits < 1.05
 
@@ -83,8 +83,8 @@ def negated(point: PlanesPoint, *which: int) -> PlanesPoint:
 
 
 def points(count: int) -> list[PlanesPoint]:
-    structure, _ = structure_and_system("m = 2")
-    return list(islice(NormalSteps(structure, fmpq(1, 10)).points([1, "1/3", 0, -2]), count))
+    normal_form, _ = structure_and_system("m = 2")
+    return list(islice(NormalSteps(normal_form, fmpq(1, 10)).points([1, "1/3", 0, -2]), count))
 
 
 @pytest.mark.parametrize("which", [(0,), (1,), (0, 1)], ids=str)
@@ -116,7 +116,7 @@ def test_a_point_is_not_equal_to_something_else():
 @pytest.mark.parametrize("name", ["one rational root", "three rational roots", "a double root"])
 def test_the_fixed_primes_are_needed(name, monkeypatch):
     # That the tests can fail: without them fractions are not reduced.
-    system, structure, start = side_by_side(name, "one real root, irrational")
+    system, normal_form, start = side_by_side(name, "one real root, irrational")
     monkeypatch.setattr(planes_point, "_common_part", lambda above, below, modulus: fmpz(1))
-    found = [point.lowest_terms() for point, _ in walk(system, structure, fmpq(1, 2), start, 9)]
+    found = [point.lowest_terms() for point, _ in walk(system, normal_form, fmpq(1, 2), start, 9)]
     assert any(gcd(int(above), int(below)) > 1 for pairs in found for above, below in pairs)

@@ -18,8 +18,8 @@ over_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
 
 
 def splitting_of(name, field, eps="1/10"):
-    structure, system = structure_and_system(name)
-    return Splitting(structure.form, field, eps, structure.T), system
+    normal_form, system = structure_and_system(name)
+    return Splitting(normal_form.form, field, eps, normal_form.T), system
 
 
 def same(field, left, right) -> bool:

@@ -13,7 +13,7 @@ from helpers import random_point
 from planar_helpers import STARTS, over_members, planar_system, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.orbits.iteration import Iterates, Orbit, OrbitEnd
@@ -25,9 +25,9 @@ EPS = ("1/2", "1", "1/3", "-1/2")
 FAR = 10**12
 
 
-def found_structure(system) -> Structure:
-    found = structure_of(system)
-    assert isinstance(found, Structure)
+def found_structure(system) -> SystemNormalForm:
+    found = system_normal_form(system)
+    assert isinstance(found, SystemNormalForm)
     return found
 
 
@@ -37,12 +37,12 @@ def ended(orbit) -> OrbitEnd:
     return orbit.end
 
 
-def event(system, structure, eps, start, steps, digits):
+def event(system, normal_form, eps, start, steps, digits):
     """What comes first, with the step before it; by three ways, which have to agree."""
     kahan = KahanMap(system, eps)
-    walks = [ended(Orbit(kahan, start, steps, structure=known, max_digits=digits)) for known in (None, structure)]
+    walks = [ended(Orbit(kahan, start, steps, normal_form=known, max_digits=digits)) for known in (None, normal_form)]
     assert walks[0] == walks[-1]
-    far = ended(Iterates(kahan, start, [steps], structure=structure, max_digits=digits))
+    far = ended(Iterates(kahan, start, [steps], normal_form=normal_form, max_digits=digits))
     walk = walks[0]
     if walk.is_whole:
         assert (far.status, far.steps) == ("completed", steps)
@@ -58,12 +58,12 @@ def event(system, structure, eps, start, steps, digits):
 def seen_from(cubic, eps, sixths, runs):
     """The events of starts with coordinates in sixths, and that far steps end so, too."""
     system = planar_system(cubic)
-    structure, seen = found_structure(system), []
+    normal_form, seen = found_structure(system), []
     for u, v in product([fmpq(i, 6) for i in sixths], repeat=2):
         for steps, digits in runs:
-            walk = event(system, structure, eps, [u, v], steps, digits)
+            walk = event(system, normal_form, eps, [u, v], steps, digits)
             seen.append(walk.status)
-            far = ended(Iterates(KahanMap(system, eps), [u, v], [FAR], structure=structure, max_digits=digits))
+            far = ended(Iterates(KahanMap(system, eps), [u, v], [FAR], normal_form=normal_form, max_digits=digits))
             if not walk.is_whole:
                 assert far.status == walk.status
     return seen
@@ -84,39 +84,39 @@ def test_many_small_starts_end_alike_by_steps_and_by_jumps(cubic, eps):
 
 def test_a_pole_comes_before_a_budget_that_is_exceeded_far_behind_it():
     system = QuadraticSystem.from_text(["u", "v"], ["6*u*v-12*v^2", "-3*u^2-3*v^2"])
-    structure, kahan = found_structure(system), KahanMap(system, "1/2")
+    normal_form, kahan = found_structure(system), KahanMap(system, "1/2")
     for n in (100, 1_000_002, 10**26):
-        end = ended(Iterates(kahan, ["-1/3", 0], [n], structure=structure))
+        end = ended(Iterates(kahan, ["-1/3", 0], [n], normal_form=normal_form))
         assert end == OrbitEnd("singular", 0, f"step {n} cannot be reached: the map has no value at step 1")
 
 
 @over_members
 def test_members_end_alike_by_steps_and_by_jumps(name):
-    structure, system = structure_and_system(name)
+    normal_form, system = structure_and_system(name)
     for seed, eps in enumerate(EPS[:2]):
-        event(system, structure, eps, random_point(system.dim, seed, height=2), 30, 40)
+        event(system, normal_form, eps, random_point(system.dim, seed, height=2), 30, 40)
 
 
 @pytest.mark.parametrize("names", [("level 0", "a triple root"), ("a double root", "a triple root, level 0")])
 def test_numbers_that_stay_short_are_delivered_however_far_the_step_is(names):
-    system, structure, start = side_by_side(*names)
+    system, normal_form, start = side_by_side(*names)
     n, field = 10**26, GF(2**61 - 1)
-    value = NthIterate(structure, "1/2", KahanMap(system, "1/2").field).value(start, n, 10**5)
-    expected = NthIterate(structure, "1/2", field).value(start, n)
+    value = NthIterate(normal_form, "1/2", KahanMap(system, "1/2").field).value(start, n, 10**5)
+    expected = NthIterate(normal_form, "1/2", field).value(start, n)
     assert tuple(map(field.convert, value.rationals())) == tuple(expected)
     assert value.height < 2000
 
 
 def test_a_plane_over_its_budget_comes_before_a_pole_far_behind_in_another():
     # h = u^2 v at v = 0: u is multiplied by r/(r - n), with r = 1/u for 2 eps = 1 a pole at step r.
-    system, structure, (_, u, _, v) = side_by_side("a double root, level 0", "three rational roots")
+    system, normal_form, (_, u, _, v) = side_by_side("a double root, level 0", "three rational roots")
     (a, b, c, d) = STARTS["a double root, level 0"][0]
     direction = next((x, y) for x, y in ((3, 1), (1, 0)) if a * x**3 + b * x * x * y + c * x * y * y + d * y**3 == 0)
     single = planar_system((a, b, c, d))
     for sign, far in product((1, -1), (40, 1000)):
         point = [fmpq(sign * x, far * direction[1] ** 2) for x in direction]
         alone = ended(Orbit(KahanMap(single, "1/2"), point, 2000, max_digits=50))
-        both = ended(Iterates(KahanMap(system, "1/2"), [point[0], u, point[1], v], [FAR], structure=structure))
-        walk = ended(Orbit(KahanMap(system, "1/2"), [point[0], u, point[1], v], 60, structure=structure))
+        both = ended(Iterates(KahanMap(system, "1/2"), [point[0], u, point[1], v], [FAR], normal_form=normal_form))
+        walk = ended(Orbit(KahanMap(system, "1/2"), [point[0], u, point[1], v], 60, normal_form=normal_form))
         assert both.status == ("singular" if alone.status == "singular" and alone.steps < 60 else "budget")
         assert walk.status == ("singular" if both.status == "singular" else "completed")

@@ -11,7 +11,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.family.structure import structure_of
+from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.drifts.draw_drift import clipped_from, draw_drift
@@ -121,7 +121,7 @@ def test_the_methods_conserve_different_things():
 
 def test_normal_form_and_elimination_are_both_drawn():
     file = load("paper_m2")
-    form = structure_of(file.system, file.hamiltonian, file.member).form
+    form = system_normal_form(file.system, file.hamiltonian, file.member).form
     found = survey(file, ["1/50", "1/70", "-1/90", "1/80"], 200, [("", "I1")], ("generic", "normal-form"), form=form)
     assert [curve.method for curve in found.curves] == ["generic", "normal-form"]
     assert all(curve.errors.max() < 1e-10 for curve in found.curves)

@@ -11,7 +11,7 @@ from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Arithmetic, Whole
-from kahanmaps_cli.runs.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, structure_for
+from kahanmaps_cli.runs.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, normal_form_for
 from kahanmaps_cli.runs.ensemble_starts import asked_starts
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, say
@@ -75,12 +75,12 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         number, lib.GF(prime) if kind == "mod" else lib.QQ
     )  # the demands on eps and the prime, in the words of orbit
     starts = asked_starts(file, options, prime if kind == "mod" else None)
-    structure = structure_for(file, options["method"])
-    form = None if isinstance(structure, lib.NoStructure) else structure.form
+    normal_form = normal_form_for(file, options["method"])
+    form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
     made = ModularRun if kind == "mod" else FloatRun
     run: Run = made(Asked(file, number, starts, form, integrals, options))
     if verbose and not quiet:
-        why = structure.reason if isinstance(structure, lib.NoStructure) else structure.text
+        why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
     steps, output = options["steps"], options["output"]
     try:

@@ -78,7 +78,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
     A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
     """
-    file, member, hidden = _member_or_hidden(opt.load_system(system, options))
+    file, member, recognised = _member_or_recognised(opt.load_system(system, options))
     data: dict[str, Any] = {
         **envelope("family show"),
         "system": file.name,
@@ -93,9 +93,9 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         "signs": list(member.signs),
         "hamiltonians": [lib.format_polynomial(H) for H in member.chain],
     }
-    if hidden is not None:
+    if recognised is not None:
         data["found"] = lib.attributes(
-            hidden, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard"
+            recognised, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard"
         )
     form = lib.normal_form(member) if normal_form else None
     if form is not None:
@@ -104,12 +104,12 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         print_json(data)
         return
     tell(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
-    if hidden is not None:
-        tell(f"found, not declared: {hidden.text}")
+    if recognised is not None:
+        tell(f"found, not declared: {recognised.text}")
     tell(data["diagnosis"])
-    if hidden is not None and not hidden.is_standard:
+    if recognised is not None and not recognised.is_standard:
         tell("x = T y, T =")
-        _print_matrix(hidden.T)
+        _print_matrix(recognised.T)
     tell("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
@@ -117,7 +117,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     if any(sign < 0 for sign in member.signs):
         tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}")
     if form is not None:
-        _print_normal_form(form, "x" if hidden is None or hidden.is_standard else "y")
+        _print_normal_form(form, "x" if recognised is None or recognised.is_standard else "y")
 
 
 @command.command("space")
@@ -315,18 +315,18 @@ def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tup
     return file, file.member
 
 
-def _member_or_hidden(file: lib.SystemFile) -> tuple[lib.SystemFile, lib.FamilyMember, lib.RecognisedMember | None]:
+def _member_or_recognised(file: lib.SystemFile) -> tuple[lib.SystemFile, lib.FamilyMember, lib.RecognisedMember | None]:
     """The member that a system is declared to be, or is found to be."""
     if file.member is not None:
         return file, file.member, None
     hamiltonian = file.hamiltonian or lib.recognised_hamiltonian(file.system)
-    hidden = None if hamiltonian is None else lib.recognised_member(hamiltonian)
-    if hidden is None:
+    recognised = None if hamiltonian is None else lib.recognised_member(hamiltonian)
+    if recognised is None:
         raise lib.InputError(
             f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all the "
             f"same was looked for and not found: {lib.reason_against(hamiltonian)}"
         )
-    return file, hidden.member, hidden
+    return file, recognised.member, recognised
 
 
 def _write(file: lib.SystemFile, output: str | None) -> None:

@@ -87,7 +87,7 @@ def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: 
         file.map,
         eps,
         starts=options["given"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
-        structure=file.structure,
+        normal_form=file.normal_form,
         **opt.given(options, "steps", "max_digits", "seconds", "seed"),
         progress=progress,
     )

@@ -62,23 +62,23 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
     file = load_system(system, options)
     if not file.is_quadratic:
-        raise lib.InputError(f"no period of {file.name} can be computed: {_structure(file)}. {_WALK}")
+        raise lib.InputError(f"no period of {file.name} can be computed: {_normal_form(file)}. {_WALK}")
     eps = the_eps(options["eps"], options["time_step"])
     _require_point(file, eps, options["start"], kind, prime)
-    structure = _structure(file)
-    if isinstance(structure, str):
+    normal_form = _normal_form(file)
+    if isinstance(normal_form, str):
         raise lib.InputError(
-            f"no period of {file.name} can be computed: {structure}. Looked for a matrix A that makes it a member of "
+            f"no period of {file.name} can be computed: {normal_form}. Looked for a matrix A that makes it a member of "
             f"the commuting family with distinct roots of chi, and so a translation. {_WALK}"
         )
     if not quiet:
         if verbose:
-            say(structure.text)
+            say(normal_form.text)
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
             say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
-    found = lib.period_of(structure, eps, options["start"], prime if kind == "mod" else None)
+    found = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     if as_json:
-        print_json(_record(file, structure, eps, options, found))
+        print_json(_record(file, normal_form, eps, options, found))
     else:
         _print(file, eps, _arithmetic(options), found)
     status = _STATUS.get(found.status, 3)
@@ -99,9 +99,9 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     }
     if system is not None or options["rhs"]:
         file = load_system(system, options)
-        structure = _structure(file) if file.is_quadratic else "it is no Kahan map"
-        if isinstance(structure, str):
-            raise lib.InputError(f"no levels of {file.name} can be computed: {structure}")
+        normal_form = _normal_form(file) if file.is_quadratic else "it is no Kahan map"
+        if isinstance(normal_form, str):
+            raise lib.InputError(f"no levels of {file.name} can be computed: {normal_form}")
         eps = the_eps(options["eps"], options["time_step"])
         data |= {
             "system": file.name,
@@ -109,7 +109,7 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
             "time_step": lib.format_number(2 * eps),
             "planes": [],
         }
-        for part in structure.form.parts:
+        for part in normal_form.form.parts:
             disc = lib.PlanarBlock(*(part.h[3 - k, k] for k in range(4))).discriminant
             squares = levels.squares(disc, eps) if disc != 0 else ()
             plane = {
@@ -145,10 +145,10 @@ def _require_point(file: lib.SystemFile, eps: Any, start: Any, kind: str, prime:
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(start)
 
 
-def _structure(file: lib.SystemFile) -> lib.Structure | str:
+def _normal_form(file: lib.SystemFile) -> lib.SystemNormalForm | str:
     """The normal form, or why there is none."""
-    structure = file.structure
-    return structure.reason if isinstance(structure, lib.NoStructure) else structure
+    normal_form = file.normal_form
+    return normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form
 
 
 def _message(found: lib.OrbitPeriod) -> str:
@@ -165,7 +165,7 @@ def _text(number: int | None) -> str | None:
 
 
 def _record(
-    file: lib.SystemFile, structure: lib.Structure, eps: Any, options: dict[str, Any], found: lib.OrbitPeriod
+    file: lib.SystemFile, normal_form: lib.SystemNormalForm, eps: Any, options: dict[str, Any], found: lib.OrbitPeriod
 ) -> dict[str, Any]:
     """Numbers are text: periods exceed what readers of JSON hold exactly."""
     return record_of(
@@ -173,7 +173,7 @@ def _record(
         file,
         _arithmetic(options),
         seed=None,
-        structure=structure.text,
+        structure=normal_form.text,
         eps=str(eps),
         time_step=str(2 * eps),
         start=lib.plain(options["start"]),

@@ -94,12 +94,12 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
 
 def _form(file: lib.SystemFile) -> tuple[lib.NormalForm | None, str]:
     """The normal form that machine numbers can step in, or why there is none."""
-    structure = file.structure
-    if isinstance(structure, lib.NoStructure):
-        return None, structure.reason
-    if structure.T is not None:
+    normal_form = file.normal_form
+    if isinstance(normal_form, lib.NoNormalForm):
+        return None, normal_form.reason
+    if normal_form.T is not None:
         return None, "in machine numbers only J = [[0, I], [-I, 0]] has one"
-    return structure.form, ""
+    return normal_form.form, ""
 
 
 def _functions(file: lib.SystemFile, eps: Any, options: dict[str, Any], talk: list[str]) -> list[lib.WatchedFunction]:

@@ -59,7 +59,7 @@ class Orbits:
     ) -> Orbits:
         """Orbits that are to be walked, from `starts` or where those are None from chosen ones."""
 
-        from kahanmaps_cli.runs.ensemble_run import structure_for
+        from kahanmaps_cli.runs.ensemble_run import normal_form_for
 
         chosen = starts is None
         if chosen:
@@ -73,8 +73,8 @@ class Orbits:
                     "chosen around the fixed points of a vector field only"
                 )
             starts = lib.automatic_starts(field, eps, plane, backward=backward)
-        structure = structure_for(file, None)
-        form = None if isinstance(structure, lib.NoStructure) else structure.form
+        normal_form = normal_form_for(file, None)
+        form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
         ensemble = lib.ensemble_for(
             file.map, lib.fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form
         )

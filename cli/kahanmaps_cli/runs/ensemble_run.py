@@ -21,16 +21,16 @@ _PIECE = 0.1  # seconds between looks at Ctrl-C
 Told = Callable[[int], None]
 
 
-def structure_for(file: lib.SystemFile, wish: str | None) -> lib.Structure | lib.NoStructure:
+def normal_form_for(file: lib.SystemFile, wish: str | None) -> lib.SystemNormalForm | lib.NoNormalForm:
     """The normal form that steps are made in, or why there is none."""
     if wish == "generic":
-        return lib.NoStructure("generic, as asked for")
-    structure = file.structure
-    if not isinstance(structure, lib.NoStructure) and structure.T is not None:
-        structure = lib.NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
-    if isinstance(structure, lib.NoStructure) and wish == "normal-form":
-        raise InputError(f"the method normal-form needs a normal form, and there is none: {structure.reason}")
-    return structure
+        return lib.NoNormalForm("generic, as asked for")
+    normal_form = file.normal_form
+    if not isinstance(normal_form, lib.NoNormalForm) and normal_form.T is not None:
+        normal_form = lib.NoNormalForm("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
+    if isinstance(normal_form, lib.NoNormalForm) and wish == "normal-form":
+        raise InputError(f"the method normal-form needs a normal form, and there is none: {normal_form.reason}")
+    return normal_form
 
 
 class Asked(NamedTuple):

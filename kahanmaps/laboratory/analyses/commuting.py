@@ -6,7 +6,7 @@ from typing import Any
 
 from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
@@ -26,9 +26,9 @@ def commuting(run: Run, **budget: Any) -> CommutingSystems | None:
 def statements(found: Findings) -> list[Statement]:
     """The g that commute, with g there is -g."""
     lines = []
-    if isinstance(found.structure, Structure) and (m := found.structure.form.m) > 1:
+    if isinstance(found.normal_form, SystemNormalForm) and (m := found.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
-        split = all(factor.degree == 1 for factor in factors_of_chi(found.structure.form.A))
+        split = all(factor.degree == 1 for factor in factors_of_chi(found.normal_form.form.A))
         lines.append(Statement(Known.PROVED, text if split else f"{text} over the splitting field of chi"))
     search = found.commuting
     if search is None:

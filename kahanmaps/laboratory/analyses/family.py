@@ -9,7 +9,7 @@ from flint import fmpq_mat
 
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.family.tensor import TensorStructure, tensor_structure
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
@@ -27,28 +27,28 @@ def hamiltonian(run: Run, **_: Any) -> ConstantStructures | None:
     return constant_structures(run.field, seed=run.seed) if run.dim <= MAX_DIMENSION else None
 
 
-def family(run: Run, **_: Any) -> Structure | NoStructure:
+def family(run: Run, **_: Any) -> SystemNormalForm | NoNormalForm:
     """The normal form of a member of the commuting family, in coordinates with the centre as origin."""
     known = run.found.hamiltonian
     if known is None or known.hamiltonian is None:
-        return structure_of(run.field)
+        return system_normal_form(run.field)
     moved = known.hamiltonian if known.hamiltonian.centre is None else known.hamiltonian.about(known.hamiltonian.centre)
-    return structure_of(moved.system, moved)
+    return system_normal_form(moved.system, moved)
 
 
 def algebra(run: Run, **_: Any) -> TensorStructure | None:
     """The algebra larger than Q over which it is a system; of a member of the family its normal form says more."""
-    return None if isinstance(run.found.structure, Structure) else tensor_structure(run.field)
+    return None if isinstance(run.found.normal_form, SystemNormalForm) else tensor_structure(run.field)
 
 
 def family_json(found: Findings) -> dict[str, Any]:
     """What a member of the family is one by, and what follows: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
     member = None
-    if isinstance(found.structure, Structure):
-        form = found.structure.form
+    if isinstance(found.normal_form, SystemNormalForm):
+        form = found.normal_form.form
         member = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
-        member |= {**attributes(found.structure, "A", "T"), **attributes(found, "centre")}
-    return {"family": (found.structure.text or None) if found.structure is not None else None, "member": member}
+        member |= {**attributes(found.normal_form, "A", "T"), **attributes(found, "centre")}
+    return {"family": (found.normal_form.text or None) if found.normal_form is not None else None, "member": member}
 
 
 def algebra_json(found: Findings) -> dict[str, Any]:
@@ -73,14 +73,14 @@ def statements(found: Findings) -> list[Statement]:
         kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
         are = f"the {kind} {planes[0]} is" if len(planes) == 1 else f"the {kind}s {_enumerated(planes)} are"
         lines.append(Statement(Known.PROVED, f"{are} invariant, for flow and map"))
-    if found.structure is not None and found.structure.text:
-        text = f"belongs to the commuting family: {found.structure.text}{_coordinates(found, found.structure.T)}"
+    if found.normal_form is not None and found.normal_form.text:
+        text = f"belongs to the commuting family: {found.normal_form.text}{_coordinates(found, found.normal_form.T)}"
         lines.append(Statement(Known.PROVED, text))
     if found.tensor is not None:
         text = "the map is that over K, and inherits what it has (docs/beyond.md)"
         lines.append(Statement(Known.PROVED, f"{found.tensor.text}: {text}"))
-    if isinstance(found.structure, Structure):
-        form = found.structure.form
+    if isinstance(found.normal_form, SystemNormalForm):
+        form = found.normal_form.form
         lines.append(
             Statement(
                 Known.PROVED,

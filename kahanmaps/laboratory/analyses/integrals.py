@@ -7,7 +7,7 @@ from typing import Any
 
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
@@ -64,8 +64,8 @@ def relations_json(found: Findings) -> dict[str, Any]:
 def statements(found: Findings) -> list[Statement]:
     """Formulas, what is measured along orbits, relations there, and the curves of a planar integral."""
     search, family = found.integrals, []
-    if isinstance(found.structure, Structure):
-        number = counted(found.structure.form.m, "independent integral")
+    if isinstance(found.normal_form, SystemNormalForm):
+        number = counted(found.normal_form.form.m, "independent integral")
         family = [Statement(Known.PROVED, f"{number}, as a member of the commuting family")]
     if search is None:
         return [*family, *_curve_lines(found)]

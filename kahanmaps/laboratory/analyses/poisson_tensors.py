@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
@@ -23,8 +23,8 @@ def poisson(run: Run, **budget: Any) -> PoissonSearch | None:
 def statements(found: Findings) -> list[Statement]:
     """The tensor of a member of the family, and those found."""
     search, lines = found.poisson, []
-    if isinstance(found.structure, Structure) and found.structure.form.m > 1:
-        text = f"with {found.structure.form.m} integrals in involution, as a member of the commuting family"
+    if isinstance(found.normal_form, SystemNormalForm) and found.normal_form.form.m > 1:
+        text = f"with {found.normal_form.form.m} integrals in involution, as a member of the commuting family"
         lines.append(Statement(Known.PROVED, f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, {text}"))
     if search is None:
         return lines

@@ -30,7 +30,7 @@ ANALYSES = (
         family.family,
         "structure",
         family.statements,
-        result="structure",
+        result="normal_form",
         reads=("Hamiltonian structure", "a larger algebra"),
         json=family.family_json,
     ),

@@ -22,7 +22,7 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_point
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
-from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, height_growth
 from kahanmaps.maps.implicit import BirationalMap
@@ -132,7 +132,7 @@ def height_survey(
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
     seconds: float = DEFAULT_SECONDS,
-    structure: Structure | NoStructure | None = None,
+    normal_form: SystemNormalForm | NoNormalForm | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> HeightSurvey:
@@ -171,7 +171,7 @@ def height_survey(
             progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
             for candidate in islice(draws, _DRAWS) if start is None else (start,):
                 found = height_growth(
-                    over, candidate, steps, structure=structure, max_digits=max_digits, deadline=deadline
+                    over, candidate, steps, normal_form=normal_form, max_digits=max_digits, deadline=deadline
                 )
                 if found.end.status != "singular" or time.monotonic() > deadline:
                     break

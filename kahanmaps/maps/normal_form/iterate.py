@@ -14,7 +14,7 @@ from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 
 if TYPE_CHECKING:
-    from kahanmaps.family.structure import Structure
+    from kahanmaps.family.system_normal_form import SystemNormalForm
     from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
     from kahanmaps.maps.normal_form.rational_iterate import RationalOrbit
@@ -23,26 +23,26 @@ _CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is wa
 
 
 class NthIterate:
-    """Iterates of Phi(., eps) over QQ, GF(p) or real balls for a structure; the time step is 2 eps.
+    """Iterates of Phi(., eps) over QQ, GF(p) or real balls in a normal form; the time step is 2 eps.
 
-    Raises BadPrime where the structure has no reduction modulo p.
+    Raises BadPrime where the normal form has no reduction modulo p.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> from kahanmaps.family.structure import structure_of
-    >>> structure = structure_of(draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system)
-    >>> NthIterate(structure, "1/10", GF(10**9 + 7)).value([1, 2, 3, 4, 5, 6], 10**30)[0]
+    >>> from kahanmaps.family.system_normal_form import system_normal_form
+    >>> normal_form = system_normal_form(draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system)
+    >>> NthIterate(normal_form, "1/10", GF(10**9 + 7)).value([1, 2, 3, 4, 5, 6], 10**30)[0]
     946728668
     """
 
-    def __init__(self, structure: Structure, eps: Any, field: Field) -> None:
-        self.structure, self.field = structure, field
+    def __init__(self, normal_form: SystemNormalForm, eps: Any, field: Field) -> None:
+        self.normal_form, self.field = normal_form, field
         self.eps = field.convert(eps)
         if field.characteristic == 2:
             raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): take another prime", 2)
         from kahanmaps.maps.normal_form.splitting import Splitting
 
-        self.splitting = Splitting(structure.form, field, self.eps, structure.T)
+        self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
         self._rational: tuple[Any, RationalOrbit] | None = None  # the last one, with what it is of
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
@@ -59,7 +59,7 @@ class NthIterate:
 
             key = (tuple(start), max_bits)
             if self._rational is None or self._rational[0] != key:
-                self._rational = key, RationalOrbit(self.structure, self.eps, start, max_bits)
+                self._rational = key, RationalOrbit(self.normal_form, self.eps, start, max_bits)
             return self._rational[1].value(n)
         with self.field.working():
             x = [self.field.convert(entry) for entry in start]
@@ -102,14 +102,14 @@ def _around_cycle(block: PlanarBlock, start: Triple, n: int) -> Triple:
     return point
 
 
-def special_start(structure: Structure, eps: Any, start: Sequence[Any]) -> str:
+def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:
     """Empty, or why the orbit of a rational start is special in a plane, which balls cannot decide.
 
     Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
     """
     from kahanmaps.maps.normal_form.splitting import Splitting
 
-    splitting = Splitting(structure.form, QQ, eps, structure.T)
+    splitting = Splitting(normal_form.form, QQ, eps, normal_form.T)
     for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
         above, below = plane.block.level((U, V, W))
         if plane.block.is_zero or (U == 0 and V == 0):

@@ -35,7 +35,7 @@ from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.splitting import Plane, Splitting
@@ -325,26 +325,26 @@ def _by_walking(block: PlanarBlock, point: Triple, q: int, name: str) -> PlanePe
 # Over the rationals.
 
 
-def period_of(structure: Structure, eps: Any, start: Sequence[Any], prime: int | None = None) -> OrbitPeriod:
+def period_of(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], prime: int | None = None) -> OrbitPeriod:
     """The period of the orbit of `start`, in the system's own coordinates, modulo a prime or (None) over Q.
 
-    `structure` is that of the system (family.structure.structure_of); otherwise like `orbit_period` and
+    `normal_form` is that of the system (family.system_normal_form); otherwise like `orbit_period` and
     `period_over_rationals`.
 
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> from kahanmaps.family.structure import structure_of
-    >>> structure = structure_of(draw_with_eigenvalues([1, -2], seed=7).chosen.system)
-    >>> period_of(structure, "1/10", ["1/2", "-1/3", 0, 1]).status
+    >>> from kahanmaps.family.system_normal_form import system_normal_form
+    >>> normal_form = system_normal_form(draw_with_eigenvalues([1, -2], seed=7).chosen.system)
+    >>> period_of(normal_form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
     field = QQ if prime is None else GF(prime)
     point = [field.convert(entry) for entry in start]
-    if structure.T is not None:  # x = T y with y the coordinates of the normal form
-        field.convert_matrix(structure.T)  # the prime may divide neither denominator
-        point = (field.convert_matrix(structure.T.inv()) * field.column(point)).entries()
+    if normal_form.T is not None:  # x = T y with y the coordinates of the normal form
+        field.convert_matrix(normal_form.T)  # the prime may divide neither denominator
+        point = (field.convert_matrix(normal_form.T.inv()) * field.column(point)).entries()
     if prime is None:
-        return period_over_rationals(structure.form, eps, point)
-    return orbit_period(structure.form, eps, point, prime)
+        return period_over_rationals(normal_form.form, eps, point)
+    return orbit_period(normal_form.form, eps, point, prime)
 
 
 def period(system: QuadraticSystem, start: Sequence[Any], eps: Any, prime: int | None = None) -> OrbitPeriod:
@@ -355,10 +355,10 @@ def period(system: QuadraticSystem, start: Sequence[Any], eps: Any, prime: int |
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
     'aperiodic'
     """
-    structure = structure_of(system)
-    if isinstance(structure, NoStructure):
-        raise InputError(f"found no normal form ({structure.reason}), expected a system that has one")
-    return period_of(structure, eps, start, prime)
+    normal_form = system_normal_form(system)
+    if isinstance(normal_form, NoNormalForm):
+        raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
+    return period_of(normal_form, eps, start, prime)
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:

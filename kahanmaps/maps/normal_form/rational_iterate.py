@@ -23,7 +23,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularStep
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form import tau_table, translation
 from kahanmaps.maps.normal_form.periods import Kind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
@@ -49,10 +49,10 @@ class OverBudget(Exception):
 class RationalOrbit:
     """The orbit of a start over Q, any iterate of it directly; no pole on the way goes unnoticed."""
 
-    def __init__(self, structure: Structure, eps: Any, start: Sequence[Any], max_bits: int | None) -> None:
-        splitting = Splitting(structure.form, QQ, eps, structure.T)
+    def __init__(self, normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], max_bits: int | None) -> None:
+        splitting = Splitting(normal_form.form, QQ, eps, normal_form.T)
         x = [QQ.convert(entry) for entry in start]
-        self._planes = _Planes(structure, splitting, x)
+        self._planes = _Planes(normal_form, splitting, x)
         self._limit = self._planes.most_bits if max_bits is None else max_bits
         self._end: SingularStep | OverBudget | None = None
         self._period: int | None = None
@@ -197,8 +197,8 @@ class _Planes:
     # Where no limit is given: longer numbers take minutes. So many steps modulo a prime are cheaper than long numbers.
     most_bits, looked = 1 << 28, 250_000
 
-    def __init__(self, structure: Structure, splitting: Splitting, x: Sequence[fmpq]) -> None:
-        self._steps = NormalSteps(structure, splitting.eps)
+    def __init__(self, normal_form: SystemNormalForm, splitting: Splitting, x: Sequence[fmpq]) -> None:
+        self._steps = NormalSteps(normal_form, splitting.eps)
         self._x = x
         self.blocks, self._assembly = self._steps.blocks(x)
         self._planes = [

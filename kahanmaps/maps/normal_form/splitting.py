@@ -46,7 +46,7 @@ class Splitting:
 
     def __init__(self, form: NormalForm, field: Field, eps: Any, T: fmpq_mat | None = None) -> None:
         if not isinstance(form, NormalForm):
-            raise wrong_kind(form, "a normal form", "km.normal_form(member) is one, and km.structure_of(system).form")
+            raise wrong_kind(form, "a normal form", "km.normal_form(member), km.system_normal_form(system).form are")
         self.form, self.field = form, field
         S = form.S if T is None else T * form.S
         with field.working():

@@ -8,7 +8,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.family.structure import Structure
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Assembly, Block, PlanesPoint
@@ -17,20 +17,20 @@ from kahanmaps.maps.normal_form.tau_table import triples
 
 
 class NormalSteps:
-    """Steps of Phi(., eps) over Q for a structure; the time step is 2 eps.
+    """Steps of Phi(., eps) over Q in a normal form; the time step is 2 eps.
 
     >>> from itertools import islice
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> from kahanmaps.family.structure import structure_of
+    >>> from kahanmaps.family.system_normal_form import system_normal_form
     >>> from kahanmaps.maps.kahan import KahanMap
     >>> system = draw_with_eigenvalues([1, -2], seed=7).chosen.system
-    >>> first, second = islice(NormalSteps(structure_of(system), fmpq(1, 10)).points([1, 0, "1/2", 0]), 2)
+    >>> first, second = islice(NormalSteps(system_normal_form(system), fmpq(1, 10)).points([1, 0, "1/2", 0]), 2)
     >>> second.rationals() == KahanMap(system, "1/10").step(first.rationals())
     True
     """
 
-    def __init__(self, structure: Structure, eps: fmpq) -> None:
-        self.splitting = Splitting(structure.form, QQ, eps, structure.T)
+    def __init__(self, normal_form: SystemNormalForm, eps: fmpq) -> None:
+        self.splitting = Splitting(normal_form.form, QQ, eps, normal_form.T)
         self._eps = eps
 
     def blocks(self, start: Sequence[Any]) -> tuple[list[Block], Assembly]:

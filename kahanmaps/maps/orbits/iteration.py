@@ -25,7 +25,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
 if TYPE_CHECKING:
-    from kahanmaps.family.structure import Structure
+    from kahanmaps.family.system_normal_form import SystemNormalForm
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 DEFAULT_MAX_DIGITS = 200_000
@@ -96,7 +96,7 @@ class Orbit(Displayed):
 
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
     back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
-    denominator (over Q). With a `structure` (family.structure.structure_of) the orbit is walked in normal form: over
+    denominator (over Q). With a `normal_form` (family.system_normal_form) the orbit is walked in normal form: over
     Q plane by plane; over balls every point directly, so that balls do not widen from step to
     step. `first` and `last` are the first points and the last one that were delivered so far.
 
@@ -117,7 +117,7 @@ class Orbit(Displayed):
         *,
         backward: bool = False,
         max_digits: int | None = DEFAULT_MAX_DIGITS,
-        structure: Structure | None = None,
+        normal_form: SystemNormalForm | None = None,
     ) -> None:
         require_steps(steps)
         if max_digits is not None and max_digits < 1:
@@ -127,7 +127,7 @@ class Orbit(Displayed):
         self.steps = steps
         self.backward = backward
         self.max_digits = max_digits
-        self.structure = structure
+        self.normal_form = normal_form
         self.end: OrbitEnd | None = None
         self.first: list[OrbitPoint] = []  # up to FIRST_POINTS of them
         self.last: OrbitPoint | None = None
@@ -182,14 +182,14 @@ class Orbit(Displayed):
     def _images(self) -> Iterator[Any]:
         """The start and its images; ends, or raises SingularStep, where the map has no value."""
         field = self.map.field
-        if self.structure is not None and field is QQ:
+        if self.normal_form is not None and field is QQ:
             from kahanmaps.maps.normal_form.steps import NormalSteps
 
-            yield from NormalSteps(self.structure, self.map.eps).points(self.start)
-        elif self.structure is not None and isinstance(field, BallField):
+            yield from NormalSteps(self.normal_form, self.map.eps).points(self.start)
+        elif self.normal_form is not None and isinstance(field, BallField):
             from kahanmaps.maps.normal_form.iterate import NthIterate
 
-            iterates = NthIterate(self.structure, self.map.eps, field)
+            iterates = NthIterate(self.normal_form, self.map.eps, field)
             value: Any = self.start
             yield value
             for step in count(1):
@@ -230,11 +230,11 @@ class Iterates:
 
     >>> from kahanmaps.algebra.fields import GF
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> from kahanmaps.family.structure import structure_of
+    >>> from kahanmaps.family.system_normal_form import system_normal_form
     >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
     >>> from kahanmaps.maps.kahan import KahanMap
     >>> kahan = KahanMap(system, "1/10", GF(10007))
-    >>> [point.text for point in Iterates(kahan, [1, 2, 3, 4, 5, 6], [10**30], structure=structure_of(system))]
+    >>> [point.text for point in Iterates(kahan, [1, 2, 3, 4, 5, 6], [10**30], normal_form=system_normal_form(system))]
     [['5212', '9799', '6471', '5788', '2175', '9896']]
     """
 
@@ -244,7 +244,7 @@ class Iterates:
         start: Sequence[Any],
         at: Sequence[int],
         *,
-        structure: Structure,
+        normal_form: SystemNormalForm,
         backward: bool = False,
         max_digits: int | None = DEFAULT_MAX_DIGITS,
     ) -> None:
@@ -257,7 +257,7 @@ class Iterates:
         self.end: OrbitEnd | None = None
         from kahanmaps.maps.normal_form.iterate import NthIterate
 
-        self._jump = NthIterate(structure, self.map.eps, self.map.field)
+        self._jump = NthIterate(normal_form, self.map.eps, self.map.field)
         self._interrupted = False
         self._busy_in: int | None = None
 

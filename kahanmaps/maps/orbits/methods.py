@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 
 METHODS = ("generic", "normal-form", "doubling")
 # From here on doublings are faster than steps: over Q, and modulo p, where steps do not pass poles silently.
@@ -33,46 +33,46 @@ class Method:
 
 
 def choose_method(
-    wish: str | None, arithmetic: str, structure: Structure | NoStructure, at: Sequence[int] | None
+    wish: str | None, arithmetic: str, normal_form: SystemNormalForm | NoNormalForm, at: Sequence[int] | None
 ) -> Method:
     """The method for an orbit in "exact", "mod", "ball" or "float" arithmetic; `at` has the steps, if only some count.
 
     Raises InputError where the wish cannot be met.
 
-    >>> choose_method(None, "exact", NoStructure("H is not a homogeneous cubic"), None).text
+    >>> choose_method(None, "exact", NoNormalForm("H is not a homogeneous cubic"), None).text
     'method generic: no normal form (H is not a homogeneous cubic)'
     """
     if wish is not None and wish not in METHODS:
         raise InputError(f"found the method {wish!r}, expected one of {', '.join(METHODS)}")
     if wish == "generic":
         return Method("generic", "as asked for")
-    if isinstance(structure, NoStructure):
+    if isinstance(normal_form, NoNormalForm):
         if wish is not None:
-            raise InputError(f"the method {wish} needs a normal form, and there is none: {structure.reason}")
-        return Method("generic", f"no normal form ({structure.reason})")
+            raise InputError(f"the method {wish} needs a normal form, and there is none: {normal_form.reason}")
+        return Method("generic", f"no normal form ({normal_form.reason})")
     if wish == "doubling" and (at is None or arithmetic == "float"):
         raise InputError("the method doubling is for --at N1,N2,... in exact, mod:P or ball arithmetic")
     if wish == "normal-form" and arithmetic == "mod":
         raise InputError("modulo P there are the methods generic and doubling")
     if wish is not None:
-        return Method(wish, structure.text)
+        return Method(wish, normal_form.text)
     if arithmetic == "float":
-        return Method("normal-form", structure.text)
+        return Method("normal-form", normal_form.text)
     if at is not None and max(at, default=0) >= DOUBLING_FROM[arithmetic]:
         dense = arithmetic == "exact" and len(at) * 10 > max(at)
         if not dense:
-            return Method("doubling", f"{structure.text}; each iterate by doublings")
+            return Method("doubling", f"{normal_form.text}; each iterate by doublings")
     if arithmetic == "mod":
         return Method("generic", "few steps modulo P")
-    return Method("normal-form", structure.text)
+    return Method("normal-form", normal_form.text)
 
 
-def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:
+def why_no_reduction(normal_form: SystemNormalForm, field: Field, eps: object) -> str:
     """Empty where iterates can be reached by doublings over the field, otherwise the reason (a bad prime)."""
     from kahanmaps.maps.normal_form.iterate import NthIterate
 
     try:
-        NthIterate(structure, eps, field)
+        NthIterate(normal_form, eps, field)
     except BadPrime as error:
         return str(error)
     return ""

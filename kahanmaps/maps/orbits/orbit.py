@@ -15,7 +15,7 @@ from kahanmaps.algebra.fields import GF, Field, rational
 from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import InputError
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _TOO_FAR = 10**13  # years
-_FEW_STEPS = 3  # for which looking for a structure does not pay
+_FEW_STEPS = 3  # for which looking for a normal form does not pay
 _LONG_INPUT = 4000  # bits of start and eps, from which on setting up a normal form pays later
 _LARGE_DIMENSION = 16
 _BITS_AT_LEAST = 4096  # where no precision is enough
@@ -58,7 +58,7 @@ def orbit(
     max_digits: int | None = None,
     hamiltonian: CubicHamiltonian | None = None,
     member: FamilyMember | None = None,
-    structure: Structure | NoStructure | None = None,
+    normal_form: SystemNormalForm | NoNormalForm | None = None,
     kernel: str | None = None,
     accuracy: int = 15,
     progress: Callable[[str], None] | None = None,
@@ -78,7 +78,7 @@ def orbit(
         every: float orbits deliver only multiples of it; `wanted` tells for all.
         max_digits: the digit budget in exact arithmetic (200,000 unless given).
         hamiltonian, member: what is known of a quadratic system, so that its normal form need not be searched.
-        structure: the normal form itself, or why there is none; looked for where it pays unless given.
+        normal_form: the normal form itself, or why there is none; looked for where it pays unless given.
         kernel: "numpy" or "numba", for floats.
         accuracy: decimal digits, for "ball:auto".
         progress: is told of trials.
@@ -110,15 +110,15 @@ def orbit(
     require_steps(far)
     if arithmetic.kind == "exact":
         require_short(exact_eps, [rational(entry) for entry in start], max_digits)
-    if structure is None:
-        structure = _structure(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
-    chosen = choose_method(method, arithmetic.kind, structure, at)
+    if normal_form is None:
+        normal_form = _normal_form(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
+    chosen = choose_method(method, arithmetic.kind, normal_form, at)
     if chosen.name != "doubling" and far > _TOO_FAR:
         raise InputError(
             f"step {far} is too far to be reached one step after the other (more than {_TOO_FAR:.0e}), "
             f"and there is no other way here: {chosen.reason}"
         )
-    used = structure if chosen.name != "generic" and isinstance(structure, Structure) else None
+    used = normal_form if chosen.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
     asked = _Asked(map_, start, exact_eps, far, at, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     remark = ""
     if arithmetic == Arithmetic("ball"):
@@ -145,21 +145,21 @@ class _Asked(NamedTuple):
     max_digits: int
     kernel: str | None
 
-    def by(self, method: str, structure: Structure | None, numbers: Arithmetic) -> Any:
+    def by(self, method: str, normal_form: SystemNormalForm | None, numbers: Arithmetic) -> Any:
         """The iterator over them by a method, in an arithmetic."""
         if numbers.kind == "float":
             from kahanmaps.maps.floats.fast import FloatOrbit
 
             every = self.every if self.at is None else max(1, math.gcd(*self.at))
-            form = None if structure is None else structure.form
+            form = None if normal_form is None else normal_form.form
             given = (self.map.rounded, self.eps, self.start, self.steps)
             return FloatOrbit(*given, backward=self.backward, form=form, kernel=self.kernel, every=every)
         over = self.map.at(self.eps, numbers.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
-        if method == "doubling" and structure is not None:
-            return Iterates(over, self.start, self.at or [], structure=structure, **limits)
-        normal = structure if method == "normal-form" else None
-        return Orbit(over, self.start, self.steps, structure=normal, **limits)
+        if method == "doubling" and normal_form is not None:
+            return Iterates(over, self.start, self.at or [], normal_form=normal_form, **limits)
+        normal = normal_form if method == "normal-form" else None
+        return Orbit(over, self.start, self.steps, normal_form=normal, **limits)
 
 
 class Trajectory:
@@ -304,7 +304,7 @@ def _orbit_at_one_eps(
     return Trajectory(points, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
 
 
-def _structure(
+def _normal_form(
     map_: BirationalMap,
     start: Sequence[Any],
     eps: fmpq,
@@ -313,27 +313,27 @@ def _structure(
     arithmetic: Arithmetic,
     hamiltonian: CubicHamiltonian | None,
     member: FamilyMember | None,
-) -> Structure | NoStructure:
+) -> SystemNormalForm | NoNormalForm:
     """The normal form, where it may be of use."""
     if method == "generic":
-        return NoStructure("not looked for")
+        return NoNormalForm("not looked for")
     if not isinstance(map_, Kahan) or map_.system.symbols:
-        return NoStructure(f"it is {map_.kind}")
+        return NoNormalForm(f"it is {map_.kind}")
     if method is None and (reason := _why_not_to_look(map_, start, eps, steps, arithmetic, member)):
-        return NoStructure(reason)
-    structure = structure_of(map_.system, hamiltonian, member)
-    if isinstance(structure, NoStructure):
-        return structure
-    if arithmetic.kind == "float" and structure.T is not None and method is None:
-        return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
+        return NoNormalForm(reason)
+    normal_form = system_normal_form(map_.system, hamiltonian, member)
+    if isinstance(normal_form, NoNormalForm):
+        return normal_form
+    if arithmetic.kind == "float" and normal_form.T is not None and method is None:
+        return NoNormalForm("in machine numbers only J = [[0, I], [-I, 0]] has one")
     reason = ""
     if arithmetic.kind == "ball":
         from kahanmaps.maps.normal_form.iterate import special_start
 
-        reason = special_start(structure, eps, start)
+        reason = special_start(normal_form, eps, start)
     if arithmetic.kind == "mod":
-        reason = why_no_reduction(structure, GF(arithmetic.number), eps)
-    return NoStructure(reason) if reason else structure
+        reason = why_no_reduction(normal_form, GF(arithmetic.number), eps)
+    return NoNormalForm(reason) if reason else normal_form
 
 
 def _why_not_to_look(
@@ -344,7 +344,7 @@ def _why_not_to_look(
     arithmetic: Arithmetic,
     member: FamilyMember | None,
 ) -> str:
-    """Empty, or why looking for a structure would cost more than it can save."""
+    """Empty, or why looking for a normal form would cost more than it can save."""
     few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
     numbers = [eps, *(rational(entry) for entry in start)]
     if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:

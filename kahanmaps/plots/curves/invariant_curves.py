@@ -24,7 +24,7 @@ from kahanmaps.algebra.fields import RR, rational
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
-from kahanmaps.family.structure import NoStructure
+from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.curves.plane_cubics import PlaneCubic
@@ -90,7 +90,7 @@ class InvariantCurves:
     planes: tuple[InvariantPlane, ...]
     originals: tuple[Numbers, ...]
     poles: tuple[int | None, ...]
-    structure: str
+    normal_form: str
 
 
 def find_invariant_curves(
@@ -115,17 +115,17 @@ def find_invariant_curves(
     True
     """
     _require_sizes(starts, steps)
-    structure = file.structure
-    if isinstance(structure, NoStructure):
+    normal_form = file.normal_form
+    if isinstance(normal_form, NoNormalForm):
         raise HypothesisError(
-            f"{file.name} has no normal form whose planes could be drawn: {structure.reason}; expected a member of "
-            "the family, declared or hidden, whose chi has no repeated root (see kahanmaps family show)"
+            f"{file.name} has no normal form whose planes could be drawn: {normal_form.reason}; expected a member of "
+            "the family, declared or recognised, whose chi has no repeated root (see kahanmaps family show)"
         )
     epsilon = rational(eps)
     if epsilon == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     field = RR(BITS)
-    splitting = Splitting(structure.form, field, epsilon, structure.T)
+    splitting = Splitting(normal_form.form, field, epsilon, normal_form.T)
     with field.working():
         frames = _frames(splitting)
         runs, originals, poles = [], [], []
@@ -143,7 +143,7 @@ def find_invariant_curves(
             originals.append(_in_variables(frames, orbits, splitting))
             poles.append(pole)
     planes = tuple(replace(frame, orbits=found) for frame, found in zip(frames, zip(*runs, strict=True), strict=True))
-    return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), structure.text)
+    return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), normal_form.text)
 
 
 def _require_sizes(starts: Sequence[Sequence[Any]], steps: int) -> None:

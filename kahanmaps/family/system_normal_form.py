@@ -23,10 +23,10 @@ _MAX_DIMENSION = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class SystemNormalForm:
     """A normal form with x = T S z; `T` is None where the form is in the system's own coordinates.
 
-    `declared` says whether the system came as a member of the family, `text` what the structure is.
+    `declared` says whether the system came as a member of the family, `text` what it is found to be.
     """
 
     form: NormalForm
@@ -41,7 +41,7 @@ class Structure:
 
 
 @dataclass(frozen=True)
-class NoStructure:
+class NoNormalForm:
     """There is no normal form, with the reason; of a member whose chi has a repeated root `text` and `T` as there."""
 
     reason: str
@@ -49,33 +49,33 @@ class NoStructure:
     T: fmpq_mat | None = field(default=None, compare=False)
 
 
-def structure_of(
+def system_normal_form(
     system: QuadraticSystem, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
-) -> Structure | NoStructure:
+) -> SystemNormalForm | NoNormalForm:
     """The normal form of a system, from what is known of it: a member, its Hamiltonian, or nothing.
 
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
     >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
-    >>> structure_of(system).text
-    'a hidden member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
+    >>> system_normal_form(system).text
+    'a recognised member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
     """
     from kahanmaps.family.planar import normal_form
     from kahanmaps.family.recognise import reason_against, recognised_hamiltonian, recognised_member
 
     if system.dim > _MAX_DIMENSION:
-        return NoStructure(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
+        return NoNormalForm(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
     declared, T = member is not None, None
     if member is None:
         hamiltonian = hamiltonian or recognised_hamiltonian(system)
         found = None if hamiltonian is None else recognised_member(hamiltonian)
         if found is None:
-            return NoStructure(reason_against(hamiltonian))
+            return NoNormalForm(reason_against(hamiltonian))
         member = found.member
         T = None if found.is_standard else found.T
     factors = "*".join(f"({one})" + f"^{one.multiplicity}" * (one.multiplicity > 1) for one in member.factors)
-    text = f"{'a' if declared else 'a hidden'} member of the family, chi = {factors}"
+    text = f"{'a' if declared else 'a recognised'} member of the family, chi = {factors}"
     try:
         form = normal_form(member)
     except HypothesisError:
-        return NoStructure("chi has a repeated root", text, T)
-    return Structure(form, T, declared, text)
+        return NoNormalForm("chi has a repeated root", text, T)
+    return SystemNormalForm(form, T, declared, text)

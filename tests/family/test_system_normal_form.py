@@ -13,7 +13,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -26,9 +26,9 @@ def hamiltonian(text: str, n: int) -> CubicHamiltonian:
     return CubicHamiltonian(parse_polynomial(text, default_variables(n)), standard_structure(n))
 
 
-def steps_like(structure: Structure, system: QuadraticSystem) -> bool:
+def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
     """Whether one step in the planes is a step of the system."""
-    splitting, x = Splitting(structure.form, QQ, "1/10", structure.T), random_point(system.dim, 8)
+    splitting, x = Splitting(normal_form.form, QQ, "1/10", normal_form.T), random_point(system.dim, 8)
     images = [plane.block.image(P) for plane, P in zip(splitting.planes, splitting.triples(x), strict=True)]
     return splitting.point(images) == KahanMap(system, "1/10").step(x)
 
@@ -38,7 +38,7 @@ def steps_like(structure: Structure, system: QuadraticSystem) -> bool:
 
 def test_a_declared_member_keeps_its_a():
     member = draw_with_eigenvalues(["1/2", -7], 3)
-    found = structure_of(member.chosen.system, member=member)
+    found = system_normal_form(member.chosen.system, member=member)
     assert (found.declared, found.T) == (True, None)
     assert found.form.A == member.A
     assert found.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
@@ -46,27 +46,27 @@ def test_a_declared_member_keeps_its_a():
 
 def test_the_same_member_not_declared_is_found_with_simpler_roots():
     member = draw_with_eigenvalues(["1/2", -7], 3)
-    found = structure_of(member.chosen.system)
+    found = system_normal_form(member.chosen.system)
     assert (found.declared, found.T) == (False, None)
-    assert found.text == "a hidden member of the family, chi = (t - 1)*(t - 2)"
+    assert found.text == "a recognised member of the family, chi = (t - 1)*(t - 2)"
 
 
 @over_members
 def test_the_structure_steps_like_the_system(name):
-    structure, system = structure_and_system(name)
-    assert steps_like(structure, system)
-    assert not structure.declared
+    normal_form, system = structure_and_system(name)
+    assert steps_like(normal_form, system)
+    assert not normal_form.declared
 
 
 @pytest.mark.parametrize("n", [2, 4, 6])
 def test_with_another_J_there_is_a_change_of_coordinates(n):
     member = draw_with_eigenvalues([1, -2, 3][: n // 2], 2)
     other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
-    found = structure_of(other.system, other)
+    found = system_normal_form(other.system, other)
     assert found.T * standard_structure(n) * found.T.transpose() == other.J
     assert steps_like(found, other.system)
     # x = S z alone, without T, are other coordinates
-    assert not steps_like(Structure(found.form, None, False, ""), other.system)
+    assert not steps_like(SystemNormalForm(found.form, None, False, ""), other.system)
 
 
 # None, with the reason.
@@ -83,16 +83,16 @@ REASONS = [
 
 @pytest.mark.parametrize(("system", "reason"), REASONS)
 def test_without_a_structure_the_reason_is_said(system, reason):
-    found = structure_of(system)
-    assert isinstance(found, NoStructure)
+    found = system_normal_form(system)
+    assert isinstance(found, NoNormalForm)
     assert found.reason.startswith(reason)
 
 
 def test_a_member_with_a_repeated_root_has_no_normal_form():
     member = draw_with_eigenvalues([2, 2], 1)
-    assert structure_of(member.chosen.system, member=member) == NoStructure("chi has a repeated root")
+    assert system_normal_form(member.chosen.system, member=member) == NoNormalForm("chi has a repeated root")
 
 
 def test_a_dimension_that_is_too_large_is_not_searched():
     system = hamiltonian("x1^3", 34).system
-    assert structure_of(system) == NoStructure("the dimension 34 is above 32")
+    assert system_normal_form(system) == NoNormalForm("the dimension 34 is above 32")
