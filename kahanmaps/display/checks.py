@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
-from kahanmaps.checks.settings import eps_words
 from kahanmaps.display import markup
 from kahanmaps.display import report_text as report_text  # which registers the text of reports
 from kahanmaps.displayed import html_form
 from kahanmaps.errors import counted
+from kahanmaps.maps.convention import eps_words
 
 _CLAIMS = 30  # in a notebook
 _TEXT = 400

@@ -16,7 +16,6 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import format_number, format_polynomial
-from kahanmaps.checks.settings import eps_record, eps_words
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
@@ -35,6 +34,7 @@ from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import SIGNED, Symmetries
+from kahanmaps.maps.convention import eps_record, eps_words
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -314,9 +314,8 @@ def test_iterates_stop_at_a_pole_on_the_way_over_q():
 
 def test_iterates_stop_where_numbers_would_be_too_long():
     normal_form, system = structure_and_system("m = 2")
-    iterates = Iterates(
-        KahanMap(system, "1/10"), [1, 2, 3, 4], [5, 10**5, 10**6], normal_form=normal_form, max_digits=1000
-    )
+    start, kahan = [1, 2, 3, 4], KahanMap(system, "1/10")
+    iterates = Iterates(kahan, start, [5, 10**5, 10**6], normal_form=normal_form, max_digits=1000)
     assert [point.step for point in iterates] == [5]
     assert (iterates.end.status, iterates.end.steps) == ("budget", 5)
     assert iterates.end.message.startswith("step 100000 cannot be reached: step ")

@@ -87,9 +87,8 @@ def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_gener
     normal_form, system = member_of(chi)
     start = random_point(system.dim, 1, height=3)
     generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, max_digits=None)]
-    planes = [
-        point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, normal_form=normal_form, max_digits=None)
-    ]
+    in_planes = Orbit(KahanMap(system, "1/10"), start, 4, normal_form=normal_form, max_digits=None)
+    planes = [point.value for point in in_planes]
     assert [point.rationals() for point in planes] == [point.rationals() for point in generic]
 
 

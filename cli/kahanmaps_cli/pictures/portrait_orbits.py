@@ -12,7 +12,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
-    from kahanmaps_cli.pictures.stored import Stored
+    from kahanmaps.maps.orbits.stored import Stored
 
 _PILOT = 4_000_000  # coordinates, from which the axes and the window of a density are chosen
 

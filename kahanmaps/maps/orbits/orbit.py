@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 
 from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, Field, rational
-from kahanmaps.algebra.written.text import parse_point
+from kahanmaps.algebra.written.plain import json_float
+from kahanmaps.algebra.written.text import format_number, parse_point
 from kahanmaps.displayed import data_frame
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.maps.convention import eps_record
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
@@ -29,10 +33,12 @@ from kahanmaps.maps.orbits.iteration import (
     require_short,
     require_steps,
 )
-from kahanmaps.maps.orbits.methods import DOUBLING_FROM, choose_method, why_no_reduction
+from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method, why_no_reduction
+from kahanmaps.maps.orbits.writers import Csv, OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.whole_files import write_whole
+from kahanmaps.version import __version__
+from kahanmaps.whole_files import growing_file
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
@@ -127,22 +133,20 @@ def orbit(
         except NotAccurate as error:
             bits, remark = _BITS_AT_LEAST, str(error)
         arithmetic = Arithmetic("ball", bits)
-    wanted = None if at is None else set(at)
-    points = asked.by(chosen.name, used, arithmetic)
-    return Trajectory(points, arithmetic, chosen.name, chosen.text, wanted, every, remark, map_.variables)
+    return Trajectory(asked.by(chosen.name, used, arithmetic), asked, arithmetic, chosen, remark)
 
 
 class _Asked(NamedTuple):
-    """Which points of which orbit are wanted."""
+    """Which points of which orbit are wanted; `steps` is the last one."""
 
-    map: BirationalMap
+    map: Any
     start: Sequence[Any]
     eps: fmpq
     steps: int
     at: Sequence[int] | None
     every: int
     backward: bool
-    max_digits: int
+    max_digits: int | None
     kernel: str | None
 
     def by(self, method: str, normal_form: SystemNormalForm | None, numbers: Arithmetic) -> Any:
@@ -166,37 +170,32 @@ class Trajectory:
     """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it.
 
     Iterate over it, and nothing is kept; or ask for its length, for points by their number, for a table or an array,
-    and all points are computed and kept.
+    and all points are computed and kept. `integrals` are functions of x and eps (PhaseFunction) by name, whose values
+    tables and files are to have beside the points.
 
     >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
     >>> len(found), found[-1].x, found.rows()[0]
     (4, (1/2,), {'step': 0, 'x': '1/5'})
     """
 
-    def __init__(
-        self,
-        orbit: Any,
-        arithmetic: Arithmetic,
-        method: str,
-        why: str,
-        at: set[int] | None,
-        every: int,
-        remark: str,
-        variables: Sequence[str],
-    ) -> None:
+    def __init__(self, orbit: Any, asked: _Asked, arithmetic: Arithmetic, chosen: Method, remark: str = "") -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
-        self.method = method
-        self.why = why
-        self._at, self._every, self._remark = at, every, remark
-        self.variables = tuple(variables)
+        self.method, self.why = chosen.name, chosen.text
+        self.variables: tuple[str, ...] = asked.map.variables
+        self.integrals: Mapping[str, Any] = {}
+        self._asked, self._remark = asked, remark
 
     def __repr__(self) -> str:
         return f"Trajectory({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
-        return step in self._at if self._at is not None else step % self._every == 0
+        return step in self._at if self._at is not None else step % self._asked.every == 0
+
+    @cached_property
+    def _at(self) -> set[int] | None:
+        return None if self._asked.at is None else set(self._asked.at)
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
@@ -226,21 +225,119 @@ class Trajectory:
         return self.points[index]
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each point: its step and the coordinates, floats and residues as numbers, others as exact text."""
+        """A row for each point: its step, the coordinates and the values of the integrals, None at poles.
+
+        Floats and residues are numbers, others exact text.
+        """
         kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
+        names = (*self.variables, *self.integrals)
         return [
-            {"step": point.step, **{name: kind(x) for name, x in zip(self.variables, point.text, strict=True)}}
+            {
+                "step": point.step,
+                **{
+                    name: None if text is None else kind(text)
+                    for name, text in zip(names, [*point.text, *self.values(point)], strict=True)
+                },
+            }
             for point in self.points
         ]
+
+    def values(self, point: OrbitPoint) -> list[str | None]:
+        """Those of the integrals, as text; None where one is not defined."""
+        return [self._value(function, point) for function in self.integrals.values()]
+
+    def _value(self, function: Any, point: OrbitPoint) -> str | None:
+        try:  # eps itself, also where the orbit steps by -eps: integrals are those of the map
+            found = function.value(point.field, self._asked.eps, point.x)
+        except (KahanmapsError, ArithmeticError):  # not defined where the map is not, or beyond the range of floats
+            return None
+        is_defined = found is not None and not (isinstance(found, float) and not math.isfinite(found))
+        return point.field.format(found) if is_defined else None
 
     def to_pandas(self) -> Any:
         """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
         return data_frame(self.rows())
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the points as `kahanmaps orbit -o` does: step and coordinates, exact."""
-        lines = [",".join(["step", *self.variables]), *(f"{p.step},{','.join(p.text)}" for p in self.points)]
-        write_whole(str(path), ("\n".join(lines) + "\n").encode())
+        """Write the points alone, as `kahanmaps orbit -o` does: step and coordinates, exact."""
+        with growing_file(path) as stream:
+            writer = Csv(stream, self.variables, list(self.integrals))
+            writer.header({})
+            for point in self.points:
+                writer.point(point.step, point.text, self.values(point))
+
+    def write(
+        self,
+        to: str | Path | IO[str] | Writer,
+        form: str = "",
+        name: str = "",
+        told: Callable[[int], None] = lambda _: None,
+    ) -> OrbitEnd:
+        """Write the points that are wanted as they are computed, as `kahanmaps orbit` does.
+
+        Args:
+            to: a path, beside which a .csv file gets what it is of; a stream of text; or a writer.
+            form: "text", "json", "jsonl", "csv", "npz", for the points of float orbits alone "npy"; by default what
+                the ending of the path stands for.
+            name: that of the system.
+            told: is called with every step that was computed.
+
+        Returns:
+            How it ended, as the file says it; "budget" where an npz file cannot hold more.
+        """
+        if not form and isinstance(to, str | Path):
+            form = form_of(to)
+        if form == "npy":
+            from kahanmaps.maps.floats.fast import stream_orbit
+
+            stream_orbit(self.orbit, to, progress=told)  # type: ignore[arg-type]  # a path
+            return self._ended(self.end)[0]
+        columns = (self.variables, list(self.integrals))
+        with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
+            writer.header(self.header(name))
+            try:
+                for point in self:
+                    told(point.step)
+                    if self.wanted(point.step):
+                        writer.point(point.step, point.text, self.values(point))
+                end = self.end
+            except OutputFull as full:
+                end = OrbitEnd("budget", full.steps, str(full))
+            end, more = self._ended(end)
+            writer.end(end, more)
+        return end
+
+    def header(self, name: str = "") -> dict[str, Any]:
+        """What the orbit can be made again from, as plain data; `name` is that of the system."""
+        asked = self._asked
+        header = {
+            "system": name,
+            "variables": list(self.variables),
+            **asked.map.written(),
+            **eps_record(asked.eps, asked.map),
+            "arithmetic": str(self.arithmetic),
+            "method": self.method,
+            "start": [format_number(rational(entry)) for entry in asked.start],
+            "direction": "backward" if asked.backward else "forward",
+            "steps": asked.steps,
+            "seed": None,
+            "version": __version__,
+        }
+        return {**header, "kernel": self.orbit.kernel} if self.arithmetic.kind == "float" else header
+
+    def _ended(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
+        """How it ended, and of a float orbit what it may have lost on the way, in the message and as plain data."""
+        if self.arithmetic.kind != "float":
+            return end, {}
+        message, more = end.message, {"near_singular": self.orbit.near_singular}
+        if self.orbit.drift:
+            more["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
+            largest = max(float(drift.largest) for drift in self.orbit.drift)
+            message += f"; block integrals moved by at most {largest:.3g} where looked at"
+        if self.orbit.near_singular:
+            first = self.orbit.near_singular_at
+            message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first}"
+        return replace(end, message=message), more
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         """The coordinates (points, dim), rounded to doubles. Raises InputError for balls and over number fields."""
@@ -301,7 +398,8 @@ def _orbit_at_one_eps(
         raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
     kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
     points = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
-    return Trajectory(points, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
+    asked = _Asked(phi, points.start, phi.eps, steps, None, 1, backward, points.max_digits, None)
+    return Trajectory(points, asked, kind, Method("generic", "it is a map at one eps"))
 
 
 def _normal_form(
