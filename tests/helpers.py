@@ -167,6 +167,8 @@ def _dyadic(mantissa: fmpz, exponent: fmpz) -> fmpq:
 
 def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
     """The cases as parameters of a test; those not among `which` are left to the thorough runs."""
+    cases = list(cases)
+    assert all(case in cases for case in which if isinstance(case, tuple))
     seldom = ((case if isinstance(case, tuple) else (case,), case in which) for case in cases)
     return [pytest.param(*values, marks=() if often else THOROUGH) for values, often in seldom]
 
