@@ -53,8 +53,8 @@ class Arithmetic(NamedTuple):
         if given is QQ or given is float or isinstance(given, EtaleAlgebra):
             return cls("float" if given is float else "exact")
         raise InputError(
-            f"found the arithmetic {given!r}, expected exact, float, mod:P, ball:BITS or ball:auto as text, or a field: "
-            "QQ, GF(p), RR(bits), CC(bits) or a number field"
+            f"found the arithmetic {given!r}, expected exact, float, mod:P, ball:BITS or ball:auto as text, or a field"
+            ": QQ, GF(p), RR(bits), CC(bits) or a number field"
         )
 
     @property
