@@ -78,7 +78,8 @@ def orbit(
         eps: an exact number, for Kahan maps half the time step; none for a map without it.
         steps: how many steps to take, or
         at: which iterates alone are wanted.
-        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field such as GF(p).
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
+            number field.
         method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
         backward: step by the inverse map.
         every: float orbits deliver only multiples of it; `wanted` tells for all.
@@ -104,17 +105,20 @@ def orbit(
     if (steps is None) == (at is None):
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
     require_steps(steps)
-    arithmetic = Arithmetic.of(arithmetic)
+    field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
     start = _numbers(start, arithmetic)
     far = max(at, default=0) if at is not None else (steps or 0)
     require_steps(far)
     wanted = None if at is None else frozenset(at)
     asked = _Asked(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     if isinstance(given, MapOver):
-        return _orbit_at_one_eps(asked, arithmetic)
+        return _orbit_at_one_eps(asked, field)
     map_ = as_map(given)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
+    if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
+        phi = map_.at(1 if eps is None else eps, field)
+        return _orbit_at_one_eps(asked._replace(map=phi, eps=None), field)
     asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
     if arithmetic.kind == "exact":
         require_short(asked.eps, [rational(entry) for entry in start], max_digits)
@@ -374,12 +378,13 @@ def _exactly(value: float) -> fmpq:
     return fmpq(*value.as_integer_ratio())
 
 
-def _orbit_at_one_eps(asked: _Asked, arithmetic: Arithmetic) -> Trajectory:
-    """The orbit of a map that has its eps and its field."""
-    phi = asked.map
-    if asked.eps is not None or asked.at is not None or arithmetic.kind != "exact":
+def _orbit_at_one_eps(asked: _Asked, numbers: Any) -> Trajectory:
+    """The orbit of a map that has its eps and its field, which `numbers` may name."""
+    phi, exact = asked.map, Arithmetic("exact")
+    if asked.eps is not None or asked.at is not None or numbers not in ("exact", exact, phi.field):
         raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
-    kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
+    p, bits = phi.field.characteristic, getattr(phi.field, "bits", 0)
+    kind = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact
     points = Orbit(phi, asked.start, asked.steps, backward=asked.backward, max_digits=asked.max_digits)
     asked = asked._replace(start=points.start, eps=phi.eps)
     return Trajectory(points, asked, kind, Method("generic", "it is a map at one eps"))
