@@ -147,7 +147,7 @@ def lyapunov_exponents(
         if counted == steps // 2:
             half, half_at = walk.sums.copy(), counted
     alive = walk.lanes if counted else walk.lanes[:0]
-    unit = abs(time_step(size, map_) or 1.0)
+    unit = time_step(size, map_) or 1.0
     span, first = unit * max(1, counted), unit * max(1, half_at)
     order = np.argsort(-walk.sums[alive] / span, axis=1)
     exponents = np.take_along_axis(walk.sums[alive] / span, order, axis=1)
