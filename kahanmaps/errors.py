@@ -130,8 +130,8 @@ def show(value: Any, width: int = 60) -> str:
 def quoted(text: str, width: int = 40) -> str:
     """`text` in quotes, safe to print, cut where it is long.
 
-    >>> quoted("abc"), quoted("1" * 50, 5)
-    ("'abc'", "'11111...'")
+    >>> quoted("12345", 5), quoted("1" * 50, 5)
+    ("'12345'", "'11111...'")
     """
     return repr(str(text) if len(text) <= width else text[:width] + "...")
 

@@ -176,6 +176,8 @@ def _dyadic(mantissa: fmpz, exponent: fmpz) -> fmpq:
 
 def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
     """The cases as parameters of a test; those not among `which` are left to the thorough runs."""
+    cases = list(cases)
+    assert all(case in cases for case in which if isinstance(case, tuple))
     seldom = ((case if isinstance(case, tuple) else (case,), case in which) for case in cases)
     return [pytest.param(*values, marks=() if often else THOROUGH) for values, often in seldom]
 
@@ -218,3 +220,21 @@ def table(path: Path) -> dict[str, list[str]]:
         elif line:
             lines.append(line)
     return found
+
+
+def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:
+    """[[W, X], [Y, W^T]] with random integers from -bound to bound in W and in the skew blocks X and Y."""
+    W = [[rng.randint(-bound, bound) for _ in range(m)] for _ in range(m)]
+    X, Y = _random_skew(m, rng, bound), _random_skew(m, rng, bound)
+    upper = [[*W[i], *X[i]] for i in range(m)]
+    lower = [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)]
+    return fmpq_mat(upper + lower)
+
+
+def _random_skew(m: int, rng: random.Random, bound: int) -> list[list[int]]:
+    skew = [[0] * m for _ in range(m)]
+    for i in range(m):
+        for j in range(i):
+            skew[i][j] = rng.randint(-bound, bound)
+            skew[j][i] = -skew[i][j]
+    return skew

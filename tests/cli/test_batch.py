@@ -165,6 +165,7 @@ def test_show_has_all_that_is_known_of_a_task(batch, space):
     shown = dict(line.split("\t", 1) for line in batch(f"show {key[:8]} --db study.db").out.splitlines())
     assert shown["task"] == "family-space"
     assert shown["in"] == "space 0"
+    assert re.fullmatch(r"[\d.e-]+ s, \d+ MB at most, attempts: 1", shown["took"])
     assert shown["result.dimension"] == "8"
     data = batch(f"show {key} --db study.db --json").json
     assert data["result"]["dimension"] == 8

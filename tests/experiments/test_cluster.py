@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from small_databases import exported
@@ -251,6 +252,7 @@ def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_n
     bad, good = jobs_of(1, leave=3), jobs_of(1, kind="other")
     records = {record.key: record for record in done(workers, [*bad, *good])}
     assert (tmp_path / "tries").stat().st_size == TRIES + 1
+    assert (list(workers._again), workers._groups) == ([], {})  # nor is it tried again when it is told
     lost = records[bad[0].task.key]
     assert (lost.outcome, lost.message) == (Outcome.LOST, "the worker's command ended with status 3")
     assert records[good[0].task.key].is_ok
@@ -307,7 +309,7 @@ def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own
 
 
 def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
-    monkeypatch.setattr(cluster, "SILENCE", 0.2)
+    monkeypatch.setattr(cluster, "SILENCE", 0.25)
     said = []
     workers = own.workers(talk=said.append)
     try:
@@ -315,6 +317,13 @@ def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
         workers.submit(job)
         assert workers.wait(1.5) == []
         assert said == [f"waiting for workers: the scheduler at {own.file} has none"]
+        with monkeypatch.context() as later:  # again after twice the time, and so on
+            workers._silent_since = 1.0
+            for quarters in range(40):
+                later.setattr(cluster, "time", SimpleNamespace(monotonic=lambda now=1 + quarters / 4: now))
+                workers._say_if_nobody_works()
+                assert len(said) == 1 + sum(quarters >= word for word in (2, 4, 8, 16, 32))
+        workers._silent_since = None
         own.worker(threads=3, nanny=False)
         assert len(done(workers, [])) == 1
         until(lambda: workers.wait(0.1) == [] and workers._dask.threads == 3)

@@ -17,6 +17,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analyses import commuting, growth, integrals, singularities, symmetries
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.singular.singularities import Patterns
@@ -221,6 +222,13 @@ def test_what_is_said_of_singularities(runs, expected):
     ]
     lines = singularities.statements(SimpleNamespace(singularities=found, file=load("euler_top")))
     assert [(str(line.status), line.text) for line in lines] == expected
+
+
+@pytest.mark.parametrize(("count", "end"), [(12, "11, 12"), (13, "11, 12, ...")])
+def test_twelve_degrees_are_shown_and_dots_for_more(count, end):
+    found = DegreeGrowth((1, *range(1, count + 1)), None, "finished", "", 0, (), ())
+    lines = growth.statements(SimpleNamespace(degrees=found, heights=None))
+    assert lines[0].text == f"degrees of the iterates: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, {end}"
 
 
 @pytest.mark.parametrize(("most", "first"), [(2, True), (1, False)])

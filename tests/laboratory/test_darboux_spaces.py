@@ -61,6 +61,11 @@ def test_multiples_of_what_is_known_are_not_found_again():
     assert gradient_rank(map_, known) == 2
 
 
+def test_integrals_that_depend_on_each_other_count_once():
+    space = DarbouxSpace(3, 1, [[1, 0, 0, 0], [0, 1, 0, 0], [5, 7, 0, 0]])  # 1, z, 5 + 7 z
+    assert gradient_rank(first_map(load("euler_top")), [space]) == 1
+
+
 def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
     rng = random.Random(1)
     for size in (2, 3):

@@ -51,12 +51,14 @@ def test_the_lower_bound_is_that_of_the_distances():
     assert not lower_bound(39, 10, 1) > 1
 
 
-def test_a_map_that_is_not_birational_is_refused():
+def test_a_map_that_is_not_birational_is_refused(monkeypatch):
     rng = random.Random(1)
     good = reduced(load("mcmillan").map, None, rng)
     assert is_birational(good, rng)
     kahan = as_map(QuadraticSystem.from_text(["x", "y"], ["x", "y^2"]))
     assert not is_birational(kahan.at(GF(PRIME).convert(fmpq(-1)), GF(PRIME)), rng)  # into a line
+    monkeypatch.setattr("kahanmaps.laboratory.growth.enclosure.is_birational", lambda *_: False)
+    assert enclose(load("lotka_volterra").map, None) is None
 
 
 def test_dimension_3_has_no_bounds():

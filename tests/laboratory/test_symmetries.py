@@ -92,6 +92,8 @@ def test_a_translation_is_found_where_it_is_needed():
     assert holds_for_the_map(f, t.S, t.r, lambda eps: -eps)
     found = linear_symmetries(system("x y", "x^2 + x", "y^2 - 3*y"))
     assert [t.text for t in found.reversing] == ["(x, y) -> (-x - 1, -y + 3)"]
+    found = linear_symmetries(system("x y", "x*(x + 3*(y - 1))", "(y - 1)*(y - 1 + 3*x)"))
+    assert [t.text for t in found.symmetries] == ["(x, y) -> (x, y)", "(x, y) -> (y - 1, x + 1)"]
 
 
 def test_matrices_that_are_no_signed_permutations():

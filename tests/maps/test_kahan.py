@@ -249,6 +249,6 @@ def test_the_field_of_the_map_is_the_field_of_the_system(system):
     phi = KahanMap(system, 1)
     x = phi.point([1] * system.dim)
     assert phi.vector_field(x) == tuple(evaluate(f, QQ, x) for f in system.rhs)
-    assert phi.vector_field_jacobian(x) == fmpq_mat(
+    assert phi.local.jacobian(x) == fmpq_mat(
         system.dim, system.dim, [f.derivative(j)(*x) for f in system.rhs for j in range(system.dim)]
     )

@@ -234,6 +234,7 @@ def test_what_blows_up_is_an_arrow_and_flattens_nothing():
     limit = clipped_from(found, "E")
     assert any(line.get_marker() == "^" and line.get_ydata().tolist() == [limit] for line in axes.lines)
     assert axes.get_ylim()[1] < 10 * limit < found.curves[1].errors.max()
+    assert not axes.patches  # no band for errors of 0, as there are none
     assert any("ended at step" in text.get_text() for text in axes.figure.legends[0].get_texts())
 
 

@@ -282,8 +282,8 @@ def is_from_outside(status: int | None) -> bool:
 def ending(status: int | None) -> str:
     """How a process ended, in words.
 
-    >>> ending(-15), ending(7)
-    ('was killed by signal 15 (SIGTERM), from outside', 'ended with status 7')
+    >>> ending(-15), ending(-11), ending(7)
+    ('was killed by signal 15 (SIGTERM), from outside', 'was killed by signal 11 (SIGSEGV)', 'ended with status 7')
     """
     if status is None:
         return "closed the pipe for its answers"
