@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly
-from helpers import HENON_HEILES
+from helpers import HENON_HEILES, quick
 
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
