@@ -54,7 +54,12 @@ def opened(function: Callable[Concatenate[Any, P], R]) -> Opened[P, R]:
     code = function.__code__
     names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
     required = names[: code.co_argcount - len(function.__defaults__ or ())]
-    wanted = str(function.__annotations__[names[0]])
+    wanted = str(function.__annotations__.get(names[0], ""))
+    if not wanted:
+        raise InputError(
+            f"found {function.__module__}.{function.__qualname__} with {names[0]} without a type, expected one: "
+            "SystemFile, QuadraticSystem, BirationalMap or MapOver says what is made of a name or a path"
+        )
     convert: Callable[[Any], Any] = _file
     if "SystemFile" not in wanted:
         convert = _orbit_of if "MapOver" in wanted else _map if "BirationalMap" in wanted else _system

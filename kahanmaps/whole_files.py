@@ -20,7 +20,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     What stood there stays until then: whoever looks, at any moment and after any end, finds the old file or the new
     one. A pipe or a device cannot be replaced: it gets everything at the end. Raises OSError that names `path`.
     """
-    try:
+    with named(path):
         if os.path.exists(path) and not os.path.isfile(path):
             with TemporaryFile() as held:
                 yield held
@@ -41,7 +41,25 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                     os.unlink(part.name)
                 raise
         _sync_folder(target.parent)
-    except OSError as error:  # a full disk comes without a name
+
+
+@contextmanager
+def growing_file(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
+    """A stream of text to a file that whoever looks sees grow; it is on the disk at the end of the block.
+
+    Raises OSError that names `path`.
+    """
+    with named(path), open(path, "w", encoding="utf-8", errors="backslashreplace") as stream:
+        yield stream
+        sync(stream)
+
+
+@contextmanager
+def named(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Let an OSError in the block name the file that it is about: a full disk comes without a name."""
+    try:
+        yield
+    except OSError as error:
         error.filename = os.fspath(path) if error.filename is None else error.filename
         raise
 

@@ -3,9 +3,12 @@
 Strategies draw plain data, so that hypothesis can shrink a failure to something one can compute by hand.
 """
 
+import ast
 import random
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from fractions import Fraction
+from functools import cache, wraps
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.documents.catalog import titles
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -26,6 +30,11 @@ SMALLEST_LARGE_PRIME = 2**63 + 29
 
 EXACT_FIELDS: list[Field] = [QQ, GF(2), GF(7), GF(2**61 - 1), GF(SMALLEST_LARGE_PRIME)]
 FIELDS: list[Field] = [*EXACT_FIELDS, RR(128)]
+
+parsed = cache(ast.parse)  # several tests read all files of the project
+
+# Of what is in the catalogue, by name, without reading it all.
+DIMENSION = {name: dim for name, (dim, _) in titles().items()}
 
 # For tests that run once a field: fewer examples each, and GF(2), where most matrices are singular, is tolerated.
 some = settings(max_examples=25, suppress_health_check=[HealthCheck.filter_too_much])
@@ -173,6 +182,34 @@ def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
     return [pytest.param(*values, marks=() if often else THOROUGH) for values, often in seldom]
 
 
+def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """One test of a long table whose cases take no time: each is tried, and those that fail are told together.
+
+    As pytest.mark.parametrize, which makes a test of each case, and takes longer than such a case.
+    """
+    wanted, rows = names.split(", "), list(cases)
+
+    def of_all(test: Callable[..., None]) -> Callable[..., None]:
+        @wraps(test)
+        def run(**fixtures: Any) -> None:
+            wrong = []
+            for row in rows:
+                values = row if len(wanted) > 1 else (row,)
+                try:
+                    test(**fixtures, **dict(zip(wanted, values, strict=True)))
+                except (Exception, pytest.fail.Exception) as error:
+                    wrong.append(f"{row!r:.300}\n    {type(error).__name__}: {error}")
+            assert rows
+            assert not wrong, f"{len(wrong)} of {len(rows)} cases\n" + "\n".join(wrong)
+
+        own = signature(test)
+        left = [parameter for name, parameter in own.parameters.items() if name not in wanted]
+        run.__signature__ = own.replace(parameters=left)  # type: ignore[attr-defined]  # what pytest reads
+        return run
+
+    return of_all
+
+
 def table(path: Path) -> dict[str, list[str]]:
     """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines."""
     found: dict[str, list[str]] = {}
@@ -183,3 +220,21 @@ def table(path: Path) -> dict[str, list[str]]:
         elif line:
             lines.append(line)
     return found
+
+
+def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:
+    """[[W, X], [Y, W^T]] with random integers from -bound to bound in W and in the skew blocks X and Y."""
+    W = [[rng.randint(-bound, bound) for _ in range(m)] for _ in range(m)]
+    X, Y = _random_skew(m, rng, bound), _random_skew(m, rng, bound)
+    upper = [[*W[i], *X[i]] for i in range(m)]
+    lower = [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)]
+    return fmpq_mat(upper + lower)
+
+
+def _random_skew(m: int, rng: random.Random, bound: int) -> list[list[int]]:
+    skew = [[0] * m for _ in range(m)]
+    for i in range(m):
+        for j in range(i):
+            skew[i][j] = rng.randint(-bound, bound)
+            skew[j][i] = -skew[i][j]
+    return skew

@@ -16,6 +16,7 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS / "_ext"))
 
 from check_pages import mistakes  # noqa: E402
+from helpers import together  # noqa: E402
 from kahanmaps_docs import docstrings, expanded, part, reference  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
 from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
@@ -146,7 +147,7 @@ def test_every_schema_has_its_section_with_its_keys(built_from):
     assert re.search(r"^\| `time_step` \| .+ \|$", entry, re.MULTILINE)
 
 
-@pytest.mark.parametrize("path", markdown_files(), ids=lambda path: str(path.relative_to(ROOT)))
+@together("path", markdown_files())
 def test_local_links_lead_to_a_file_and_to_a_heading_in_it(path):
     assert broken_links(path) == []
 

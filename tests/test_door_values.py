@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import kahanmaps as km
+from kahanmaps.algebra.duals import DualField
+from kahanmaps.door import opened
 from kahanmaps.errors import InputError
 
 FISH = "q' = p; p' = q^2 - q"
@@ -149,3 +151,30 @@ def test_starts_are_one_or_many_of_any_kind_of_number():
 def test_wrong_arguments_are_told_in_a_sentence(expression, words):
     with pytest.raises(InputError, match=words):
         eval(expression, {"km": km, "FISH": FISH, "phi": km.map(FISH, "1/5")})
+
+
+def test_orbits_go_over_every_field_that_has_numbers_to_print():
+    K = km.load("euler_top", a1="root of t^2 - 2").map.root.number_field
+    start = [K.generator, 2]
+    walk = km.orbit(FISH, start, "1/10", 2, arithmetic=K)
+    over = km.System(FISH).map.at("1/10", K)
+    assert walk[2].x == over.step(over.step(start))
+    assert (str(walk.arithmetic), walk.header()["start"]) == ("exact", ["t", "2"])
+    kinds = [(km.QQ, "exact"), (km.GF(101), "mod:101"), (km.RR(64), "ball:64"), (km.CC(64), "ball:64")]
+    for field, kind in kinds:
+        walk = km.orbit(FISH, [1, 2], "1/10", 2, arithmetic=field)
+        assert (str(walk.arithmetic), walk[0].field) == (kind, field)
+    phi = km.map(FISH, "1/10")
+    assert len(km.orbit(phi, [1, 2], steps=2, arithmetic=km.QQ)) == 3
+    with pytest.raises(InputError, match="has its eps and its numbers"):
+        km.orbit(phi, start, steps=2, arithmetic=K)
+    with pytest.raises(InputError, match=r"found the arithmetic DualField\(QQ\), expected exact, .* a field: QQ"):
+        km.orbit(FISH, [1, 2], "1/10", 2, arithmetic=DualField(km.QQ))
+
+
+def test_a_function_without_a_type_cannot_be_opened():
+    def untyped(file):
+        return file
+
+    with pytest.raises(InputError, match="untyped with file without a type, expected one: SystemFile"):
+        opened(untyped)

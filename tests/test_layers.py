@@ -9,11 +9,11 @@ from __future__ import annotations
 import ast
 from collections import deque
 from collections.abc import Iterator
-from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from helpers import parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -39,7 +39,7 @@ NUMPY_WHILE_LOADING = (
 KERNELS = ("kahanmaps/maps/floats/numba_kernel.py", "kahanmaps/maps/kept_code.py")
 
 
-parsed = cache(ast.parse)  # several tests read all files
+_PARTS = ("body", "orelse", "finalbody", "handlers", "cases")  # of statements, where statements stand
 
 
 def python_files() -> list[Path]:
@@ -99,12 +99,12 @@ def _imports(body: list[ast.stmt], package: list[str], only_while_loading: bool 
             base = [*above, *(node.module.split(".") if node.module else [])]
             for name in node.names:
                 yield node.lineno, ".".join([*base, name.name])
-        elif only_while_loading and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+        elif only_while_loading and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         elif only_while_loading and isinstance(node, ast.If) and _is_type_checking(node.test):
             waiting += node.orelse
         else:
-            waiting += ast.iter_child_nodes(node)
+            waiting += (one for part in _PARTS for one in getattr(node, part, ()))
 
 
 def _is_type_checking(test: ast.expr) -> bool:

@@ -8,6 +8,7 @@ import tokenize
 from pathlib import Path
 
 import pytest
+from helpers import parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 CODE = ("kahanmaps", "cli", "tests", "examples", "benchmarks")
@@ -41,7 +42,7 @@ def opens_with_a_docstring(path: Path) -> bool:
 def undocumented(source: str) -> list[str]:
     """The public functions and classes at the top of a file that have no docstring."""
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-    public = [node for node in ast.parse(source).body if isinstance(node, kinds) and not node.name.startswith("_")]
+    public = [node for node in parsed(source).body if isinstance(node, kinds) and not node.name.startswith("_")]
     return [node.name for node in public if not ast.get_docstring(node)]
 
 

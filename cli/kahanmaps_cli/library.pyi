@@ -11,11 +11,8 @@ from numpy.typing import NDArray as NDArray
 from kahanmaps.algebra.fields import GF as GF
 from kahanmaps.algebra.fields import QQ as QQ
 from kahanmaps.algebra.fields import rational as rational
-from kahanmaps.algebra.polynomials import RationalFunction as RationalFunction
-from kahanmaps.algebra.polynomials import evaluate as evaluate
-from kahanmaps.algebra.roots import parse_root as parse_root
-from kahanmaps.algebra.written.numerals import check_names as check_names
 from kahanmaps.algebra.written.plain import attributes as attributes
+from kahanmaps.algebra.written.plain import json_float as json_float
 from kahanmaps.algebra.written.plain import plain as plain
 from kahanmaps.algebra.written.text import format_factored as format_factored
 from kahanmaps.algebra.written.text import format_number as format_number
@@ -32,10 +29,8 @@ from kahanmaps.checks.claims import Finding as Finding
 from kahanmaps.checks.claims import Report as Report
 from kahanmaps.checks.claims import Verdict as Verdict
 from kahanmaps.checks.claims import combined as combined
-from kahanmaps.checks.conserve import known_integrals as known_integrals
+from kahanmaps.checks.conserve import functions_along as functions_along
 from kahanmaps.checks.settings import Settings as Settings
-from kahanmaps.checks.settings import eps_record as eps_record
-from kahanmaps.checks.settings import eps_words as eps_words
 from kahanmaps.checks.table import CHECKS as CHECKS
 from kahanmaps.display.experiments import summary_markdown as summary_markdown
 from kahanmaps.display.laboratory import analysis_head as analysis_head
@@ -44,6 +39,7 @@ from kahanmaps.display.latex import latex_name as latex_name
 from kahanmaps.display.latex import latex_polynomial as latex_polynomial
 from kahanmaps.display.latex import latex_rational_function as latex_rational_function
 from kahanmaps.display.markup import code as code
+from kahanmaps.display.markup import eps_phrase as eps_phrase
 from kahanmaps.display.markup import markdown as markdown
 from kahanmaps.display.report_text import details as details
 from kahanmaps.display.report_text import headline as headline
@@ -60,7 +56,6 @@ from kahanmaps.documents.structured_facts import KEYS as KEYS
 from kahanmaps.documents.structured_facts import relations as relations
 from kahanmaps.documents.tensor import tensor_file as tensor_file
 from kahanmaps.errors import InputError as InputError
-from kahanmaps.errors import KahanmapsError as KahanmapsError
 from kahanmaps.errors import counted as counted
 from kahanmaps.errors import printable as printable
 from kahanmaps.errors import quoted as quoted
@@ -71,7 +66,6 @@ from kahanmaps.experiments.options import FAMILY as FAMILY
 from kahanmaps.experiments.registry import task_kind as task_kind
 from kahanmaps.experiments.registry import task_kinds as task_kinds
 from kahanmaps.experiments.results.columns import value_pairs as value_pairs
-from kahanmaps.experiments.results.export import cell as cell
 from kahanmaps.experiments.results.export import write_csv as write_csv
 from kahanmaps.experiments.results.export import write_jsonl as write_jsonl
 from kahanmaps.experiments.results.export import write_parquet as write_parquet
@@ -110,7 +104,7 @@ from kahanmaps.family.skew_hamiltonian import diagnosis as diagnosis
 from kahanmaps.family.system_normal_form import NoNormalForm as NoNormalForm
 from kahanmaps.family.system_normal_form import SystemNormalForm as SystemNormalForm
 from kahanmaps.invariants.growth import Growth as Growth
-from kahanmaps.invariants.integrals import ClaimedIntegral as ClaimedIntegral
+from kahanmaps.invariants.phase_functions import PhaseFunction as PhaseFunction
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as analyze
 from kahanmaps.laboratory.finite.cycle_laws import Comparison as Comparison
@@ -151,13 +145,16 @@ from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as linear
 from kahanmaps.languages.convert import convert as convert
 from kahanmaps.maps.convention import CONVENTION as CONVENTION
 from kahanmaps.maps.convention import convention as convention
+from kahanmaps.maps.convention import eps_record as eps_record
+from kahanmaps.maps.convention import eps_share as eps_share
+from kahanmaps.maps.convention import eps_told as eps_told
+from kahanmaps.maps.convention import time_step as time_step
 from kahanmaps.maps.floats.doubles import FloatArray as FloatArray
 from kahanmaps.maps.floats.doubles import to_float as to_float
 from kahanmaps.maps.floats.doubles import to_floats as to_floats
 from kahanmaps.maps.floats.ensemble import starts_in_box as starts_in_box
 from kahanmaps.maps.floats.fast import FloatEnsemble as FloatEnsemble
 from kahanmaps.maps.floats.fast import float_function as float_function
-from kahanmaps.maps.floats.fast import stream_orbit as stream_orbit
 from kahanmaps.maps.floats.lyapunov import Lyapunov as Lyapunov
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
 from kahanmaps.maps.floats.stream import NpyFile as NpyFile
@@ -172,6 +169,8 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock as PlanarBlock
 from kahanmaps.maps.orbits.arithmetic import Arithmetic as Arithmetic
 from kahanmaps.maps.orbits.iteration import OrbitEnd as OrbitEnd
 from kahanmaps.maps.orbits.orbit import orbit as orbit
+from kahanmaps.maps.orbits.stored import read_orbits as read_orbits
+from kahanmaps.maps.orbits.writers import form_of as form_of
 from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
 from kahanmaps.paper.claims.survivors import survivors as survivors
 from kahanmaps.paper.claims.survivors import table as table
@@ -249,6 +248,5 @@ from kahanmaps.systems.quadratic import MAX_DIMENSION as MAX_DIMENSION
 from kahanmaps.systems.quadratic import QuadraticSystem as QuadraticSystem
 from kahanmaps.version import __version__ as __version__
 from kahanmaps.whole_files import resolved as resolved
-from kahanmaps.whole_files import sync as sync
 from kahanmaps.whole_files import whole_file as whole_file
 from kahanmaps.whole_files import write_whole as write_whole

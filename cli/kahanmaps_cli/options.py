@@ -149,14 +149,6 @@ def integral_option(help_text: str, flag: str = "--integral", into: str = "integ
     )
 
 
-def asked_integral(file: lib.SystemFile, name: str, text: str, otherwise: str) -> tuple[str, lib.RationalFunction]:
-    """An integral of the file by its name, or an expression, called by its own text where that is short."""
-    if text in file.integrals:
-        return name or text, file.integrals[text]
-    function = lib.parse_rational_function(text, file.claim_names, file.parameters)
-    return name or (" ".join(text.split()) if len(text) <= 30 else otherwise), function
-
-
 def seconds_option(default: float | None, help_text: str) -> Callable[[F], F]:
     """--seconds T; None where the default depends on the system, and `help_text` says how."""
     return click.option(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from flint import fmpq
@@ -12,7 +12,7 @@ from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claimed import claimed_functions, settings_and_claim
+from kahanmaps.checks.claimed import claimed_function, claimed_functions, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
@@ -29,7 +29,7 @@ from kahanmaps.invariants.integrals import (
     constancy,
     is_constant,
 )
-from kahanmaps.invariants.phase_functions import PhaseFunction
+from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -68,6 +68,41 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
         if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
             found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
     return found
+
+
+def functions_along(
+    file: SystemFile, asked: Sequence[tuple[str, str]], in_floats: bool, taken: Sequence[str] = ()
+) -> dict[str, PhaseFunction]:
+    """What is watched along orbits, in floats or not, by name, for pairs of a name, which may be empty, and a text.
+
+    A text is an expression, the name of an integral of the file, or the word known, which stands for all that theorems
+    give and the file claims. Raises InputError for the same name twice, or one that is `taken` by another column.
+    """
+    file = file.rounded if in_floats else file
+    found: list[PhaseFunction] = []
+    for k, (name, text) in enumerate(asked, start=1):
+        if text == "known" and not name:
+            claims = file.integrals
+            known = [integral for integral, _, _ in known_integrals(file)]
+            if not known and not claims:
+                raise InputError(f"--integral known: no integral of {file.name} is known or claimed")
+            if known and in_floats:
+                raise InputError(
+                    "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
+                )
+            found += known
+        elif text in file.integrals:
+            claims = {name or text: file.integrals[text]}
+        else:
+            short = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
+            claims = {name or short: claimed_function(file, text)}
+        found += [ClaimedFunction(name, function, file.map.root) for name, function in claims.items()]
+    names = [*taken, *(function.name for function in found)]
+    for name in names:
+        if names.count(name) > 1:
+            kind = "columns" if taken else "integrals"
+            raise InputError(f"found two {kind} of the name {name}: write --integral NAME=EXPR")
+    return {function.name: function for function in found}
 
 
 def check_integrals(file: SystemFile, settings: Settings | Any = None, extra: Mapping[str, Any] | Any = None) -> Report:

@@ -16,7 +16,7 @@ from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.maps.convention import CONVENTION, NO_EPS, convention
+from kahanmaps.maps.convention import eps_record
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
@@ -75,34 +75,6 @@ class Settings:
             "document": files[0].document,
             **({"other_document": files[1].document} if len(files) > 1 else {}),
         }
-
-
-def eps_record(eps: fmpq | None, *maps: BirationalMap) -> dict[str, str | None]:
-    """What every record says of eps, None standing for every one: its value, the time step, and what eps is.
-
-    The value is None where the maps do not depend on eps.
-    """
-    meaning = convention(*maps)
-    time_step = "every" if eps is None else format_number(2 * eps)
-    return {
-        "eps": None if meaning == NO_EPS else "every" if eps is None else format_number(eps),
-        "time_step": time_step if meaning == CONVENTION else None,
-        "convention": meaning,
-    }
-
-
-def eps_words(context: Mapping[str, Any]) -> str:
-    """For which eps a record speaks, with the time step where there is one, to follow the name of the map.
-
-    >>> eps_words({"eps": "1/10", "time_step": "1/5", "convention": CONVENTION})
-    ', eps = 1/10 (time step 2 eps = 1/5)'
-    """
-    if context.get("convention") == NO_EPS:
-        return ""
-    has_step = context["time_step"] is not None
-    if context["eps"] == "every":
-        return f", every eps{' (the time step is 2 eps)' if has_step else ''}"
-    return f", eps = {context['eps']}" + (f" (time step 2 eps = {context['time_step']})" if has_step else "")
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
-from kahanmaps.checks.settings import eps_words
 from kahanmaps.display import markup
 from kahanmaps.display import report_text as report_text  # which registers the text of reports
 from kahanmaps.displayed import html_form
@@ -91,9 +90,7 @@ def eps_sentence(report: Report) -> str:
     if "eps" not in context:
         return ""
     second = f", second map at eps2 = {markup.shortened(context['eps2'])}" if "eps2" in context else ""
-    step = context["time_step"] and markup.shortened(context["time_step"])
-    words = eps_words({**context, "eps": markup.shortened(context["eps"]), "time_step": step})
-    return words.removeprefix(", ") + second
+    return markup.eps_phrase(context) + second
 
 
 def ending_sentence(report: Report) -> str:

@@ -16,7 +16,6 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import format_number, format_polynomial
-from kahanmaps.checks.settings import eps_record, eps_words
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
@@ -35,6 +34,7 @@ from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import SIGNED, Symmetries
+from kahanmaps.maps.convention import eps_record, eps_told
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -69,12 +69,9 @@ def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> Shown:
     return _formula(format_polynomial(polynomial), polynomial, name)
 
 
-def eps_sentence(eps: fmpq | None, map_: BirationalMap | None = None) -> str:
+def eps_sentence(eps: fmpq | None, *maps: BirationalMap) -> str:
     """For which eps a result is, with the time step: a phrase, empty for a map that does not depend on eps."""
-    if map_ is not None and not map_.has_time_step:
-        words = "every eps" if eps is None else f"eps = {markup.shortened(format_number(eps))}"
-        return words if map_.has_eps else ""
-    return markup.eps_words() if eps is None else markup.eps_words(format_number(eps), format_number(2 * eps))
+    return markup.eps_phrase(eps_record(eps, *maps))
 
 
 @singledispatch
@@ -114,7 +111,7 @@ def _text(text: str, width: int = _TEXT) -> str:
 
 def analysis_title(found: Analysis) -> str:
     """The system, its dimension and parameters, and for which eps the report is."""
-    step = eps_words(eps_record(found.eps, found.file.map))
+    step = eps_told(found.eps, found.file.map)
     values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
     formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
     return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"

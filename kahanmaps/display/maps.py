@@ -107,9 +107,10 @@ def orbit_html(orbit: Orbit) -> str:
         status = "no point computed yet: iterate over it"
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
-    eps = orbit.map.eps  # None where maps at several eps were composed
-    step = "" if eps is None else f" eps = {markup.shortened(field.format(eps))} (the time step is 2 eps),"
-    title = f"orbit{direction},{step} over {field}"
+    eps, flow = orbit.map.eps, orbit.map.flow  # None where maps at several eps, of several fields were composed
+    at = "" if eps is None else f" eps = {markup.shortened(field.format(eps))},"
+    at += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
+    title = f"orbit{direction},{at} over {field}"
     return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
 
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from kahanmaps.errors import printable
+from kahanmaps.maps.convention import eps_words
 
 # A mark, and a colour to be mixed with that of the text: with a contrast above 4.5 : 1 on white and on near black.
 WORDS = {
@@ -72,15 +74,14 @@ def shortened(text: object, width: int = _SHORTENED) -> str:
     return f"{whole[:keep]}…{whole[-keep:]} ({len(whole)} characters)"
 
 
-def eps_words(eps: object = None, step: object = None) -> str:
-    """For which eps something is said, with the time step, as text; None is every eps.
+def eps_phrase(record: Mapping[str, Any]) -> str:
+    """For which eps a record speaks, with the time step, as text with short numbers.
 
-    >>> eps_words(), eps_words("1/10", "1/5")
-    ('every eps (the time step is 2 eps)', 'eps = 1/10 (time step 2 eps = 1/5)')
+    >>> eps_phrase({"eps": "1/10", "time_step": "1/5"})
+    'eps = 1/10 (time step 2 eps = 1/5)'
     """
-    if eps is None:
-        return "every eps (the time step is 2 eps)"
-    return f"eps = {shortened(eps)} (time step 2 eps = {shortened(step)})"
+    step = record["time_step"] and shortened(record["time_step"])
+    return eps_words({**record, "eps": shortened(record["eps"]), "time_step": step}).removeprefix(", ")
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:

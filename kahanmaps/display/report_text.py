@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
-from kahanmaps.checks.settings import eps_words
 from kahanmaps.displayed import shorten, text_form
+from kahanmaps.maps.convention import eps_words
 
 
 @text_form.register

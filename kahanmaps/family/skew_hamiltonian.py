@@ -167,15 +167,6 @@ def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
     return value
 
 
-def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:
-    """[[W, X], [Y, W^T]] with random integers from -bound to bound in W and in the skew blocks X and Y."""
-    W = [[rng.randint(-bound, bound) for _ in range(m)] for _ in range(m)]
-    X, Y = _random_skew(m, rng, bound), _random_skew(m, rng, bound)
-    upper = [[*W[i], *X[i]] for i in range(m)]
-    lower = [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)]
-    return fmpq_mat(upper + lower)
-
-
 def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     """A random integer matrix S with S^T J S = J and small entries: a product of elementary symplectic matrices.
 
@@ -222,15 +213,6 @@ def _order(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
     if factor.degree == 1:
         return (1, (-factor.polynomial[0],))
     return (factor.degree, tuple(factor.polynomial.coeffs()))
-
-
-def _random_skew(m: int, rng: random.Random, bound: int) -> list[list[int]]:
-    skew = [[0] * m for _ in range(m)]
-    for i in range(m):
-        for j in range(i):
-            skew[i][j] = rng.randint(-bound, bound)
-            skew[j][i] = -skew[i][j]
-    return skew
 
 
 def _show(number: fmpq) -> str:

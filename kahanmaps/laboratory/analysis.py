@@ -69,7 +69,7 @@ class Analysis(Findings, Printed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""
-        from kahanmaps.checks.settings import eps_record
+        from kahanmaps.maps.convention import eps_record
         from kahanmaps.version import __version__
 
         final = self.conclusion

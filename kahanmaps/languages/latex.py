@@ -10,6 +10,7 @@ from kahanmaps.algebra.written.reading import above_and_below
 from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.writer import header
+from kahanmaps.maps.convention import eps_share
 
 _LINE = 140  # characters of source on a line of a formula
 # The point and its image; x may be the name of a variable.
@@ -28,8 +29,9 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
     columns = f"\\setcounter{{MaxMatrixCols}}{{{formulas.dim}}}\n" if formulas.dim > 10 else ""
     body = "\n\n".join(displays)
     step = ""
-    if formulas.map.has_time_step:
-        step = "\\noindent $\\varepsilon$ is half the time step: the time step is $2 \\varepsilon$.\n\n"
+    if share := eps_share(formulas.map):
+        share = share.replace("eps", "$\\varepsilon$")
+        step = f"\\noindent {share}: the time step is ${2 * formulas.map.time_steps} \\varepsilon$.\n\n"
     return (
         f"{comment}\n\\documentclass{{article}}\n\\usepackage{{amsmath}}\n\\allowdisplaybreaks\n{columns}"
         "\\begin{document}\n\n"

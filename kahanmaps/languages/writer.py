@@ -13,6 +13,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.language import Language, fill
+from kahanmaps.maps.convention import eps_share
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
@@ -51,8 +52,8 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
             f"  {name}' = {text if len(text) <= width else text[: width - 4] + ' ...'}"
             for name, text in zip(formulas.variables, texts, strict=True)
         ]
-    if formulas.map.has_time_step:
-        lines.append("eps is half the time step: the time step is 2 eps.")
+    if share := eps_share(formulas.map):
+        lines.append(f"{share}: the time step is {2 * formulas.map.time_steps} eps.")
     numbers = [f"{name} = {value}" for name, value in file.parameters.items() if name not in formulas.symbols]
     if numbers:
         lines.append(f"Parameters: {', '.join(numbers)}")

@@ -30,7 +30,7 @@ class AlgebraicMap(BirationalMap):
 
     def __init__(self, given: BirationalMap, root: Root, at_number: Callable[[Any], BirationalMap]) -> None:
         self.given, self.root = given, root
-        self.variables, self.title, self.has_time_step = given.variables, given.title, given.has_time_step
+        self.variables, self.title, self.time_steps = given.variables, given.title, given.time_steps
         self.denominator_name = given.denominator_name
         self._at_number = at_number
         self._last: tuple[Field, Any] | None = None

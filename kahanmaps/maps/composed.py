@@ -60,7 +60,6 @@ class ComposedMap(BirationalMap):
     """The map that takes one step of each part after the other; `composed_map` makes it."""
 
     title = "composition"
-    has_time_step = False
 
     def __init__(self, variables: tuple[str, ...], parts: Sequence[Part], symbols: tuple[str, ...]) -> None:
         self.variables, self.parts, self._symbols = variables, tuple(parts), symbols
@@ -78,6 +77,23 @@ class ComposedMap(BirationalMap):
     @property
     def subject(self) -> tuple[Any, ...]:
         return (self.variables, self.symbols, [part.subject for part in self.parts])
+
+    @cached_property
+    def time_steps(self) -> int:  # type: ignore[override]  # nobody writes it
+        """The sum of those of the letters, where these are one map and its inverse; else there is no one flow."""
+        letters = self._letters
+        return sum(steps for _, steps in letters) if all(one == letters[0][0] for one, _ in letters) else 0
+
+    @property
+    def _letters(self) -> list[tuple[Any, int]]:
+        """What each part is, compositions taken apart, and its time steps, with a sign."""
+        found: list[tuple[Any, int]] = []
+        for part in self.parts:
+            letters = [(part.map_and_values, part.map.time_steps)]
+            if isinstance(part.map, ComposedMap) and not part.values:
+                letters = part.map._letters
+            found += [(letter, -steps if part.is_inverse else steps) for letter, steps in letters]
+        return found
 
     @property
     def digits(self) -> int:

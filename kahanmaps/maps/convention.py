@@ -1,7 +1,17 @@
-"""What eps is, in a sentence that every record carries."""
+"""What eps is and which time step it makes: all that say so ask here, and here the maps are asked.
+
+A step of a map advances the flow that it approximates by `time_steps` times 2 eps: once for a Kahan map, k times for
+its k-th power. A product of maps of different fields approximates no flow with one time, and has no time step.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.maps.implicit import BirationalMap
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
@@ -9,9 +19,62 @@ NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
 NO_EPS = "the map does not depend on eps"
 
 
+def _time_steps(maps: tuple[BirationalMap, ...]) -> list[int]:
+    """The different ones of the maps of which a record speaks together, as far as they have any."""
+    return sorted({map_.time_steps for map_ in maps if map_.has_eps} - {0}) if maps else [1]
+
+
+def time_step(eps: Any, *maps: BirationalMap) -> Any:
+    """The time step at eps, a number or an element of a field; None where the maps have none, or not the same."""
+    steps = _time_steps(maps)
+    return 2 * steps[0] * eps if len(steps) == 1 else None
+
+
 def convention(*maps: BirationalMap) -> str:
-    """The sentence for the maps of which a record speaks together."""
-    with_eps = [map_ for map_ in maps if map_.has_eps]
-    if not with_eps:
+    """The sentence that every record carries, for the maps of which it speaks together."""
+    if maps and not any(map_.has_eps for map_ in maps):
         return NO_EPS
-    return CONVENTION if any(map_.has_time_step for map_ in with_eps) else NO_TIME_STEP
+    steps = [f"{2 * steps} eps" for steps in _time_steps(maps)]
+    if len(steps) > 1:
+        return f"eps is the paper's epsilon, the time steps of the maps are {' and '.join(steps)}"
+    return f"eps is the paper's epsilon, the time step is {steps[0]}" if steps else NO_TIME_STEP
+
+
+def eps_share(map_: BirationalMap) -> str:
+    """The same of one map, the other way round: "eps is half the time step"; empty where it has none."""
+    if not map_.time_steps:
+        return ""
+    return f"eps is {'half' if map_.time_steps == 1 else f'{fmpq(1, 2 * map_.time_steps)} of'} the time step"
+
+
+def eps_record(eps: fmpq | None, *maps: BirationalMap) -> dict[str, str | None]:
+    """What every record says of eps, None standing for every one: its value, the time step, and what eps is.
+
+    The value is None where the maps do not depend on eps.
+    """
+    meaning, step = convention(*maps), time_step(1 if eps is None else eps, *maps)
+    return {
+        "eps": None if meaning == NO_EPS else "every" if eps is None else format_number(eps),
+        "time_step": None if step is None else "every" if eps is None else format_number(step),
+        "convention": meaning,
+    }
+
+
+def eps_words(context: Mapping[str, Any]) -> str:
+    """For which eps a record speaks, with the time step where there is one, to follow the name of the map."""
+    meaning = context.get("convention", CONVENTION)
+    if meaning == NO_EPS:
+        return ""
+    multiple, step = meaning.rpartition(" is ")[2], context["time_step"]
+    if context["eps"] == "every":
+        return f", every eps{'' if step is None else f' (the time step is {multiple})'}"
+    return f", eps = {context['eps']}{'' if step is None else f' (time step {multiple} = {step})'}"
+
+
+def eps_told(eps: fmpq | None, *maps: BirationalMap) -> str:
+    """The words for an eps and maps.
+
+    >>> eps_told(fmpq(1, 10)), eps_told(None)
+    (', eps = 1/10 (time step 2 eps = 1/5)', ', every eps (the time step is 2 eps)')
+    """
+    return eps_words(eps_record(eps, *maps))

@@ -53,6 +53,7 @@ class MapOver(ABC):
     eps: Any
     dim: int
     variables: tuple[str, ...] = ()
+    flow: tuple[Any, Any] | None = None  # that it approximates, where it does: of which field, and for which time
 
     @property
     @abstractmethod
@@ -63,6 +64,11 @@ class MapOver(ABC):
     @abstractmethod
     def inverse(self) -> MapOver:
         """The inverse map. Raises InputError where it is not known."""
+
+    def written(self) -> dict[str, Any]:
+        """What it is, as plain data for records: eps is None where it differs, the time step where there is no flow."""
+        eps, step = (None if x is None else self.field.format(x) for x in (self.eps, self.flow and self.flow[1]))
+        return {"map": repr(self), "eps": eps, "time_step": step}
 
     @property
     def equations(self) -> tuple[Equation, ...]:
@@ -116,7 +122,9 @@ class MapOver(ABC):
         n, one = self.dim, self.field.one
         units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
         rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # 1 x~ - x
-        return EquationMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, variables=self.variables)
+        found = EquationMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, variables=self.variables)
+        found.flow = self.flow and (self.flow[0], self.field.zero)
+        return found
 
     def __eq__(self, other: object) -> bool:
         """Whether the equations of the steps are the same, one after the other."""
@@ -214,9 +222,20 @@ class ComposedMapOver(MapOver):
         """The inverses in the opposite order."""
         return ComposedMapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
 
+    @cached_property
+    def flow(self) -> tuple[Any, Any] | None:  # type: ignore[override]  # nobody writes it
+        """That of the parts for the sum of their times, where it is one."""
+        flows = [part.flow for part in self.parts]
+        known = [flow for flow in flows if flow is not None]
+        if len(known) < len(flows) or any(field != known[0][0] for field, _ in known):
+            return None
+        with self.field.working():
+            return known[0][0], sum((time for _, time in known), self.field.zero)
+
     def __repr__(self) -> str:
         eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
-        return f"ComposedMapOver({', '.join(self.variables)}; {eps}, over {self.field})"
+        step = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
+        return f"ComposedMapOver({', '.join(self.variables)}; {eps}{step}, over {self.field})"
 
 
 class StepOver(MapOver):
@@ -348,7 +367,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
 
     variables: tuple[str, ...]
     title: str  # what kind of map it is, in a word or two
-    has_time_step: bool = True  # which is 2 eps
+    time_steps: int = 1  # of 2 eps each, by which a step advances the flow that it approximates; 0 without one
     denominator_name = "det M"
     root: Root | None = None  # the algebraic number in the coefficients, where there is one
 
@@ -438,8 +457,8 @@ class ImplicitMap(BirationalMap):
 
     Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows
     of the inverse map where they are known; else, where M and r are of degree 1 in the variables, exchanging the points
-    gives it, and elimination elsewhere. `title` says in a word or two what kind of map it is, `has_time_step` that it
-    approximates a flow for the time 2 eps, `of_field` which one, in the first of the variables, where that is known.
+    gives it, and elimination elsewhere. `title` says in a word or two what kind of map it is, `time_steps` is 1 where
+    it approximates a flow for the time 2 eps, that of `of_field` in the first of the variables, where that is known.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -450,7 +469,7 @@ class ImplicitMap(BirationalMap):
     variables: tuple[str, ...]
     rows: Rows
     title: str
-    has_time_step: bool = False
+    time_steps: int = 0
     backward: Rows | None = None
     of_field: PolynomialField | None = None
     _last: list[tuple[Field, Any, EquationMap]] = field(default_factory=list, init=False, repr=False)

@@ -25,6 +25,7 @@ from kahanmaps.algebra.written.numerals import wrong_kind
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver, nonzero_eps
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
@@ -97,11 +98,6 @@ class KahanMapOver(StepOver):
         with self.field.working():
             return self.local.value(self.point(point))
 
-    def vector_field_jacobian(self, point: Sequence[Any]) -> Any:
-        """f'(x)."""
-        with self.field.working():
-            return self.local.jacobian(self.point(point))
-
 
 class KahanMap(DisplayedAsFormula, KahanMapOver):
     """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
@@ -141,6 +137,13 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
         """The inverse map, Phi(., -eps) for the same vector field, whatever eps is in its coefficients."""
         with self.field.working():
             return KahanMap(self.system, -self.eps, self.field, self.values, self._inside)
+
+    @property
+    def flow(self) -> tuple[Any, Any]:  # type: ignore[override]  # nobody writes it
+        """That of the system, with the values of its symbols, for the time step."""
+        symbols = self._inside if "eps" in self.system.symbols else None, *self.values
+        with self.field.working():
+            return (str(self.system), symbols), time_step(self.eps)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return KahanMap, (self.system, self.eps, self.field, self.values, self._inside)

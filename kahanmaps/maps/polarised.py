@@ -73,7 +73,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
         forward.append((*zero, *ahead, -known[0][i] - right))
         backward.append((*behind, *zero, -known[-1][i] + right))
     field = PolynomialField(tuple(substitute(f, {rest[-1]: fmpq(0)}) for f in rhs), rest[:-1])
-    return ImplicitMap(variables, tuple(forward), TITLE, has_time_step=True, backward=tuple(backward), of_field=field)
+    return ImplicitMap(variables, tuple(forward), TITLE, time_steps=1, backward=tuple(backward), of_field=field)
 
 
 def _linear_in_one_point(

@@ -45,9 +45,9 @@ def draw_scan(
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.scan.scan import scan
-    >>> figure = draw_scan(scan(load("zhukovski_volterra_2"), ["b1", "b2"], terms=3, primes=[11, 13, 17]))
+    >>> figure = draw_scan(scan(load("lotka_volterra"), ["a", "c"], terms=2, primes=[5, 7, 11]))
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
-    ['quadratic growth']
+    ['linear growth']
     """
     if len(found.over) != 2:
         raise InputError(f"found a scan over {', '.join(found.over)}, expected two parameters: a plane is drawn")

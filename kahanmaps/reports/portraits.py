@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import counted
+from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
@@ -61,9 +61,7 @@ def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
             remarks.append(f"{shown.left_out} of {found.points[..., 0].size} points lie outside the window.")
         return draw_portrait(shown, style)
 
-    step = f", time step {format_number(2 * at)}" if file.map.has_time_step else ""
-    sentence = f"eps = {format_number(at)}{step}, " if file.map.has_eps else ""
-    sentence += f"{_STEPS} steps in machine numbers"
+    sentence = f"{eps_told(at, file.map)}, {_STEPS} steps in machine numbers".removeprefix(", ")
     caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {' and '.join(axes)}: {sentence}."
     return pictures.draw(
         "portrait", caption, f"Portrait of orbits in {' and '.join(axes)}, {sentence}", drawing, remarks
@@ -85,7 +83,7 @@ def invariant_curves_figure(file: SystemFile, eps: Any, pictures: Pictures) -> s
         )
         return draw_invariant_curves(found, style)
 
-    sentence = f"eps = {format_number(at)}, time step {format_number(2 * at)}, {_CURVE_STEPS} steps"
+    sentence = f"{eps_told(at)}, {_CURVE_STEPS} steps".removeprefix(", ")
     caption = f"{_ORBITS} orbits in the planes of the normal form, and the invariant curves through them: {sentence}."
     return pictures.draw(
         "invariant-curves", caption, f"Invariant plane cubics with orbits on them, {sentence}", drawing, remarks

@@ -6,12 +6,13 @@ which moduli and precisions are allowed, and what a ball may be said to be.
 
 import random
 from fractions import Fraction
+from itertools import product
 
 import flint
 import numpy as np
 import pytest
 from flint import acb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mod_ctx, nmod
-from helpers import FIELDS, SMALLEST_LARGE_PRIME, encloses, over_exact_fields, rationals, some
+from helpers import FIELDS, SMALLEST_LARGE_PRIME, encloses, over_exact_fields, rationals, some, together
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -23,7 +24,8 @@ from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.matrices import nullspace, rank
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 
-over_all_fields = pytest.mark.parametrize("field", [*FIELDS, CC(128)], ids=repr)
+ALL_FIELDS = [*FIELDS, CC(128)]
+over_all_fields = pytest.mark.parametrize("field", ALL_FIELDS, ids=repr)
 over_balls = pytest.mark.parametrize("balls", [RR, CC], ids=["RR", "CC"])
 
 integers = st.integers(-(10**30), 10**30)
@@ -51,15 +53,13 @@ def test_integers_fractions_and_text_stand_for_exact_numbers(value, expected):
 MACHINE_NUMBERS = [0.1, -0.0, float("nan"), float("inf"), 1e300, 1j, np.float64(0.1), np.float32(0.5)]
 
 
-@pytest.mark.parametrize("value", MACHINE_NUMBERS, ids=repr)
-@over_all_fields
+@together("field, value", product(ALL_FIELDS, MACHINE_NUMBERS))
 def test_a_machine_number_is_refused_by_every_field(field, value):
     with pytest.raises(InexactNumber, match="machine number"):
         field.convert(value)
 
 
-@pytest.mark.parametrize("value", [True, None, (1, 2), {}, b"1", pytest.param(object(), id="an object")], ids=repr)
-@over_all_fields
+@together("field, value", product(ALL_FIELDS, [True, None, (1, 2), {}, b"1", object()]))
 def test_what_is_no_number_is_refused_by_every_field(field, value):
     with pytest.raises(InputError, match="expected"):
         field.convert(value)

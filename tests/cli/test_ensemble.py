@@ -216,3 +216,15 @@ def test_a_normal_form_in_coordinates_of_its_own_is_for_single_orbits(kahanmaps,
     assert kahanmaps(*command, "--json").json["method"] == "generic"
     outcome = kahanmaps(*command, "--method normal-form")
     assert (outcome.status, "J = [[0, I], [-I, 0]] only" in outcome.err) == (2, True)
+
+
+@pytest.mark.parametrize("arithmetic", ["float", "mod:7"])
+def test_integrals_may_contain_an_algebraic_parameter(kahanmaps, tmp_path, arithmetic):
+    """Modulo 7 the first root of t^2 - 2 is 3; its square is 2 for both."""
+    path = tmp_path / "s.txt"
+    path.write_text("1/2,1/3,1/5,1/11\n")
+    command = f"ensemble henon_heiles -p c='sqrt(2)' --eps 1/10 --steps 0 --arithmetic {arithmetic} --json"
+    record = kahanmaps(command, "--integral c*c --integral c*c*q1 --starts", path).json
+    if arithmetic == "float":
+        assert [one["initial"] for one in record["drift"]] == pytest.approx([2, 1])
+    assert [one["orbits"] for one in record["drift"]] == [1, 1]

@@ -26,12 +26,12 @@ from helpers import table
 from small_databases import ok, planned
 
 from kahanmaps.errors import InputError
+from kahanmaps.maps.orbits.stored import read_orbits
 from kahanmaps.plots.degree_records import degrees_of_record
 from kahanmaps.plots.height_curves import curves_of_record
 from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli.main import main
 from kahanmaps_cli.pictures.growth import read_record
-from kahanmaps_cli.pictures.stored import read_orbits
 from kahanmaps_cli.runs.ensemble_starts import read_starts
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder
 

@@ -3,6 +3,7 @@
 import click
 import pytest
 from command_tree import all_commands, all_examples, examples_in, words_of
+from helpers import together
 
 from kahanmaps_cli.main import COMMANDS, SECTIONS, cli
 
@@ -26,27 +27,27 @@ def parsed(words: list[str]) -> None:
             raise
 
 
-@pytest.mark.parametrize("words", COMMANDS_AND_GROUPS, ids=lambda words: words or "kahanmaps")
+@together("words", COMMANDS_AND_GROUPS)
 def test_help_fits_80_columns(kahanmaps, monkeypatch, words):
     monkeypatch.setenv("COLUMNS", "80")
     assert [line for line in kahanmaps(words, "--help").out.splitlines() if len(line) > 80] == []
 
 
-@pytest.mark.parametrize("words", COMMANDS_AND_GROUPS, ids=lambda words: words or "kahanmaps")
+@together("words", COMMANDS_AND_GROUPS)
 def test_examples_come_right_after_the_first_sentence(words):
     help_text = dict(all_commands())[words].help or ""
     _, second, *_ = [*help_text.split("\n\n"), "", ""]
     assert examples_in(second)
 
 
-@pytest.mark.parametrize("words", COMMANDS_AND_GROUPS, ids=lambda words: words or "kahanmaps")
+@together("words", COMMANDS_AND_GROUPS)
 def test_the_first_paragraph_is_one_sentence_or_question(words):
     first = " ".join((dict(all_commands())[words].help or "").split("\n\n")[0].split())
     assert first[-1] in ".?"
     assert ". " not in first.replace("e.g. ", "")
 
 
-@pytest.mark.parametrize("example", all_examples())
+@together("example", all_examples())
 def test_the_options_of_an_example_are_understood(example):
     parsed(words_of(example))
 

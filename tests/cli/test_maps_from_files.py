@@ -27,7 +27,7 @@ def test_the_orbit_command_takes_every_map_and_every_arithmetic(kahanmaps, name,
     out = kahanmaps(f"orbit {path} --start {start}{eps} --steps 3 --arithmetic {arithmetic} --format jsonl -q").out
     header, *points, end = map(json.loads, out.splitlines())
     assert [mistakes("orbit", line) for line in (header, *points, end)] == [[]] * 6
-    assert (header["time_step"] is None) == (not file.map.has_time_step)
+    assert (header["time_step"] is None) == (not file.map.time_steps)
     assert ("equations" in header) == (file.kind != "system" or file.name == "duffing")
     assert end["status"] == "completed"
 

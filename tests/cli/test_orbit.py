@@ -87,6 +87,13 @@ def test_at_picks_iterates(kahanmaps):
     assert picked[1:-1] == [every[1 + step] for step in (0, 4, 6)]
 
 
+@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:80"])
+def test_integrals_have_values_where_the_map_does_not_depend_on_eps(kahanmaps, arithmetic):
+    lyness = "orbit --vars x,y --image 'y; (3 + y)/x' --start 1,2 --steps 3 --integral x*y --arithmetic"
+    found = [record["integrals"]["x*y"] for record in kahanmaps(f"{lyness} {arithmetic} --format jsonl").records[1:-1]]
+    assert [float(Fraction(text.strip("[]"))) for text in found[:3]] == [2, 10, 20]
+
+
 # Where the system comes from
 
 
@@ -170,7 +177,7 @@ def test_npz_holds_integrals_with_a_mark_for_poles(npz, arithmetic, first):
 
 
 def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monkeypatch):
-    monkeypatch.setattr("kahanmaps_cli.runs.orbit_formats.MAX_PADDED_BYTES", 1000)
+    monkeypatch.setattr("kahanmaps.maps.orbits.writers.MAX_PADDED_BYTES", 1000)
     found = npz(f"{TOP} --steps 20")
     assert (found.status, found.meta["end"]["status"]) == (3, "budget")
     assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))
@@ -246,6 +253,12 @@ def test_in_narrow_columns_long_numbers_are_decimals_with_their_digits_as_well()
     assert "..." not in out
     assert "# (30/28): digits above and below the line" in out
     assert "(30/28)" not in terminal(*shlex.split(f"{TOP} --steps 1"), columns=64).out
+
+
+def test_balls_stand_below_each_other_where_columns_would_leave_nothing_of_them():
+    out = terminal(*shlex.split(f"{TOP} --steps 2 --arithmetic ball:200"), columns=60).out
+    lines = re.findall(r"^  x[123] = \[?-?[0-9.]+.*", out, re.MULTILINE)
+    assert (len(lines), max(map(len, lines)) <= 60) == (9, True)
 
 
 def test_npz_is_refused_on_a_terminal():

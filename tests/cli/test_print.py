@@ -22,8 +22,8 @@ def test_print_shows_what_the_command_prints(kahanmaps):
         (lambda: km.darboux_polynomials("lotka_volterra", 2), "find-integrals lotka_volterra --darboux 2"),
         (lambda: km.find_poisson("lorenz", 1), "find-poisson lorenz --degree 1"),
         (
-            lambda: km.scan("henon_heiles", ["c"], primes=[5, 7, 11], terms=2),
-            "scan henon_heiles --over c --primes 5,7,11 --terms 2",
+            lambda: km.scan("lotka_volterra", ["a"], primes=[5, 7, 11], terms=2),
+            "scan lotka_volterra --over a --primes 5,7,11 --terms 2",
         ),
     ],
 )

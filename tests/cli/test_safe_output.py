@@ -47,7 +47,7 @@ COMMANDS = [
     "batch export --db r.db --csv",
     "batch show KEY --db r.db",
     f"plot drift {ORBIT} --format svg --title <script>\x1b[31m",
-    "analyze s.toml --seconds 1 --markdown",
+    "analyze s.toml --seconds 0.2 --markdown",
     "report s.toml --from checks --no-pictures -o -",
     *(f"convert s.toml --to {language}" for language in ("pari", "latex", "mathematica")),
 ]

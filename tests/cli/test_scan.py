@@ -9,7 +9,7 @@ import tomllib
 import pytest
 from cli_helpers import COMMAND
 
-QUICK = "henon_heiles --over c --terms 3 --primes 11,13,17"
+QUICK = "lotka_volterra --over a --terms 3 --primes 11,13,17"
 FAMILY_OF_PLANES = """--rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --terms 4"""
 PLANE = f"{FAMILY_OF_PLANES} --primes 31,37,41"
 
@@ -25,16 +25,24 @@ def begun(command, kept):
 
 
 def test_blocks_say_degrees_growth_and_where(kahanmaps):
-    outcome = kahanmaps("scan henon_heiles --over c --terms 4 --primes 101,103,107")
+    outcome = kahanmaps(f"scan {PLANE}")
     assert (outcome.status, outcome.err) == (0, "")
     assert outcome.out.splitlines() == [
-        "# scan: henon_heiles over c, every eps (the time step is 2 eps)",
-        "in general\t3, 7, 17, 39",
-        "degrees\t3, 5, 9, 13\tquadratic growth, dynamical degree 1, explained",
-        "at c =\t-1",
+        "# scan: inline over g, every eps (the time step is 2 eps)",
+        "in general\t2, 4, 8, 16",
+        "degrees\t1, 1, 1, 1\tbounded growth, dynamical degree 1, measured",
+        "at g =\t-2",
+        "degrees\t2, 2, 2, 2\tbounded growth, dynamical degree 1, explained",
+        "at g =\t-1",
+        "degrees\t2, 4, 6, 8\tlinear growth, dynamical degree 1, explained",
+        "at g =\t0",
+        "degrees\t2, 4, 7, 12\tquadratic growth, dynamical degree 1, explained",
+        "at g =\t2",
+        "degrees\t2, 4, 8, 13\tquadratic growth, dynamical degree 1, explained",
+        "at g =\t1",
         "growth\tthat of one member; singularities were followed for 40 steps",
-        "tried\tall members with parameters modulo 101, 103, 107; found are single points, where one of the first 4 "
-        "degrees is smaller, over Q with numerators and denominators up to 72; points over number fields of degree d "
+        "tried\tall members with parameters modulo 31, 37, 41; found are single points, where one of the first 4 "
+        "degrees is smaller, over Q with numerators and denominators up to 23; points over number fields of degree d "
         "up to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo "
         "which they have residues",
         "left\tnone: every slow member that was seen is on a component",
@@ -42,17 +50,17 @@ def test_blocks_say_degrees_growth_and_where(kahanmaps):
 
 
 def test_the_json_has_what_is_needed_to_run_it_again_and_files_of_an_earlier_scan_are_replaced(kahanmaps, tmp_path):
-    for name in ("henon_heiles-1.toml", "henon_heiles-2.toml", "henon_heiles-x.toml"):
+    for name in ("lotka_volterra-1.toml", "lotka_volterra-2.toml", "lotka_volterra-x.toml"):
         (tmp_path / name).write_text("old")
     found = kahanmaps(f"scan {QUICK} --seed 3 --json --write-to {tmp_path}").json
-    assert (found["command"], found["over"], found["seed"], found["eps"]) == ("scan", ["c"], 3, "every")
-    assert found["document"]["name"] == "henon_heiles"
+    assert (found["command"], found["over"], found["seed"], found["eps"]) == ("scan", ["a"], 3, "every")
+    assert found["document"]["name"] == "lotka_volterra"
     ((only,),) = [one["components"] for one in found["classes"]]
-    assert (only["equations"], only["values"], only["growth"]) == (["c + 1"], {"c": "-1"}, "quadratic")
+    assert (only["equations"], only["values"], only["growth"]) == (["a + 1"], {"a": "-1"}, "linear")
     assert (only["confirmed"], only["tried"], only["primes"]) == (3, 3, [11, 13, 17])
     assert [one["seen"] for one in found["sweeps"]] == [11, 13, 17]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["henon_heiles-1.toml", "henon_heiles-x.toml"]
-    assert tomllib.loads((tmp_path / "henon_heiles-1.toml").read_text())["parameters"] == {"c": "-1"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lotka_volterra-1.toml", "lotka_volterra-x.toml"]
+    assert tomllib.loads((tmp_path / "lotka_volterra-1.toml").read_text())["parameters"]["a"] == "-1"
 
 
 def test_an_inline_system_need_not_declare_what_varies(kahanmaps, tmp_path):
@@ -70,7 +78,7 @@ def test_an_inline_system_need_not_declare_what_varies(kahanmaps, tmp_path):
 def test_members_are_printed_as_system_files(kahanmaps):
     found = kahanmaps(f"scan {QUICK} --toml").out
     assert found.startswith("# -1\n")
-    assert tomllib.loads(found)["parameters"] == {"c": "-1"}
+    assert tomllib.loads(found)["parameters"]["a"] == "-1"
 
 
 def test_verdicts_are_asked_for(kahanmaps):
@@ -99,7 +107,7 @@ def test_the_time_may_be_over(kahanmaps):
 
 
 def test_ctrl_c_ends_it_with_what_was_seen(tmp_path):
-    process = begun("henon_heiles --over c --primes 7,8101,8111,8117 --terms 7", tmp_path / "kept.jsonl")
+    process = begun(f"{FAMILY_OF_PLANES} --primes 7,8101,8111,8117", tmp_path / "kept.jsonl")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -111,7 +119,7 @@ def test_ctrl_c_ends_it_with_what_was_seen(tmp_path):
 
 def test_a_scan_that_was_killed_goes_on_where_it_was(kahanmaps, tmp_path):
     kept = tmp_path / "kept.jsonl"
-    command = f"{FAMILY_OF_PLANES} --primes 31,37,41,83,89"
+    command = "lotka_volterra --over a --terms 3 --primes 31,37,41,83,89"
     process = begun(command, kept)
     process.kill()
     process.communicate()
@@ -143,7 +151,7 @@ def test_what_is_not_kept_of_this_scan_is_refused(kahanmaps, tmp_path):
     outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept --seed 1")
     assert (outcome.status, outcome.out) == (2, "")
     assert "of a scan with another seed, expected one of this scan" in outcome.err
-    for text in ("name = 1\n", (tmp_path / "kept").read_text().replace('"generic": [3,', '"generic": ["q",')):
+    for text in ("name = 1\n", (tmp_path / "kept").read_text().replace('"generic": [2,', '"generic": ["q",')):
         (tmp_path / "other").write_text(text)
         assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
         assert (tmp_path / "other").read_text() == text

@@ -9,22 +9,27 @@ from pathlib import Path
 
 import pytest
 from cli_helpers import with_its_file
-from helpers import table
+from helpers import table, together
 
 from kahanmaps.checks.table import CHECKS
 
 TABLE = table(Path(__file__).with_name("wrong_use.txt"))
-CASES = [tuple(line.split(" => ")) for lines in TABLE.values() for line in lines]
-CASES.append(("check euler_top", f"Did you mean {' or '.join(CHECKS)}?"))
+TABLE["checks are listed"] = [f"check euler_top => Did you mean {' or '.join(CHECKS)}?"]
 
 
-@pytest.mark.parametrize("case", CASES, ids=[command[:70] for command, *_ in CASES])
-def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, case):
-    monkeypatch.chdir(tmp_path)
-    command, *expected = case
-    outcome = kahanmaps(with_its_file(command))
-    assert (outcome.status, outcome.out, len(list(tmp_path.iterdir()))) == (2, "", " <= " in command)
-    said = " ".join(outcome.err.split())
-    for words in expected:
-        assert (words.removeprefix("not: ") in said) is not words.startswith("not: ")
-    assert "Traceback" not in outcome.err
+@pytest.mark.parametrize("lines", TABLE.values(), ids=TABLE.keys())
+def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, lines):
+    @together("line", lines)
+    def each(line):
+        command, *expected = line.split(" => ")
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        outcome = kahanmaps(with_its_file(command))
+        assert (outcome.status, outcome.out, len(list(folder.iterdir()))) == (2, "", " <= " in command)
+        said = " ".join(outcome.err.split())
+        for words in expected:
+            assert (words.removeprefix("not: ") in said) is not words.startswith("not: ")
+        assert "Traceback" not in outcome.err
+
+    each()

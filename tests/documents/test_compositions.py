@@ -35,7 +35,7 @@ def test_a_word_in_files_catalogue_and_tables_is_what_its_letters_do(tmp_path):
     assert file.map.at(EPS).inverse.step(expected) == START
     assert file.variables == ("x", "y")
     assert file.map.has_eps
-    assert not file.map.has_time_step
+    assert not file.map.time_steps
 
 
 def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):

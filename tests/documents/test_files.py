@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from check_helpers import hamiltonians
 from flint import fmpq, fmpq_mat
-from helpers import rationals, systems, table
+from helpers import rationals, systems, table, together
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -301,7 +301,7 @@ def wrong_files():
         for line in lines:
             piece, expected, *words = line.split(" => ")
             text = heading.replace("@", piece).replace("\\n", "\n")
-            yield pytest.param(text, expected.split(", "), words, id=piece[:70])
+            yield text, expected.split(", "), words
 
 
 # What is too long for it, or no text.
@@ -318,7 +318,7 @@ LARGE = {
 }
 
 
-@pytest.mark.parametrize(("text", "expected", "words"), [*wrong_files()])
+@together("text, expected, words", wrong_files())
 def test_a_wrong_file_is_told_its_mistakes_by_key(text, expected, words):
     found = mistakes(text)
     assert [key for key, _ in found] == expected

@@ -11,14 +11,14 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import decide
 from kahanmaps.checks.preserve import check_measure, check_poisson, density_identity
-from kahanmaps.checks.settings import Settings, eps_words
+from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
-from kahanmaps.maps.convention import CONVENTION, NO_EPS, NO_TIME_STEP
+from kahanmaps.maps.convention import CONVENTION, NO_EPS, NO_TIME_STEP, eps_words
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.orbit import orbit
 

@@ -5,11 +5,12 @@ Whatever is no value of an option is told in a sentence (InputError), with what 
 
 import json
 from datetime import date, time
+from itertools import product
 from typing import Any
 
 import pytest
 from flint import fmpq, fmpq_poly
-from helpers import rationals
+from helpers import rationals, together
 from hypothesis import given
 
 from kahanmaps.errors import InputError
@@ -128,14 +129,10 @@ def test_what_is_no_value_is_told_in_a_sentence(name, value, words):
     assert words in refused(name, value)
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if name != "other"])
-@pytest.mark.parametrize(
-    "value",
-    [
-        None, True, -7, 10**4000, "", "\x1b[31m", "1..2", "a" * 10_000, [1], {}, time(7, 32),
-    ],
-    ids=lambda value: show(value)[:12],
-)  # fmt: skip
+ANYTHING = (None, True, -7, 10**4000, "", "\x1b[31m", "1..2", "a" * 10_000, [1], {}, time(7, 32))
+
+
+@together("name, value", product([name for name in ALL if name != "other"], ANYTHING))
 def test_whatever_is_written_is_read_or_refused_in_a_short_sentence(name, value):
     try:
         json.dumps(ALL[name].read(value))
@@ -164,14 +161,14 @@ def test_a_value_is_shown_as_a_spec_has_it_and_short(value, shown):
 # The vocabulary
 
 
-@pytest.mark.parametrize("option", ALL.values(), ids=ALL.keys())
+@together("option", ALL.values())
 def test_every_option_has_a_name_and_a_help(option: Option):
     assert ALL[option.name] is option
     assert option.help.strip()
     assert len(option.help) <= 80
 
 
-@pytest.mark.parametrize("name", VOCABULARY)
+@together("name", VOCABULARY)
 def test_every_option_of_the_vocabulary_is_used_by_a_task_of_the_library(name):
     ours = [kind for kind in task_kinds().values() if kind.function.__module__ in registry.LIBRARY]
     assert any(name in kind.options for kind in ours)

@@ -200,7 +200,7 @@ def test_jobs_are_taken_one_by_one_as_they_are_needed():
     assert taken < 110
 
 
-@pytest.mark.parametrize(("kills", "last"), [(3, 200), pytest.param(50, 12_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "last"), [(1, 80), pytest.param(50, 12_000, marks=pytest.mark.slow)])
 def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path, kills: int, last: int):
     text = PAUSES.format(milliseconds=4, last=last)
     (tmp_path / "spec.toml").write_text(text)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import table
+from helpers import table, together
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from specs import LORENZ, mistakes
@@ -52,7 +52,7 @@ CASES = {
 SYSTEMS = CASES.pop("a system")
 
 
-@pytest.mark.parametrize(("text", "expected"), [case for cases in CASES.values() for case in cases])
+@together("text, expected", [case for cases in CASES.values() for case in cases])
 def test_a_mistake_is_told_once_with_its_key(text, expected):
     wanted = [words.split(": ", 1) for words in expected.split(" ;; ")]
     found = mistakes(text)

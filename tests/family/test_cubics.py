@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import pytest
 from flint import fmpq_mat, fmpq_poly
+from helpers import random_skew_hamiltonian
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +18,7 @@ from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import HypothesisError
 from kahanmaps.family.cubics import belongs, chain, cubic_space, default_variables, potential, require_member
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.skew_hamiltonian import diagnosis, is_generic, minimal_degree, random_skew_hamiltonian
+from kahanmaps.family.skew_hamiltonian import diagnosis, is_generic, minimal_degree
 
 t = fmpq_poly([0, 1])
 DIAGONAL = fmpq_mat([[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]])

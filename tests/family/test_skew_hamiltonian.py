@@ -8,6 +8,7 @@ import random
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
+from helpers import random_skew_hamiltonian
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,7 +21,6 @@ from kahanmaps.family.skew_hamiltonian import (
     diagnosis,
     factors_of_chi,
     is_generic,
-    random_skew_hamiltonian,
     random_symplectic,
     require_skew_hamiltonian,
     symplectic_inverse,

@@ -1,6 +1,7 @@
 """Cofactors, their products, and the polynomials that have them."""
 
 import pytest
+from helpers import DIMENSION
 from search_helpers import system
 
 from kahanmaps.documents.catalog import load, names
@@ -22,7 +23,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
 )
 from kahanmaps.maps.kahan import Kahan
 
-SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]
+SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4]
 ONE = CofactorProduct((), 0)
 
 

@@ -4,7 +4,7 @@ import random
 
 import pytest
 from flint import arb, fmpq
-from helpers import quick
+from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +17,7 @@ from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
-PLANAR = [name for name in (*names(), *map_names()) if load(name).dim == 2]
+PLANAR = [name for name in (*names(), *map_names()) if DIMENSION[name] == 2]
 POSITIVE = ["lotka_volterra", "fibonacci", "hietarinta_viallet", "zander_120", "lotka_volterra_symplectic_euler"]
 
 
@@ -32,7 +32,7 @@ def test_the_bounds_enclose_the_dynamical_degree_that_is_explained(name):
     "name", quick([name for name in PLANAR if name not in POSITIVE], ["harmonic", "nahm_tetrahedral", "mcmillan"])
 )
 def test_no_map_of_slow_growth_gets_a_bound(name):
-    assert enclose(load(name).map, None, seconds=3) is None
+    assert enclose(load(name).map, None, seconds=1) is None
 
 
 @given(st.integers(1, 10**6), st.integers(7, 200))

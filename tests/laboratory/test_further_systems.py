@@ -24,7 +24,7 @@ from check_helpers import (
     slope,
     unit,
 )
-from helpers import fraction
+from helpers import fraction, together
 from search_helpers import ranks
 
 from kahanmaps.algebra.written.text import parse_rational_function
@@ -149,7 +149,7 @@ def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
     assert all(len(values) > 1 for values in seen)  # no constants
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@together("name", KNOWN)
 def test_the_answers_count_their_independent_integrals(name):
     known = KNOWN[name]
     _, rank, _ = ranks([], formulas(name), Laboratory(file_of(name)).maps[0])

@@ -1,7 +1,6 @@
 """Relations along orbits: the dimensions of the literature, none for systems without integrals, points where orbits
 close."""
 
-from math import comb
 from types import SimpleNamespace
 
 import pytest
@@ -60,18 +59,21 @@ def test_as_many_points_as_are_independent_make_all_relations(name, degree):
     assert relations_on_orbit(other, degree, independent - 1).dimension == every.dimension
 
 
-@pytest.mark.parametrize(
-    "independent",  # monomials of degree at most d
-    [
-        lambda d: comb(d + 2, 2),  # in the plane
-        lambda d: comb(d + 3, 3) - comb(d + 1, 3),  # on a quadric in dimension 3
-        lambda d: 3 * d + 1,  # on the twisted cubic
-    ],
-)
-def test_macaulays_bound_holds_and_is_reached(independent):
-    assert all(module._most(independent(d), d) >= independent(d + 1) for d in range(1, 9))
-    assert module._most(independent(8), 8) == independent(9)
-    assert module._most(independent(8) - 1, 8) < independent(9)
+@pytest.mark.parametrize(("name", "degree"), [("euler_top", 4), ("volterra_periodic_3", 5), ("paper_m2", 4)])
+def test_multiples_of_relations_of_lower_degrees_may_be_left_out(name, degree):
+    leading = frozenset()
+    for d in range(1, degree + 1):
+        map_, other = maps(load(name))[0], maps(load(name))[0]  # the same orbit
+        every, some = relations_on_orbit(map_, d), relations_on_orbit(other, d, leading=leading)
+        assert (some.dimension, some.normals, some.end) == (every.dimension, every.normals, every.end)
+        assert leading <= some.leading <= every.leading
+        leading = some.leading
+    assert some.kernel.ncols() < every.kernel.ncols()
+
+
+def test_what_leads_no_relation_of_this_orbit_is_not_left_out():
+    map_ = maps(load("lorenz"))[0]
+    assert relations_on_orbit(map_, 3, leading=frozenset({(1, 0, 0)})).dimension == 0
 
 
 def test_a_perturbed_system_loses_its_relations():
@@ -117,7 +119,7 @@ def test_there_are_not_too_many_unknowns(monkeypatch):
 def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, with_known, monkeypatch):
     maps = [SimpleNamespace(dim=3, prime=101, step=lambda x: x, random_point=lambda: (1, 2, 3)) for _ in range(2)]
 
-    def along(map_, degree, most=None):
+    def along(map_, degree, leading):
         count, codimension, period = degrees[degree - 1][next(k for k, one in enumerate(maps) if one is map_)]
         return OrbitRelations(nmod_mat(0, 0, 101), count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ())
 

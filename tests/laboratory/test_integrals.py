@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from flint import fmpq
+from helpers import DIMENSION
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from search_helpers import random_system, ranks, system, values_on_orbits
@@ -22,7 +23,7 @@ from kahanmaps.laboratory.preserve.integrals import (
 )
 from kahanmaps.laboratory.preserve.results import closing_note
 
-PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
+PLANE_AND_SPACE = [name for name in names() if DIMENSION[name] <= 4]
 LONG = ("henon_heiles", "paper_m2")
 EPS = ["1/10", "-2/7", "3"]
 # All known integrals of these files are found, in closed form.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from flint import fmpz_poly
-from helpers import quick
+from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,7 +30,7 @@ def explained(name):
     return patterns(map_, None)
 
 
-WRITTEN = [name for name in (*names(), *map_names()) if load(name).dim <= 4]
+WRITTEN = [name for name in (*names(), *map_names()) if DIMENSION[name] <= 4]
 FURTHER = Path(__file__).parent / "further_systems"
 # In these several contracted hypersurfaces are zeros of one form over Q: the degrees of all of them.
 OF_ONE_FORM = {
@@ -44,7 +44,7 @@ OF_ONE_FORM = {
 
 
 @pytest.mark.parametrize(
-    "name", quick(WRITTEN, [name for name in WRITTEN if load(name).dim < 4 and name != "qrt_asymmetric"])
+    "name", quick(WRITTEN, [name for name in WRITTEN if DIMENSION[name] < 4 and name != "qrt_asymmetric"])
 )
 def test_the_degrees_of_the_catalogue_are_explained(name):
     found = degree_growth(load(name).map, seconds=30, max_degree=500)

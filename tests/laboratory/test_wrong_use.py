@@ -1,6 +1,7 @@
 """What no search of the laboratory can be asked: each names what it found, and runs nothing."""
 
 import pytest
+from helpers import together
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
@@ -48,7 +49,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("search", "given", "options", "words"), WRONG)
+@together("search, given, options, words", WRONG)
 def test_what_cannot_be_searched_is_refused(search, given, options, words):
     with pytest.raises(InputError, match=words):
         search(given, **options)

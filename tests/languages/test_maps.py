@@ -4,6 +4,7 @@ import re
 
 import pytest
 from flint import fmpq
+from helpers import DIMENSION
 from language_helpers import run_python
 
 import kahanmaps as km
@@ -13,7 +14,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.languages.convert import convert
 from kahanmaps.languages.language import LANGUAGES
 
-FILES = {name: load(name) for name in map_names() if load(name).dim < 4}
+FILES = {name: load(name) for name in map_names() if DIMENSION[name] < 4}
 FILES["adjusted"] = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y + eps*x^2", "y^2 - eps"]', "adjusted")
 PARTS = ["map", "map-formulas", "inverse"]
 EPS = "1/3"
@@ -58,7 +59,7 @@ def test_the_map_the_formulas_and_the_inverse_are_those_of_the_library(
 def test_every_language_takes_every_kind(language: str, name: str) -> None:
     text = convert(load(name), language)
     assert "Kahan map" not in text
-    assert ("time step" in text) == load(name).map.has_time_step
+    assert ("time step" in text) == bool(load(name).map.time_steps)
     assert bool(re.search(r"\beps\b", text)) == load(name).map.has_eps
 
 

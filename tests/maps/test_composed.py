@@ -12,8 +12,10 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.maps.composed import composed_map
+from kahanmaps.maps.convention import convention, eps_record, eps_share, eps_told, time_step
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble
+from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.residues.ensemble import ModularEnsemble
 
@@ -109,3 +111,46 @@ def test_a_budget_ends_a_step_between_its_factors():
     list(walk)
     assert walk.end.status == "budget"
     assert int(walk.end.message.split("numbers of ")[1].split()[0]) < 2000
+
+
+@pytest.mark.parametrize(
+    ("parts", "steps"),
+    [
+        ([(F, 3)], 3),
+        ([(F, -2)], -2),
+        ([F, (F, -1)], 0),
+        ([(composed_map((F, 2)), -1), F, F, F], 1),
+        ([F, G], 0),
+        ([F, G, (F, -1)], 0),
+        ([(LYNESS, 2)], 0),
+        ([composed_map(F, G), composed_map(F, G)], 0),
+    ],
+)
+def test_powers_of_one_map_have_its_time_step_so_many_times_and_products_of_fields_none(parts, steps):
+    word = composed_map(*parts)
+    assert word.time_steps == steps
+    assert time_step(fmpq(1, 10), word) == (fmpq(steps, 5) if steps else None)
+
+
+def test_parts_with_different_parameters_follow_different_flows():
+    scaled = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["2*x - 2*x*y", "2*x*y - 2*y"]').map
+    assert composed_map(F, scaled).time_steps == 0
+
+
+def test_the_words_tell_the_multiple_of_eps():
+    eps = fmpq(1, 10)
+    assert eps_told(eps, composed_map((F, 3))) == ", eps = 1/10 (time step 6 eps = 3/5)"
+    assert eps_told(None, composed_map((F, -2))) == ", every eps (the time step is -4 eps)"
+    assert eps_told(eps, composed_map(F, G)) == ", eps = 1/10"
+    assert eps_told(eps, LYNESS) == ""
+    assert eps_record(eps, F, composed_map((F, 2)))["time_step"] is None
+    assert convention(F, composed_map((F, 2))).endswith("the time steps of the maps are 2 eps and 4 eps")
+    assert eps_share(composed_map((F, 3))) == "eps is 1/6 of the time step"
+
+
+def test_exponents_per_unit_of_time_are_those_of_the_map_whose_power_is_taken():
+    start = [[0.5, 0.25]]
+    once = lyapunov_exponents(F, start, "1/10", 3000, transient=300)
+    cubed = lyapunov_exponents(composed_map((F, 3)), start, "1/10", 1000, transient=100)
+    assert cubed.unit == pytest.approx(3 * once.unit)
+    assert cubed.mean == pytest.approx(once.mean, rel=1e-6)  # the same orbit, summed in another order

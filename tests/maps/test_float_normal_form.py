@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly
-from helpers import HENON_HEILES
+from helpers import HENON_HEILES, quick
 
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
@@ -413,16 +413,23 @@ def test_a_complex_step_is_that_of_the_formulas(name):
         )
 
 
-@pytest.mark.parametrize("width", [1, 3, 300])
-@pytest.mark.parametrize(
-    ("name", "parts", "count"),
-    [("general", 2, 1), ("general", 4, 1)]  # there are none of several blocks
-    + [(*kind, count) for kind in (("lines", 2), ("lines", 4), ("cubes", 2)) for count in (1, 2, 5)],
-)
-def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(name, parts, count, width):
-    pytest.importorskip("numba")
-    from kahanmaps.maps.floats.numba_kernel import _sweep
+KINDS = (("lines", 2), ("lines", 4), ("cubes", 2))
+RUNS = [("general", 2, 1), ("general", 4, 1), *((*kind, count) for kind in KINDS for count in (1, 2, 5))]
 
+
+@pytest.mark.parametrize("width", [1, 3, 300])
+@pytest.mark.parametrize(("name", "parts", "count"), RUNS)
+@pytest.mark.parametrize("compiled", quick([False, True], [False]), ids=["as Python", "compiled"])
+def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(
+    name, parts, count, width, compiled, monkeypatch
+):
+    pytest.importorskip("numba")
+    from kahanmaps.maps.floats import numba_kernel
+
+    if not compiled:  # the loops as they are written; only the formulas in them are compiled, which takes no seconds
+        loops = {own: loop for own, loop in vars(numba_kernel).items() if hasattr(loop, "py_func")}
+        for own, loop in loops.items():
+            monkeypatch.setattr(numba_kernel, own, loop.py_func)
     kind = {"lines": LINES, "cubes": CUBES, "general": GENERAL}[name]
     run = float_steps.Run(kind, parts, 1, count, 0)
     k = parts_of(*BLOCKS[name])
@@ -433,10 +440,8 @@ def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(name, p
         for rows, after in zip(run.of(expected), image, strict=True):
             rows[:] = after
     flat = state.ravel().copy()
-    for sweep in (_sweep, _sweep.py_func):
-        found = flat.copy()
-        sweep(found, width, np.array(run), np.array([k]), 3, usual)
-        assert np.array_equal(found.reshape(state.shape), expected)
+    numba_kernel._sweep(flat, width, np.array(run), np.array([k]), 3, usual)
+    assert np.array_equal(flat.reshape(state.shape), expected)
     assert usual.all()
 
 

@@ -24,7 +24,10 @@ START = ["1", "1/2", "1/3"]
 
 def test_orbits_that_have_ended_are_nan_in_the_file(tmp_path):
     riccati = QuadraticSystem.from_text(["x"], ["x^2"])
-    FloatEnsemble(riccati, "1/2", np.array([[1.0], [-1.0]]), kernel="numpy").stream(tmp_path / "x.npy", 2, 1)
+    ensemble = FloatEnsemble(riccati, "1/2", np.array([[1.0], [-1.0]]), kernel="numpy")
+    with NpyFile(tmp_path / "x.npy", (2, 1)) as file:
+        for points in ensemble.records(2, 1):
+            file.append(points)
     assert np.isnan(np.load(tmp_path / "x.npy")[:, :, 0]).tolist() == [[False, False], [True, False], [True, False]]
 
 

@@ -9,7 +9,7 @@ import random
 
 import pytest
 from flint import arb, fmpq, fmpq_poly
-from helpers import encloses, quick, random_point
+from helpers import encloses, quick, random_point, together
 from planar_helpers import STARTS, before, over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ, RR
@@ -238,7 +238,7 @@ def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
             found.value(start, n)
 
 
-@pytest.mark.parametrize("name", STARTS)
+@together("name", STARTS)
 def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
     """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
     _, normal_form, start = side_by_side(name)

@@ -11,6 +11,7 @@ from math import lcm
 
 import pytest
 from flint import fmpq, fmpq_poly, fmpz, fq_default_ctx, nmod
+from helpers import together
 from planar_helpers import STARTS, Finite, planar_system, planes_over, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ
@@ -254,7 +255,7 @@ def test_a_rational_orbit_of_period_5_or_6_comes_back(h, start, period):
     assert found.meets_pole or orbit.end.period == period
 
 
-@pytest.mark.parametrize("name", STARTS)
+@together("name", STARTS)
 def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
     cubic, (U, V, W) = STARTS[name]
     block = PlanarBlock(*(fmpq(c) for c in cubic))
@@ -296,7 +297,7 @@ def test_a_number_is_reduced_at_primes_above_100_that_do_not_divide_its_denomina
 RATIONAL = {5: fmpq(32, 27), 6: fmpq(28, 27), 9: fmpq(8, 9), 12: fmpq(80, 81)}
 
 
-@pytest.mark.parametrize("period", range(1, 31))
+@together("period", range(1, 31))
 def test_the_rational_levels_are_those_of_periods_5_6_9_and_12(period):
     assert PeriodicLevels(period).gammas == ((RATIONAL[period],) if period in RATIONAL else ())
 

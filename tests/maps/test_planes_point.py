@@ -60,12 +60,6 @@ def test_coordinates_are_reduced_with_positive_denominators(system, normal_form,
         assert point.lowest_terms() == [(entry.p, entry.q) for entry in x]
 
 
-@over_cases
-def test_the_integer_point_is_in_lowest_terms(system, normal_form, eps, start):
-    for point, x in walk(system, normal_form, eps, start, 6):
-        assert point.integer_point() == IntegerPoint.from_rationals(x)
-
-
 @pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"])
 def test_the_bits_are_about_those_of_the_longest_integer(name):
     normal_form, system = structure_and_system(name)
@@ -94,7 +88,6 @@ def test_the_signs_of_triples_do_not_matter(which):
         assert other == point
         assert hash(other) == hash(point)
         assert other.lowest_terms() == point.lowest_terms()
-        assert other.integer_point() == point.integer_point()
 
 
 def test_one_sign_in_one_triple_makes_another_point():

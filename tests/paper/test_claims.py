@@ -10,7 +10,7 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
-from helpers import quick
+from helpers import quick, together
 from paper.members import LARGE_SPECTRA, SPECTRA, member, point, values
 
 from kahanmaps.algebra.fields import QQ
@@ -190,11 +190,7 @@ def test_every_control_that_a_claim_names_refutes_it(claim, spectra):
     assert idle == []
 
 
-@pytest.mark.parametrize(
-    "claim",
-    [found for found in RIGHT if found.makes_sense(1)],
-    ids=[found.key for found in RIGHT if found.makes_sense(1)],
-)
+@together("claim", [found for found in RIGHT if found.makes_sense(1)])
 def test_some_control_refutes_a_claim_for_m_1(claim):
     applicable = [control for control in claim.breaks if CONTROLS[control].least_m == 1]
     assert "fails" in [outcome(claim, "m=1", control) for control in applicable]

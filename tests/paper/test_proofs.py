@@ -8,6 +8,7 @@ a changed right-hand side, which must be refuted both at random points and in no
 from dataclasses import replace
 
 import pytest
+from helpers import together
 from paper.members import member, named, point
 
 from kahanmaps.algebra.bounds import Size
@@ -150,7 +151,7 @@ def test_a_claim_with_a_changed_side_has_no_proof(claim, only):
         normal_form_proof(claim.key, claim.blocks_for_proof(m), 2)
 
 
-@over_identities
+@together("claim", IDENTITIES)
 def test_a_claim_with_a_changed_side_fails_at_a_point(claim):
     name = "m=3, split" if claim.only_m == 3 else "m=1" if claim.only_m == 1 else "m=2, split"
     assert not evaluate(changed(claim), point(name)).holds

@@ -1,6 +1,7 @@
 """A picture tells how it was made: the recipe goes into PDF, SVG and PNG and comes out as it went in."""
 
 import pytest
+from helpers import together
 
 from kahanmaps.errors import InputError
 from kahanmaps.plots.figures import FORMATS, drawing, new_figure, picture_bytes, write_picture
@@ -32,7 +33,7 @@ def test_the_recipe_comes_out_as_it_went_in(tmp_path, kind, recipe):
     assert read_recipe(path) == recipe
 
 
-@pytest.mark.parametrize("length", range(60))
+@together("length", range(60))
 def test_what_stands_behind_the_recipe_is_no_part_of_it(tmp_path, length):
     """In PNG a checksum follows, which may begin with any letters."""
     recipe = Recipe("kahanmaps plot " + "x" * length)

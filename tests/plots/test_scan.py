@@ -16,7 +16,7 @@ rhs = ["x*(a*x + y)", "y*(x + b*y)"]"""
 
 @pytest.fixture(scope="module")
 def found():
-    return scan(parse_system(PLANE), ["a", "b"], terms=4, primes=[17, 19, 23])
+    return scan(parse_system(PLANE), ["a", "b"], terms=3, primes=[17, 19, 23])
 
 
 def of_growth(found, kind):

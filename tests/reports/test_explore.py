@@ -20,7 +20,7 @@ from kahanmaps.reports.report import report_html
 NODE = shutil.which("node")
 SCRIPT = resources.files("kahanmaps.reports") / "explore.js"
 FILES = {
-    "plane": km.load("lotka_volterra"),
+    "plane": km.load("weierstrass"),
     "no eps": km.load("mcmillan"),
     "hostile": km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], ["x"]), "</script><script>alert(1)"),
 }

@@ -111,8 +111,8 @@ def _print(
     common: list[str],
 ) -> None:
     what = "the Kahan map" if file.is_quadratic else file.map.kind
-    step = ", eps is half the time step" if file.map.has_time_step else ""
-    tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){step}")
+    share = lib.eps_share(file.map)
+    tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
     rows = lib.plain(reversor)
     shown = "none known" if rows is None else ";".join(",".join(row) for row in rows)
     tell(f"reversing symmetry\t{shown}")
@@ -153,7 +153,7 @@ def _record(
                     census, common_factor="factor", singular_everywhere="is_undefined", fixed_points="fixed"
                 ),
                 "eps": str(census.eps),
-                "time_step": str(2 * census.eps) if file.map.has_time_step else None,
+                "time_step": lib.eps_record(census.eps, file.map)["time_step"],
                 "points": str(census.points),
                 "lengths": pairs(census.lengths),
                 "at_infinity": pairs(census.at_infinity),

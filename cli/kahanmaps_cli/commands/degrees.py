@@ -90,21 +90,18 @@ def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
 
 def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 63 bits"
-    at = "generic eps" if eps is None else f"eps = {eps}"
-    if eps is not None and file.map.has_time_step:
-        at += f" (time step 2 eps = {2 * eps})"
-    at = f"{at}, " if file.map.has_eps else ""
-    tell(f"# {file.name}, {at}{lines}: measured, not proved")
+    at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
+    tell(f"# {file.name}{at}, {lines}: measured, not proved")
     tell(found.text)
 
 
 def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth) -> dict[str, Any]:
-    time_step = "generic" if found.eps is None else str(2 * found.eps)
+    time_step = lib.eps_record(found.eps, file.map)["time_step"]
     return record_of(
         "degrees",
         file,
         "modulo the primes of the lines",
-        time_step=time_step if file.map.has_time_step else None,
+        time_step="generic" if time_step == "every" else time_step,
         **opt.given(options, "seconds", terms_asked="terms"),
         max_degree=options["max_degree"],
         **found.to_json(),

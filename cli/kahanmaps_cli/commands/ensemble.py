@@ -68,7 +68,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
     file = opt.load_system(system, options)
-    integrals = _integrals(options["integrals"], file)
+    integrals = lib.functions_along(file, options["integrals"], in_floats=kind == "float")
     eps = opt.eps_of(file, options)
     number = lib.fmpq(1) if eps is None else eps
     file.map.at(
@@ -83,12 +83,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
     steps, output = options["steps"], options["output"]
-    try:
-        with interruptible(run.interrupt), Progress(quiet) as progress:
-            run.walk(lambda k: progress(f"step {k} of {steps}"))
-    except OSError as error:  # a full disk comes without a name
-        error.filename = error.filename or output
-        raise
+    with interruptible(run.interrupt), Progress(quiet) as progress:
+        run.walk(lambda k: progress(f"step {k} of {steps}"))
     if as_json:
         print_json(_record(file, eps, options, run))
     else:
@@ -129,26 +125,11 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _integrals(requests: tuple[tuple[str, str], ...], file: lib.SystemFile) -> dict[str, lib.RationalFunction]:
-    found: dict[str, lib.RationalFunction] = {}
-    for k, request in enumerate(requests, start=1):
-        name, function = opt.asked_integral(file, *request, f"I{k}")
-        if name in found:
-            raise click.UsageError(f"found two integrals of the name {name}: write --integral NAME=EXPR")
-        found[name] = function
-    return found
-
-
-def _arithmetic(options: dict[str, Any]) -> str:
-    kind, number = options["arithmetic"]
-    return f"mod:{number}" if kind == "mod" else str(kind)
-
-
 def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
     """Tab-separated lines, aligned on a terminal."""
     backward = ", backward" if options["backward"] else ""
-    arithmetic = _arithmetic(options)
-    tell(f"# {file.name}{lib.eps_words(lib.eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
+    arithmetic = options["arithmetic"]
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {arithmetic} arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()
@@ -192,4 +173,4 @@ def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -
         if output is None
         else {"file": output, "shape": [run.records, *run.shape], "every": every, "axes": ["record", "orbit", "x"]},
     }
-    return record_of("ensemble", file, _arithmetic(options), **more)
+    return record_of("ensemble", file, str(options["arithmetic"]), **more)

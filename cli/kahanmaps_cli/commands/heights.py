@@ -95,17 +95,14 @@ def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: 
 
 def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
-    if file.map.has_time_step:
-        each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
-    else:
-        each = ", ".join(map(str, values))
+    each = ", ".join(lib.eps_told(value, file.map).removeprefix(", eps = ") for value in values)
     eps = f", eps = {each}" if file.map.has_eps else ""
     tell(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
     tell(str(found))
 
 
 def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey) -> dict[str, Any]:
-    values = [str(value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits)]
-    steps = [str(2 * value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits) if file.map.has_time_step]
+    values = dict.fromkeys(orbit.eps for orbit in found.orbits)
+    steps = [str(step) for value in values if (step := lib.time_step(value, file.map)) is not None]
     asked = opt.given(options, "seed", "steps", "max_digits", "seconds")
-    return record_of("heights", file, "exact", eps=values, time_step=steps, **asked, **found.to_json())
+    return record_of("heights", file, "exact", eps=lib.plain(list(values)), time_step=steps, **asked, **found.to_json())

@@ -79,10 +79,10 @@ def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
 
 
 def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
-    tell(f"# {file.name}{lib.eps_words(lib.eps_record(eps, file.map))}, double precision")
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, double precision")
     tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
     tell(f"steps\t{found.steps} after {found.transient}")
-    columns = {"per unit of time": found.mean} if file.map.has_time_step else {}
+    columns = {"per unit of time": found.mean} if file.map.time_steps else {}
     columns |= {"per step": found.mean * found.unit, "spread": found.spread, "change from half": found.change}
     rows = [
         [str(k), *(f"{number:.6g}" for number in numbers)]

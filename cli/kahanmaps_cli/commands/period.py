@@ -80,7 +80,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if as_json:
         print_json(_record(file, normal_form, eps, options, found))
     else:
-        _print(file, eps, _arithmetic(options), found)
+        _print(file, eps, str(options["arithmetic"]), found)
     status = _STATUS.get(found.status, 3)
     if status and not quiet and as_json:
         say(f"{found.status}: {_message(found)}")
@@ -106,7 +106,7 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         data |= {
             "system": file.name,
             "eps": lib.format_number(eps),
-            "time_step": lib.format_number(2 * eps),
+            "time_step": lib.format_number(lib.time_step(eps, file.map)),
             "planes": [],
         }
         for part in normal_form.form.parts:
@@ -135,11 +135,6 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     return 0
 
 
-def _arithmetic(options: dict[str, Any]) -> str:
-    kind, number = options["arithmetic"]
-    return f"mod:{number}" if kind == "mod" else "exact"
-
-
 def _require_point(file: lib.SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
     """The same demands on eps, prime and start as orbits make, in the same words."""
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(start)
@@ -156,7 +151,7 @@ def _message(found: lib.OrbitPeriod) -> str:
 
 
 def _print(file: lib.SystemFile, eps: Any, arithmetic: str, found: lib.OrbitPeriod) -> None:
-    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {arithmetic} arithmetic")
     tell(str(found))
 
 
@@ -171,11 +166,10 @@ def _record(
     return record_of(
         "period",
         file,
-        _arithmetic(options),
+        str(options["arithmetic"]),
         seed=None,
         structure=normal_form.text,
-        eps=str(eps),
-        time_step=str(2 * eps),
+        **lib.eps_record(eps, file.map),
         start=lib.plain(options["start"]),
         **lib.attributes(found, "status", "meets_pole"),
         period=_text(found.period),

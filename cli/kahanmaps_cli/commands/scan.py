@@ -85,7 +85,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     elif as_json:
         print_json(_record(found, options))
     else:
-        at = "" if "eps" in found.over else lib.eps_words(lib.eps_record(found.eps, found.file.map))
+        at = "" if "eps" in found.over else lib.eps_told(found.eps, found.file.map)
         tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
         tell(found.text)
     return ending(found, quiet)

@@ -85,7 +85,8 @@ def _print(
     file: lib.SystemFile, runs: list[lib.SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str
 ) -> None:
     name = file.map.denominator_name
-    tell(f"# {file.name}, dimension {file.map.dim}" + (", eps is half the time step" if file.map.has_time_step else ""))
+    share = lib.eps_share(file.map)
+    tell(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
     if symbolic is not None:
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
         tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
@@ -119,7 +120,7 @@ def _record(
                 ),
                 **lib.attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
                 "eps": str(run.eps),
-                "time_step": str(2 * run.eps),
+                "time_step": lib.eps_record(run.eps, file.map)["time_step"],
                 "maps_a_step": None if run.word is None else run.word.length,
                 "hypersurfaces": [_hypersurface(found) for found in run.hypersurfaces],
             }

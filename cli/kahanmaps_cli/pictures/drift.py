@@ -117,7 +117,7 @@ def _told(survey: lib.DriftSurvey) -> Iterator[str]:
 
     point = ",".join(lib.format_number(entry) for entry in survey.start)
     point = point if len(point) <= _LONGEST else point[:_LONGEST] + "..."
-    yield f"start {point}, eps = {survey.eps} (time step 2 eps = {2 * survey.eps})"
+    yield f"start {point}{lib.eps_told(survey.eps)}"
     for name, is_relative in survey.relative.items():
         if not is_relative:
             yield f"{name}: absolute errors, for it is 0 at the start"

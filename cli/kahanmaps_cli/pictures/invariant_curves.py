@@ -70,9 +70,7 @@ def _short(text: str) -> str:
 
 
 def _told(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:
-
-    eps, twice = _short(lib.format_number(found.eps)), _short(lib.format_number(2 * found.eps))
-    yield f"{found.normal_form}; eps = {eps} (time step 2 eps = {twice})"
+    yield f"{found.normal_form}; {lib.eps_phrase(lib.eps_record(found.eps))}"
     for k, pole in enumerate(found.poles, 1):
         if pole is not None:
             which = f"start {k}: " if len(found.poles) > 1 else ""

@@ -13,7 +13,6 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
 from kahanmaps_cli.pictures.portrait_orbits import Orbits
-from kahanmaps_cli.pictures.stored import read_orbits
 from kahanmaps_cli.screen.progress import Progress
 
 if TYPE_CHECKING:
@@ -148,7 +147,7 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     elif options["parameters"]:
         raise click.UsageError("-p sets a parameter of the system: name the SYSTEM as well")
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
-    stored = read_orbits(options["stored"], None if file is None else file.variables)
+    stored = lib.read_orbits(options["stored"], None if file is None else file.variables)
     told = stored.header.get("eps")
     try:
         if eps is None and isinstance(told, str):

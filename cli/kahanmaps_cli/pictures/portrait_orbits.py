@@ -12,7 +12,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
-    from kahanmaps_cli.pictures.stored import Stored
+    from kahanmaps.maps.orbits.stored import Stored
 
 _PILOT = 4_000_000  # coordinates, from which the axes and the window of a density are chosen
 
@@ -246,7 +246,7 @@ class Orbits:
             if len(functions) < len(axes):
                 raise lib.InputError("--flow draws curves in phase space: it does not go with the axis step")
             box = lib.window_of(self._points.reshape(-1, len(self.variables)), self.starts)
-            time = float(2 * self.eps * self.steps) * (-1 if self.backward else 1) if self.steps else None
+            time = float(lib.time_step(self.eps) * self.steps) * (-1 if self.backward else 1) if self.steps else None
             curves = lib.solutions(system, self.starts, box, time)
             found = replace(found, solutions=tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves))
         return found
@@ -259,9 +259,7 @@ class Orbits:
     def told(self) -> Iterator[str]:
         """What is drawn, and what became of it."""
         orbits = counted(len(self.starts), "orbit")
-        eps = "" if self.eps is None else f", eps = {self.eps}"
-        if self.eps is not None and (self.file is None or self.file.map.has_time_step):
-            eps += f" (time step 2 eps = {2 * self.eps})"
+        eps = "" if self.eps is None else lib.eps_told(self.eps, *([] if self.file is None else [self.file.map]))
         if self.stored is not None:
             yield f"{self.name}: {orbits} of {counted(len(self.stored.points), 'point')}{eps}"
         else:

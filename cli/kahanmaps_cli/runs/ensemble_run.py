@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from kahanmaps.errors import InputError
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.screen.numbers import json_float, json_number, short_float
+from kahanmaps_cli.screen.numbers import json_number, short_float
 
 FAILURES_SHOWN = 20
 _WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded
@@ -40,7 +40,7 @@ class Asked(NamedTuple):
     eps: Any
     starts: lib.NDArray[Any]
     form: lib.NormalForm | None
-    integrals: Mapping[str, lib.RationalFunction]
+    integrals: Mapping[str, lib.PhaseFunction]
     options: Mapping[str, Any]
 
     @property
@@ -99,8 +99,8 @@ class FloatRun(_Walk):
         super().__init__(asked)
         value = lib.to_float(asked.eps)  # backward too: the inverse conserves what the map conserves
 
-        def of_point(function: lib.RationalFunction) -> Callable[[Sequence[float]], float | None]:
-            found = lib.float_function(function)
+        def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
+            found = lib.float_function(claimed.function)
             return lambda x: found([*x, value])
 
         self.ensemble: lib.FloatEnsemble = lib.FloatEnsemble(
@@ -136,8 +136,7 @@ class FloatRun(_Walk):
 
     def failures(self) -> Iterator[dict[str, Any]]:
         for orbit in (self.ensemble.failed_at >= 0).nonzero()[0].tolist():
-            end = self.ensemble.end(orbit)
-            yield {"orbit": orbit, "status": end.status, "steps": end.steps, "message": end.message}
+            yield {"orbit": orbit, **self.ensemble.end(orbit).to_json()}
 
     def near(self) -> dict[str, Any]:
         near = self.ensemble.near_singular
@@ -156,7 +155,7 @@ class FloatRun(_Walk):
             record: dict[str, Any] = {"name": drift.name, "orbits": len(going)}
             if len(going):
                 worst = int(going[drift.largest[going].argmax()])
-                record["largest"] = json_float(drift.largest[worst])
+                record["largest"] = lib.json_float(drift.largest[worst])
                 record["orbit"] = worst
                 record["initial"] = json_number(drift.initial[worst])
             found.append(record)
@@ -213,12 +212,10 @@ class ModularRun(_Walk):
 
     def _values(self) -> dict[str, list[Any]]:
         field = self.ensemble.field
-        claims = {name: lib.ClaimedIntegral(name, function) for name, function in self.asked.integrals.items()}
-        points = self.ensemble.x.tolist() if claims else []
-        return {
-            name: [claim.value(field, self.asked.eps, [field.convert(entry) for entry in x]) for x in points]
-            for name, claim in claims.items()
-        }
+        rows = self.ensemble.x.tolist() if self.asked.integrals else []
+        points = [[field.convert(entry) for entry in x] for x in rows]
+        asked = self.asked.integrals.items()
+        return {name: [function.value(field, self.asked.eps, x) for x in points] for name, function in asked}
 
     @property
     def counts(self) -> dict[str, int]:

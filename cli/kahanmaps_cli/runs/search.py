@@ -53,7 +53,7 @@ def scope(found: Any) -> str:
     """For which eps and which symbols the formulas hold, to follow the name of the map."""
     if getattr(found, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
-    step = lib.eps_words(lib.eps_record(found.eps, found.file.map))
+    step = lib.eps_told(found.eps, found.file.map)
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 

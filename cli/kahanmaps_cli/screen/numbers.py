@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 from kahanmaps.errors import InputError, counted
 from kahanmaps_cli import library as lib
 
 
-def json_float(value: Any) -> float | str:
-    """A JSON number, or the text inf, -inf or nan."""
-    number = float(value)
-    return number if isfinite(number) else repr(number)
-
-
 def json_number(value: Any) -> Any:
-    """The same, and for a complex number its real and imaginary part."""
+    """A JSON number, or the text inf, -inf or nan; for a complex number its real and imaginary part."""
     number = complex(value)
     if isinstance(value, complex) or getattr(value, "dtype", None) == "complex128":
-        return [json_float(number.real), json_float(number.imag)]
-    return json_float(value)
+        return [lib.json_float(number.real), lib.json_float(number.imag)]
+    return lib.json_float(value)
 
 
 def short_float(value: Any) -> str:

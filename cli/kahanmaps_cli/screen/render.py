@@ -47,11 +47,6 @@ def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet
     return status
 
 
-def ending(status: str, message: str) -> str:
-    """How something ended, in a sentence that says it once."""
-    return message if message.startswith(status) else f"{status}: {message}"
-
-
 def exit_status(report: lib.Report) -> int:
     """0 holds, 1 refuted, 3 undecided, or an orbit that was asked for and ended early."""
     if report.verdict is lib.Verdict.REFUTED:

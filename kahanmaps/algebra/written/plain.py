@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from math import isfinite
 from typing import Any
 
 from flint import fmpq_mat, fmpq_mpoly
@@ -31,6 +32,12 @@ def plain(value: Any) -> Any:
     if isinstance(value, fmpq_mat) or type(value).__module__ == "numpy":
         return plain(value.tolist())
     return format_polynomial(value) if isinstance(value, fmpq_mpoly) else str(value)
+
+
+def json_float(value: Any) -> float | str:
+    """A JSON number, or the text inf, -inf or nan."""
+    number = float(value)
+    return number if isfinite(number) else repr(number)
 
 
 def all_fields(value: Any) -> dict[str, Any]:

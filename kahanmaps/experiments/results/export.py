@@ -20,17 +20,15 @@ are the same bytes.
 
 from __future__ import annotations
 
-import csv
 import json
 import os
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from fractions import Fraction
 from importlib import import_module
-from io import StringIO
 from typing import IO, Any, NamedTuple
 
+from kahanmaps.algebra.written.cells import NUMBER, csv_line, guarded
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.records import Row, encodable
 from kahanmaps.version import __version__
@@ -41,12 +39,6 @@ BETWEEN = ("outcome", "verdict")
 AFTER = ("message",)
 OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # with stderr and versions: not in a stable export
 RESERVED = frozenset((*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN, "system", "options", "result", "stderr", "versions"))
-
-# An integer, p/q or a decimal. The bound on the exponent keeps 1e999999999 from filling the memory of who reads it.
-NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)")
-# What a spreadsheet would run. An apostrophe in front makes it text; since texts that begin with apostrophes and then
-# so get one more, taking one away leads back to what was there.
-_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
 _ROW_GROUP = 10_000
@@ -143,15 +135,8 @@ def plain(value: Any) -> str:
 
 
 def cell(value: Any) -> str:
-    """The text of a value in a CSV file: texts that a spreadsheet would run get an apostrophe, numbers never do.
-
-    >>> [cell(value) for value in (-3, "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
-    ['-3', '-1/2', "'=HYPERLINK(1)", "'-x", "''-x"]
-    """
-    text = plain(value)
-    if isinstance(value, str) and _FORMULA.match(text) and not NUMBER.fullmatch(text):
-        return "'" + text
-    return text
+    """The text of a value in a CSV file: texts that a spreadsheet would run get an apostrophe, numbers never do."""
+    return guarded(plain(value)) if isinstance(value, str) else plain(value)
 
 
 def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -> None:
@@ -175,17 +160,9 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
     for the values. Open files with newline="", or "\\n" becomes what the machine likes.
     """
     layout = _Layout(rows(), stable)
-    stream.write(_csv_line(layout.names))
+    stream.write(csv_line(map(cell, layout.names)))
     for row in rows():
-        stream.write(_csv_line(layout.values(row)))
-
-
-def _csv_line(values: Iterable[Any]) -> str:
-    # The csv module may quote only those line ends that are in its terminator: with both of them there, no cell can
-    # break a line, whatever the version of Python.
-    line = StringIO(newline="")
-    csv.writer(line, lineterminator="\r\n").writerow([cell(value) for value in values])
-    return line.getvalue().removesuffix("\r\n") + "\n"
+        stream.write(csv_line(map(cell, layout.values(row))))
 
 
 def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:

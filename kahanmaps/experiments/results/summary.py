@@ -16,9 +16,10 @@ from functools import lru_cache
 from math import inf, isfinite
 from typing import Any
 
+from kahanmaps.algebra.written.cells import NUMBER
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.experiments.results.export import NUMBER, Entry, entries, known, plain
+from kahanmaps.experiments.results.export import Entry, entries, known, plain
 from kahanmaps.experiments.results.records import KEPT, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent

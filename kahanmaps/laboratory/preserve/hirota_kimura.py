@@ -27,12 +27,16 @@ from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
     echelon,
+    exponents_up_to,
     integers,
     kernel_vectors,
+    monomial_tables,
     null_space,
     rank,
     slope_values,
 )
+
+Exponent = tuple[int, ...]
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
@@ -44,9 +48,10 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 class OrbitRelations:
     """The polynomials up to a degree that vanish along one orbit.
 
-    They span a space of this `dimension`, and the first columns of `kernel` are a basis on the monomials
-    `exponents_up_to` that degree; `normals` is one of the span of their gradients at the last point, `end`; `period` is
-    the number of points of an orbit that closed, else None.
+    They span a space of this `dimension`, and the columns of `kernel` that are not 0 are a basis on the monomials of
+    `exponents_up_to` that degree, or on those in the places `support`, where the others follow. `leading` are the last
+    monomials of the basis, whose multiples are dependent in any higher degree; `normals` is a basis of the span of the
+    gradients at the last point, `end`; `period` is the number of points of an orbit that closed, else None.
     """
 
     kernel: nmod_mat
@@ -54,6 +59,7 @@ class OrbitRelations:
     normals: list[list[int]]
     period: int | None
     end: Point
+    leading: frozenset[Exponent] = frozenset()
 
     @property
     def codimension(self) -> int:
@@ -62,7 +68,7 @@ class OrbitRelations:
 
     @cached_property
     def vectors(self) -> list[list[int]]:
-        """The reduced echelon basis."""
+        """The reduced echelon basis, where no monomials were left out."""
         return kernel_vectors(self.kernel, self.dimension, self.kernel.modulus())
 
 
@@ -109,22 +115,44 @@ class Profile:
         return attributes(self, *names, maps_agree="agree", complete="complete")
 
 
-def relations_on_orbit(map_: ModularMap, degree: int, most: int | None = None) -> OrbitRelations:
+def relations_on_orbit(
+    map_: ModularMap, degree: int, most: int | None = None, leading: frozenset[Exponent] = frozenset()
+) -> OrbitRelations:
     """The polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
     `most` says how many monomials are independent on orbits at most, as far as one knows: so many points and a few are
     as good as all. For from a generic point on the rank of the rows grows until it has its final value: relations of
     the points 0 to k that hold at the point k + 1 as well are, a step later, those of the points 1 to k + 1, and so on.
+    `leading` are those of relations of lower degrees: proper multiples of them are left out, dependent as they are.
     Raises NoPoint where orbits meet the singular set.
     """
-    prime, unknowns = map_.prime, comb(map_.dim + degree, degree)
-    most = unknowns if most is None else min(most, unknowns)
-    rows, end, period = map_.along_orbit(degree, unknowns + _SPARE, most + _SPARE)
-    kernel, dimension = nmod_mat(rows, prime).nullspace()
-    if unknowns - dimension > most:  # what was known is of special orbits, and not all points were used
-        return relations_on_orbit(map_, degree)
-    slopes = nmod_mat(slope_values(end, degree, prime), prime) * kernel
-    return OrbitRelations(kernel, dimension, echelon(integers(slopes.transpose()), prime), period, end)
+    prime, exponents = map_.prime, exponents_up_to(map_.dim, degree)
+    support = _not_multiples(map_.dim, degree, leading)
+    most = len(support) if most is None else min(most, len(support))
+    rows, end, period = map_.along_orbit(degree, len(exponents) + _SPARE, most + _SPARE)
+    slopes = slope_values(end, degree, prime)
+    if leading:
+        rows, slopes = ([[row[k] for k in support] for row in table] for table in (rows, slopes))
+    kernel, nullity = nmod_mat(rows, prime).nullspace()
+    last = (max(i for i in range(len(support)) if kernel[i, k]) for k in range(nullity))
+    found = frozenset(exponents[support[i]] for i in last)
+    if len(support) - nullity > most or not leading <= found:
+        return relations_on_orbit(map_, degree)  # what was known is of special orbits
+    normals = echelon(integers((nmod_mat(slopes, prime) * kernel).transpose()), prime)
+    return OrbitRelations(kernel, len(exponents) - len(support) + nullity, normals, period, end, found)
+
+
+def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
+    """The places in `exponents_up_to` of the monomials that are no proper multiples of `leading`."""
+    exponents = exponents_up_to(dim, degree)
+    is_multiple: list[bool] = []  # or one of them itself
+    support = []
+    for k, (exponent, factors) in enumerate(zip(exponents, monomial_tables(dim, degree), strict=True)):
+        is_proper = any(is_multiple[place] for _, _, place in factors)
+        is_multiple.append(is_proper or exponent in leading)
+        if not is_proper:
+            support.append(k)
+    return support
 
 
 def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> list[list[int]]:
@@ -177,6 +205,7 @@ def orbit_profile(
     codimensions: list[int] = []
     with_known = 0
     agree, period, took, complete = True, None, 0.0, True
+    leading: list[frozenset[Exponent]] = [frozenset()] * len(maps)
     top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
         top = max((d for d in range(1, top + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
@@ -192,8 +221,8 @@ def orbit_profile(
             break
         progress(f"relations of degree {degree} along orbits")
         began = time.monotonic()
-        most = _most(comb(dim + degree - 1, dim) - nullities[-1], degree - 1) if nullities else None
-        found = [relations_on_orbit(map_, degree, most) for map_ in maps]
+        found = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
+        leading = [one.leading for one in found]
         took = time.monotonic() - began
         agree = agree and len({(one.dimension, one.codimension) for one in found}) == 1
         # A special orbit has more relations, never fewer.
@@ -284,18 +313,3 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
         len({len(basis) for basis in bases}) == 1,
         periods.pop() if len(periods) == 1 else None,
     )
-
-
-def _most(independent: int, degree: int) -> int:
-    """How many monomials of one degree more are independent at most on a variety where so many of a degree are.
-
-    Macaulay's bound for Hilbert functions: C(a, d) + C(b, d - 1) + ... with a > b > ... becomes C(a + 1, d + 1) + ...
-    """
-    total = 0
-    while independent:
-        a = degree
-        while comb(a + 1, degree) <= independent:
-            a += 1
-        independent, total = independent - comb(a, degree), total + comb(a + 1, degree + 1)
-        degree -= 1
-    return total

@@ -10,6 +10,7 @@ from flint import fmpq
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.implicit import BirationalMap
 
 
@@ -37,7 +38,7 @@ class Search(Printed):
         """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
         if self.eps is None:
             return []
-        step = f" (time step 2 eps = {2 * self.eps})" if self.file.map.has_time_step else ""
+        step = eps_told(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
         return [f"# for eps = {self.eps} only{step}: check with --eps {self.eps}"]
 
 

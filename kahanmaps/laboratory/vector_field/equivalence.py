@@ -22,7 +22,7 @@ from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial
-from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
@@ -112,10 +112,12 @@ class _Known:
 @lru_cache(maxsize=MAX_DIMENSION)
 def _catalogue(dim: int) -> tuple[_Known, ...]:
     """The systems of one dimension, few parameters first; with too many of them everything would be one of theirs."""
-    found = []
+    found, every = [], titles()
     for name in names():
+        if every[name][0] != dim:
+            continue
         file = load(name)
-        if file.dim == dim and len(file.parameters) <= dim + 2:
+        if len(file.parameters) <= dim + 2:
             system = with_symbols(file, tuple(file.parameters))
             if system.degree >= 2:
                 terms = [m for p in system.rhs for m in p.monoms()]

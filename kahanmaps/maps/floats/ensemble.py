@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,6 @@ from kahanmaps.maps.floats.steps import (
     PlanarRows,
     generic_equation,
 )
-from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.kernels import choose_kernel, processors
@@ -265,13 +263,6 @@ class FloatEnsemble:
         require_steps(steps)
         for _ in self._recorded(steps, 0, progress):
             pass
-
-    def stream(self, out: str | Path, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> int:
-        """Write the `records` to a .npy file of shape (records, n, dim) as they come; returns how many there are."""
-        with NpyFile(out, (self.n, self.system.dim)) as file:
-            for x in self.records(steps, every, progress=progress):
-                file.append(x)
-            return file.rows
 
     def records(self, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> Iterator[FloatArray]:
         """The points at multiples of `every`, the start among them, in portions (count, n, dim); NaN after the end.

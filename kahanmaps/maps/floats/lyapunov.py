@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.implicit import BirationalMap
@@ -146,7 +147,7 @@ def lyapunov_exponents(
         if counted == steps // 2:
             half, half_at = walk.sums.copy(), counted
     alive = walk.lanes if counted else walk.lanes[:0]
-    unit = 2 * size if map_.has_time_step else 1.0
+    unit = time_step(size, map_) or 1.0
     span, first = unit * max(1, counted), unit * max(1, half_at)
     order = np.argsort(-walk.sums[alive] / span, axis=1)
     exponents = np.take_along_axis(walk.sums[alive] / span, order, axis=1)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.whole_files import sync
+from kahanmaps.whole_files import named, sync
 
 
 class NpyFile:
@@ -36,13 +36,15 @@ class NpyFile:
     def __init__(self, path: str | Path, shape: tuple[int, ...], kind: Literal["<f8", "<i8"] = "<f8") -> None:
         if Path(path).is_fifo():  # to open it would wait for a reader, and it could not grow
             raise InputError(f"{path}: found a pipe, expected a file: a .npy file is written to in several places")
+        self.path = path
         self.shape = shape
         self.rows = 0
         self.kind = kind
         self._room = len(self._header(0))
         self._stream: IO[bytes] = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by `close`)
         try:
-            self._stream.write(self._header(0))
+            with named(path):
+                self._stream.write(self._header(0))
         except BaseException:
             self._stream.close()
             raise
@@ -54,19 +56,21 @@ class NpyFile:
         header = self._header(self.rows + len(rows))
         if len(header) != self._room:
             raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file has room for")
-        self._stream.seek(0, io.SEEK_END)
-        left = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
-        while left:  # a single write may take less than everything
-            left = left[self._stream.write(left) :]
-        self._stream.seek(0)
-        self._stream.write(header)
+        with named(self.path):
+            self._stream.seek(0, io.SEEK_END)
+            left = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
+            while left:  # a single write may take less than everything
+                left = left[self._stream.write(left) :]
+            self._stream.seek(0)
+            self._stream.write(header)
         self.rows += len(rows)
 
     def close(self) -> None:
         """Close the file, which is on the disk then."""
         try:
             if not self._stream.closed:
-                sync(self._stream)
+                with named(self.path):
+                    sync(self._stream)
         finally:
             self._stream.close()
 

@@ -24,7 +24,6 @@ from kahanmaps.maps.normal_form.planar_integers import (
     is_all,
     radical,
 )
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 Block = IntegerBlock | AlgebraBlock
 
@@ -166,14 +165,6 @@ class PlanesPoint:
                 total += _at([entry * factor for entry in form], scaled[i])
             numerators.append(total)
         return numerators, below * product
-
-    def integer_point(self) -> IntegerPoint:
-        """The point over one denominator in lowest terms."""
-        pairs = self.lowest_terms()
-        below = fmpz(1)
-        for _, denominator in pairs:
-            below = below.lcm(denominator)
-        return IntegerPoint(tuple(above * (below // denominator) for above, denominator in pairs), below)
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced, denominators positive."""

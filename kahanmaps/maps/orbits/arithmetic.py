@@ -39,15 +39,23 @@ class Arithmetic(NamedTuple):
         >>> str(Arithmetic.of("exact")), str(Arithmetic.of(float))
         ('exact', 'float')
         """
-        from kahanmaps.algebra.fields import QQ, PrimeField
+        from kahanmaps.algebra.etale import EtaleAlgebra
+        from kahanmaps.algebra.fields import QQ, BallField, ComplexBallField, PrimeField
 
         if isinstance(given, Arithmetic):
             return given
+        if isinstance(given, str):
+            return cls.parse(given)
         if isinstance(given, PrimeField):
             return cls("mod", given.characteristic)
-        if given is QQ or given is float:
-            return cls("exact" if given is QQ else "float")
-        return cls.parse(given if isinstance(given, str) else repr(given))
+        if isinstance(given, BallField | ComplexBallField):
+            return cls("ball", given.bits)
+        if given is QQ or given is float or isinstance(given, EtaleAlgebra):
+            return cls("float" if given is float else "exact")
+        raise InputError(
+            f"found the arithmetic {given!r}, expected exact, float, mod:P, ball:BITS or ball:auto as text, or a field"
+            ": QQ, GF(p), RR(bits), CC(bits) or a number field"
+        )
 
     @property
     def field(self) -> Any:

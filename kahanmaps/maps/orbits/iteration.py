@@ -7,8 +7,8 @@ with every step, so the budget is never absent by accident.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import count
 from threading import get_ident
@@ -53,6 +53,15 @@ class OrbitEnd:
     def is_whole(self) -> bool:
         """Whether every step that was asked for has been delivered."""
         return self.status in ("completed", "periodic")
+
+    @property
+    def text(self) -> str:
+        """How it ended, in a sentence that says it once."""
+        return self.message if self.message.startswith(self.status) else f"{self.status}: {self.message}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Its fields; the period where there is one."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 class OrbitPoint:
@@ -242,7 +251,7 @@ class Iterates:
         self,
         kahan_map: MapOver,
         start: Sequence[Any],
-        at: Sequence[int],
+        at: Iterable[int],
         *,
         normal_form: SystemNormalForm,
         backward: bool = False,

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 
 from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, Field, rational
+from kahanmaps.algebra.written.plain import json_float
 from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.displayed import data_frame
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.maps.convention import eps_record
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
@@ -29,10 +33,12 @@ from kahanmaps.maps.orbits.iteration import (
     require_short,
     require_steps,
 )
-from kahanmaps.maps.orbits.methods import DOUBLING_FROM, choose_method, why_no_reduction
+from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method, why_no_reduction
+from kahanmaps.maps.orbits.writers import OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.whole_files import write_whole
+from kahanmaps.version import __version__
+from kahanmaps.whole_files import growing_file
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
@@ -72,7 +78,8 @@ def orbit(
         eps: an exact number, for Kahan maps half the time step; none for a map without it.
         steps: how many steps to take, or
         at: which iterates alone are wanted.
-        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field such as GF(p).
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
+            number field.
         method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
         backward: step by the inverse map.
         every: float orbits deliver only multiples of it; `wanted` tells for all.
@@ -98,20 +105,25 @@ def orbit(
     if (steps is None) == (at is None):
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
     require_steps(steps)
-    arithmetic = Arithmetic.of(arithmetic)
+    field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
     start = _numbers(start, arithmetic)
+    far = max(at, default=0) if at is not None else (steps or 0)
+    require_steps(far)
+    wanted = None if at is None else frozenset(at)
+    asked = _Asked(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     if isinstance(given, MapOver):
-        return _orbit_at_one_eps(given, start, eps, steps, arithmetic, backward, max_digits)
+        return _orbit_at_one_eps(asked, field)
     map_ = as_map(given)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
-    exact_eps = fmpq(1) if eps is None else rational(eps)
-    far = max(at, default=0) if at is not None else (steps or 0)
-    require_steps(far)
+    if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
+        phi = map_.at(1 if eps is None else eps, field)
+        return _orbit_at_one_eps(asked._replace(map=phi, eps=None), field)
+    asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
     if arithmetic.kind == "exact":
-        require_short(exact_eps, [rational(entry) for entry in start], max_digits)
+        require_short(asked.eps, [rational(entry) for entry in start], max_digits)
     if normal_form is None:
-        normal_form = _normal_form(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
+        normal_form = _normal_form(asked, method, arithmetic, hamiltonian, member)
     chosen = choose_method(method, arithmetic.kind, normal_form, at)
     if chosen.name != "doubling" and far > _TOO_FAR:
         raise InputError(
@@ -119,7 +131,6 @@ def orbit(
             f"and there is no other way here: {chosen.reason}"
         )
     used = normal_form if chosen.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
-    asked = _Asked(map_, start, exact_eps, far, at, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     remark = ""
     if arithmetic == Arithmetic("ball"):
         try:
@@ -127,19 +138,17 @@ def orbit(
         except NotAccurate as error:
             bits, remark = _BITS_AT_LEAST, str(error)
         arithmetic = Arithmetic("ball", bits)
-    wanted = None if at is None else set(at)
-    points = asked.by(chosen.name, used, arithmetic)
-    return Trajectory(points, arithmetic, chosen.name, chosen.text, wanted, every, remark, map_.variables)
+    return Trajectory(asked.by(chosen.name, used, arithmetic), asked, arithmetic, chosen, remark)
 
 
 class _Asked(NamedTuple):
-    """Which points of which orbit are wanted."""
+    """Which points of which orbit are wanted; `steps` is the last one."""
 
-    map: BirationalMap
+    map: Any
     start: Sequence[Any]
-    eps: fmpq
+    eps: Any
     steps: int
-    at: Sequence[int] | None
+    at: frozenset[int] | None
     every: int
     backward: bool
     max_digits: int
@@ -157,7 +166,7 @@ class _Asked(NamedTuple):
         over = self.map.at(self.eps, numbers.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
-            return Iterates(over, self.start, self.at or [], normal_form=normal_form, **limits)
+            return Iterates(over, self.start, self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
         return Orbit(over, self.start, self.steps, normal_form=normal, **limits)
 
@@ -166,37 +175,29 @@ class Trajectory:
     """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it.
 
     Iterate over it, and nothing is kept; or ask for its length, for points by their number, for a table or an array,
-    and all points are computed and kept.
+    and all points are computed and kept. `integrals` are functions of x and eps (PhaseFunction) by name, whose values
+    tables and files are to have beside the points.
 
     >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
     >>> len(found), found[-1].x, found.rows()[0]
     (4, (1/2,), {'step': 0, 'x': '1/5'})
     """
 
-    def __init__(
-        self,
-        orbit: Any,
-        arithmetic: Arithmetic,
-        method: str,
-        why: str,
-        at: set[int] | None,
-        every: int,
-        remark: str,
-        variables: Sequence[str],
-    ) -> None:
+    def __init__(self, orbit: Any, asked: _Asked, arithmetic: Arithmetic, chosen: Method, remark: str = "") -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
-        self.method = method
-        self.why = why
-        self._at, self._every, self._remark = at, every, remark
-        self.variables = tuple(variables)
+        self.method, self.why = chosen.name, chosen.text
+        self.variables: tuple[str, ...] = asked.map.variables
+        self.integrals: Mapping[str, Any] = {}
+        self._asked, self._remark = asked, remark
 
     def __repr__(self) -> str:
         return f"Trajectory({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
-        return step in self._at if self._at is not None else step % self._every == 0
+        at = self._asked.at
+        return step in at if at is not None else step % self._asked.every == 0
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
@@ -226,21 +227,111 @@ class Trajectory:
         return self.points[index]
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each point: its step and the coordinates, floats and residues as numbers, others as exact text."""
+        """A row for each point: its step, the coordinates and the values of the integrals, None at poles.
+
+        Floats and residues are numbers, others exact text.
+        """
         kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
-        return [
-            {"step": point.step, **{name: kind(x) for name, x in zip(self.variables, point.text, strict=True)}}
-            for point in self.points
-        ]
+        names = (*self.variables, *self.integrals)
+        found = []
+        for point in self.points:
+            numbers = [text and kind(text) for text in (*point.text, *self.values(point))]
+            found.append({"step": point.step, **dict(zip(names, numbers, strict=True))})
+        return found
+
+    def values(self, point: OrbitPoint) -> list[str | None]:
+        """Those of the integrals, as text; None where one is not defined."""
+        return [self._value(function, point) for function in self.integrals.values()]
+
+    def _value(self, function: Any, point: OrbitPoint) -> str | None:
+        try:  # eps itself, also where the orbit steps by -eps: integrals are those of the map
+            found = function.value(point.field, self._asked.eps, point.x)
+        except (KahanmapsError, ArithmeticError):  # not defined where the map is not, or beyond the range of floats
+            return None
+        is_defined = found is not None and not (isinstance(found, float) and not math.isfinite(found))
+        return point.field.format(found) if is_defined else None
 
     def to_pandas(self) -> Any:
         """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
         return data_frame(self.rows())
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the points as `kahanmaps orbit -o` does: step and coordinates, exact."""
-        lines = [",".join(["step", *self.variables]), *(f"{p.step},{','.join(p.text)}" for p in self.points)]
-        write_whole(str(path), ("\n".join(lines) + "\n").encode())
+        """Write the points alone, as `kahanmaps orbit -o` does: step and coordinates, exact."""
+        with growing_file(path) as stream:
+            self.write(stream, "csv")
+
+    def write(
+        self,
+        to: str | Path | IO[str] | Writer,
+        form: str = "",
+        name: str = "",
+        told: Callable[[int], None] = lambda _: None,
+    ) -> OrbitEnd:
+        """Write the points that are wanted as they are computed, as `kahanmaps orbit` does.
+
+        Args:
+            to: a path, beside which a .csv file gets what it is of; a stream of text; or a writer.
+            form: "text", "json", "jsonl", "csv", "npz", for the points of float orbits alone "npy"; by default what
+                the ending of the path stands for.
+            name: that of the system.
+            told: is called with every step that was computed.
+
+        Returns:
+            How it ended, as the file says it; "budget" where an npz file cannot hold more.
+        """
+        if not form and isinstance(to, str | Path):
+            form = form_of(to)
+        if form == "npy":
+            from kahanmaps.maps.floats.fast import stream_orbit
+
+            stream_orbit(self.orbit, to, progress=told)  # type: ignore[arg-type]  # a path
+            return self._ended(self.end)[0]
+        columns = (self.variables, list(self.integrals))
+        with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
+            writer.header(self.header(name))
+            try:
+                for point in self:
+                    told(point.step)
+                    if self.wanted(point.step):
+                        writer.point(point.step, point.text, self.values(point))
+                end = self.end
+            except OutputFull as full:
+                end = OrbitEnd("budget", full.steps, str(full))
+            end, more = self._ended(end)
+            writer.end(end, more)
+        return end
+
+    def header(self, name: str = "") -> dict[str, Any]:
+        """What the orbit can be made again from, as plain data; `name` is that of the system."""
+        asked = self._asked
+        header = {
+            "system": name,
+            "variables": list(self.variables),
+            **asked.map.written(),
+            **({} if isinstance(asked.map, MapOver) else eps_record(asked.eps, asked.map)),
+            "arithmetic": str(self.arithmetic),
+            "method": self.method,
+            "start": [str(entry) for entry in asked.start],
+            "direction": "backward" if asked.backward else "forward",
+            "steps": asked.steps,
+            "seed": None,
+            "version": __version__,
+        }
+        return {**header, "kernel": self.orbit.kernel} if self.arithmetic.kind == "float" else header
+
+    def _ended(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
+        """How it ended, and of a float orbit what it may have lost on the way, in the message and as plain data."""
+        if self.arithmetic.kind != "float":
+            return end, {}
+        message, more = end.message, {"near_singular": self.orbit.near_singular}
+        if self.orbit.drift:
+            more["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
+            largest = max(float(drift.largest) for drift in self.orbit.drift)
+            message += f"; block integrals moved by at most {largest:.3g} where looked at"
+        if self.orbit.near_singular:
+            first = self.orbit.near_singular_at
+            message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first}"
+        return replace(end, message=message), more
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         """The coordinates (points, dim), rounded to doubles. Raises InputError for balls and over number fields."""
@@ -287,39 +378,32 @@ def _exactly(value: float) -> fmpq:
     return fmpq(*value.as_integer_ratio())
 
 
-def _orbit_at_one_eps(
-    phi: MapOver,
-    start: Sequence[Any],
-    eps: Any,
-    steps: int | None,
-    arithmetic: Arithmetic,
-    backward: bool,
-    max_digits: int | None,
-) -> Trajectory:
-    """The orbit of a map that has its eps and its field."""
-    if eps is not None or steps is None or arithmetic.kind != "exact":
+def _orbit_at_one_eps(asked: _Asked, numbers: Any) -> Trajectory:
+    """The orbit of a map that has its eps and its field, which `numbers` may name."""
+    phi, exact = asked.map, Arithmetic("exact")
+    if asked.eps is not None or asked.at is not None or numbers not in ("exact", exact, phi.field):
         raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
-    kind = Arithmetic("mod", phi.field.characteristic) if phi.field.characteristic else arithmetic
-    points = Orbit(phi, start, steps, backward=backward, max_digits=max_digits or DEFAULT_MAX_DIGITS)
-    return Trajectory(points, kind, "generic", "it is a map at one eps", None, 1, "", phi.variables)
+    p, bits = phi.field.characteristic, getattr(phi.field, "bits", 0)
+    kind = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact
+    points = Orbit(phi, asked.start, asked.steps, backward=asked.backward, max_digits=asked.max_digits)
+    asked = asked._replace(start=points.start, eps=phi.eps)
+    return Trajectory(points, asked, kind, Method("generic", "it is a map at one eps"))
 
 
 def _normal_form(
-    map_: BirationalMap,
-    start: Sequence[Any],
-    eps: fmpq,
-    steps: int,
+    asked: _Asked,
     method: str | None,
     arithmetic: Arithmetic,
     hamiltonian: CubicHamiltonian | None,
     member: FamilyMember | None,
 ) -> SystemNormalForm | NoNormalForm:
     """The normal form, where it may be of use."""
+    map_, eps = asked.map, asked.eps
     if method == "generic":
         return NoNormalForm("not looked for")
     if not isinstance(map_, Kahan) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
-    if method is None and (reason := _why_not_to_look(map_, start, eps, steps, arithmetic, member)):
+    if method is None and (reason := _why_not_to_look(asked, arithmetic, member)):
         return NoNormalForm(reason)
     normal_form = system_normal_form(map_.system, hamiltonian, member)
     if isinstance(normal_form, NoNormalForm):
@@ -330,27 +414,20 @@ def _normal_form(
     if arithmetic.kind == "ball":
         from kahanmaps.maps.normal_form.iterate import special_start
 
-        reason = special_start(normal_form, eps, start)
+        reason = special_start(normal_form, eps, asked.start)
     if arithmetic.kind == "mod":
         reason = why_no_reduction(normal_form, GF(arithmetic.number), eps)
     return NoNormalForm(reason) if reason else normal_form
 
 
-def _why_not_to_look(
-    map_: BirationalMap,
-    start: Sequence[Any],
-    eps: fmpq,
-    steps: int,
-    arithmetic: Arithmetic,
-    member: FamilyMember | None,
-) -> str:
+def _why_not_to_look(asked: _Asked, arithmetic: Arithmetic, member: FamilyMember | None) -> str:
     """Empty, or why looking for a normal form would cost more than it can save."""
     few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
-    numbers = [eps, *(rational(entry) for entry in start)]
+    numbers = [asked.eps, *(rational(entry) for entry in asked.start)]
     if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
         few = max(few, 24)
-    if steps <= few:
+    if asked.steps <= few:
         return "not looked for, for so few steps"
-    if member is None and map_.dim > _LARGE_DIMENSION:
-        return f"not looked for in dimension {map_.dim}"
+    if member is None and asked.map.dim > _LARGE_DIMENSION:
+        return f"not looked for in dimension {asked.map.dim}"
     return ""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import time_step
 from kahanmaps.plots.curves.zero_band import log_scale_with_zero
 from kahanmaps.plots.drifts.drift import METHODS, DriftCurve, DriftSurvey
 from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, wrapped
@@ -54,7 +55,7 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
             elif k + columns >= count:
                 axes.set_xlabel("step $n$")
                 axes.tick_params(labelbottom=True)
-        title = rf"time step $2\varepsilon = {label_number(2 * survey.eps)}$"
+        title = rf"time step $2\varepsilon = {label_number(time_step(survey.eps))}$"
         legend_above(figure, [_handle(method) for method in survey.ends], labels, style, title)
     return figure
 

@@ -13,13 +13,20 @@ from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import click
+from flint import fmpz
 
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.roots import parse_root
+from kahanmaps.algebra.written.numerals import check_names
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import InputError
-from kahanmaps_cli import library as lib
-from kahanmaps_cli.runs.orbit_formats import meta_of
+from kahanmaps.maps.orbits.writers import meta_of
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.floats.doubles import FloatArray
 
 _ENDINGS = (".npy", ".npz", ".jsonl", ".csv")
 _MAX_POINTS = 4_000_000  # of a file that has to be read as text
@@ -31,7 +38,7 @@ class Stored:
     """Points (records, orbits, dim), their steps, and what the file says: `header` is empty for .npy."""
 
     variables: tuple[str, ...]
-    points: lib.FloatArray
+    points: FloatArray
     steps: Any
     header: dict[str, Any]
     end: dict[str, Any]
@@ -60,16 +67,15 @@ def read_orbits(path: str, variables: Sequence[str] | None) -> Stored:
             f"{path}: found {ending or 'no ending'}, expected a file of kahanmaps orbit or ensemble: "
             f"{', '.join(_ENDINGS)}"
         )
+    if not Path(path).is_fifo():  # which can be opened once
+        open(path, "rb").close()  # raises what has nothing to do with what is in it
     try:
         if ending in (".npy", ".csv"):
             found = (_from_npy if ending == ".npy" else _from_csv)(path, variables)
         else:
             found = (_from_npz if ending == ".npz" else _from_jsonl)(path)
-    except click.ClickException:
-        raise
     except Exception as error:  # zip archives, headers of arrays and numbers that are damaged may go wrong in any way
-        is_told = isinstance(error, InputError) and path in str(error)
-        if is_told or (isinstance(error, OSError) and error.filename is not None):  # the other cannot even be opened
+        if isinstance(error, InputError) and path in str(error):
             raise
         raise InputError(
             f"{path}: found no orbit that kahanmaps wrote ({_first(error)}): it is another file, or damaged"
@@ -169,9 +175,8 @@ def _stored(steps: Sequence[Any], x: Any, header: dict[str, Any], end: dict[str,
 
 
 def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
-
     names = tuple(str(name) for name in header["variables"])
-    lib.check_names(names)
+    check_names(names)
     if width and len(names) != width:
         raise ValueError(f"{len(names)} names for {width} columns")
     return names
@@ -179,14 +184,14 @@ def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
 
 def _reader(header: dict[str, Any]) -> Callable[[str], float]:
     """What reads the numbers of an orbit; those over a number field are read at the real root that is meant."""
-    root = next((lib.parse_root(str(text)) for text in header.get("algebraic", {}).values()), None)
+    root = next((parse_root(str(text)) for text in header.get("algebraic", {}).values()), None)
     if root is None or header.get("arithmetic") != "exact":
         return _number
     rounded = cache(root.rounded)
 
     def number(text: str) -> float:
         bits = 1 << max(256, 8 * len(text)).bit_length()  # more than can be lost where conjugates are far away
-        return _number(str(lib.evaluate(lib.parse_polynomial(text, ["t"]), lib.QQ, [rounded(bits)])))
+        return _number(str(evaluate(parse_polynomial(text, ["t"]), QQ, [rounded(bits)])))
 
     return number
 
@@ -196,7 +201,7 @@ def _number(text: str) -> float:
     middle = text.partition(" +/- ")[0].strip("[] ")
     above, slash, below = middle.partition("/")
     try:
-        value = int(lib.fmpz(above)) / int(lib.fmpz(below)) if slash else float(middle)
+        value = int(fmpz(above)) / int(fmpz(below)) if slash else float(middle)
     except OverflowError:
         value = inf
     if not isfinite(value):

@@ -1,0 +1,60 @@
+"""Orbits written from Python are those of the command, and are read back as they were."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+import kahanmaps as km
+from kahanmaps.checks.conserve import functions_along
+from kahanmaps.documents.catalog import load
+from kahanmaps.maps.orbits.stored import read_orbits
+
+TOP = load("euler_top")
+ARITHMETICS = ["exact", "float", "mod:101", "ball:100"]
+
+
+def walk(arithmetic="exact", **options):
+    found = km.orbit(TOP, [1, "1/2", "-1/3"], "1/10", **({"steps": 4} | options), arithmetic=arithmetic)
+    found.integrals = functions_along(TOP, [("", "F1"), ("p", "1/(x1 - 1)")], arithmetic == "float")
+    return found
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("ending", ["csv", "jsonl", "npz"])
+def test_what_is_written_is_read_again(tmp_path, arithmetic, ending):
+    path = tmp_path / f"o.{ending}"
+    end = walk(arithmetic).write(path, name="top")
+    found = read_orbits(str(path), TOP.variables)
+    assert (end.status, found.end["status"], found.header["system"]) == ("completed", "completed", "top")
+    kept = walk(arithmetic)
+    points = [[float(f"{text}".strip("[]").split(" ")[0]) for text in point.text] for point in kept] \
+        if arithmetic == "ball:100" else np.asarray(kept).tolist()  # fmt: skip
+    assert found.points[:, 0].tolist() == points
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_a_table_has_the_values_of_integrals_and_none_at_a_pole(arithmetic):
+    rows = walk(arithmetic).rows()
+    assert list(rows[0]) == ["step", *TOP.variables, "F1", "p"]
+    assert rows[0]["p"] is None
+    assert rows[1]["p"] is not None
+    if arithmetic in ("exact", "mod:101"):
+        assert len({row["F1"] for row in rows}) == 1
+
+
+def test_only_wanted_points_are_written():
+    stream = io.StringIO()
+    told = []
+    walk(every=2).write(stream, "jsonl", told=told.append)
+    header, *points, end = map(json.loads, stream.getvalue().splitlines())
+    assert ([point["step"] for point in points], told, end["steps"]) == ([0, 2, 4], [0, 1, 2, 3, 4], 4)
+    assert header["start"] == ["1", "1/2", "-1/3"]
+
+
+def test_a_full_disk_is_named(tmp_path):
+    for form in ("csv", "jsonl", "npz", "npy"):
+        found = km.orbit(TOP, [1, 2, 3], "1/10", 50_000 if form == "npy" else 3, arithmetic="float")
+        with pytest.raises(OSError, match="/dev/full"):
+            found.write("/dev/full", form)
