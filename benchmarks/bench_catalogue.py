@@ -1,4 +1,4 @@
-"""Exact orbits of the systems and maps of the catalogue: kahanmaps without structure against FLINT's plain solve.
+"""Exact orbits of the systems and maps of the catalogue: kahanmaps without normal form against FLINT's plain solve.
 
     python benchmarks/bench_catalogue.py [--quick]
 
@@ -19,7 +19,7 @@ from kahanmaps import Orbit, load
 from kahanmaps.documents.catalog import map_names, names
 
 GROUP = "Exact orbits of the catalogue"
-OURS = "kahanmaps without structure"
+OURS = "kahanmaps without normal form"
 PLAIN = "FLINT: fmpq_mat.solve, rationals"
 EPS = fmpq(3, 11)
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))

@@ -63,7 +63,7 @@ def normal_only(work: Work, steps: int) -> tuple[float, Pairs]:
 
 
 def generic(work: Work, steps: int) -> tuple[float, Pairs]:
-    """What kahanmaps does for a system without structure: fraction-free elimination on integers."""
+    """What kahanmaps does without the normal form: linear systems on integers over one denominator."""
 
     def run() -> Any:
         return deque(Orbit(KahanMap(work.system, work.eps), work.start, steps, max_digits=None), maxlen=1)[0]
@@ -334,7 +334,7 @@ KAHANMAPS: list[tuple[str, Runner]] = [
     ("kahanmaps, normal form: reduced rationals in x", normal_reduced),
     ("kahanmaps, normal form: x over one common denominator", normal_common),
     ("kahanmaps, normal form: normal coordinates alone", normal_only),
-    ("kahanmaps without structure", generic),
+    ("kahanmaps without normal form", generic),
 ]
 PEERS: list[tuple[str, Runner]] = [
     ("FLINT: fmpz_mat.rref (fraction-free), integers over one denominator", fmpz_rref),
@@ -396,8 +396,8 @@ def over_fields(quick: bool = False) -> list[Row]:
         rows.append(
             row(FIELDS, "kahanmaps, this chi, normal form: reduced rationals in x", what, seconds, seconds / split)
         )
-        rows.append(row(FIELDS, "kahanmaps, this chi, without structure", what, slow, slow / split))
-        say(f"  {what}: {seconds / split:.3g}, without structure {slow / split:.3g}")
+        rows.append(row(FIELDS, "kahanmaps, this chi, without normal form", what, slow, slow / split))
+        say(f"  {what}: {seconds / split:.3g}, without normal form {slow / split:.3g}")
     return rows
 
 

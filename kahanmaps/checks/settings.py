@@ -124,7 +124,7 @@ def run_orbit(
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     kahan = as_map(system).at(eps)
-    # A claim that takes two more steps of a map without structure multiplies the digits by dim^2, and elimination
+    # A claim that takes two more steps of a map without a normal form multiplies the digits by dim^2, and elimination
     # by dim once more; for the family numbers hardly grow from one step to the next.
     by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
     max_digits = by_dimension if settings.max_digits is None else settings.max_digits
