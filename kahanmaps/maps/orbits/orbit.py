@@ -117,6 +117,8 @@ def orbit(
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
+        if at is not None or method not in (None, "generic"):
+            raise InputError(f"over {field} orbits go step by step: found at= or method=, expected steps alone")
         phi = map_.at(1 if eps is None else eps, field)
         return _orbit_at_one_eps(asked._replace(map=phi, eps=None), field)
     asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
