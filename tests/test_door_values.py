@@ -164,6 +164,9 @@ def test_orbits_go_over_every_field_that_has_numbers_to_print():
     for field, kind in kinds:
         walk = km.orbit(FISH, [1, 2], "1/10", 2, arithmetic=field)
         assert (str(walk.arithmetic), walk[0].field) == (kind, field)
+    for options in ({"at": [2]}, {"steps": 2, "method": "doubling"}):
+        with pytest.raises(InputError, match=r"over CC\(64\) orbits go step by step"):
+            km.orbit(FISH, [1, 2], "1/10", arithmetic=km.CC(64), **options)
     phi = km.map(FISH, "1/10")
     assert len(km.orbit(phi, [1, 2], steps=2, arithmetic=km.QQ)) == 3
     with pytest.raises(InputError, match="has its eps and its numbers"):

@@ -109,6 +109,13 @@ def test_an_orbit_ends_before_one_coordinate_leaves_the_range_of_doubles():
     assert delivered[-1] == pytest.approx([float(3**646), 5.0], rel=646 * UNIT)  # one rounding a step
 
 
+def test_an_orbit_walked_again_starts_again():
+    orbit = FloatOrbit(OSCILLATOR, "1/10", [1, 0], 5, every=2)
+    next(iter(orbit))
+    once, again = ([(step, x.tolist()) for step, x in orbit] for _ in range(2))
+    assert (once, again[-1][0], orbit.end.steps) == (again, 4, 5)
+
+
 def test_an_interrupted_orbit_ends_after_the_point_in_hand():
     orbit = FloatOrbit(OSCILLATOR, "1/10", [1, 0], None)
     for step, _ in orbit:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,7 @@ __all__ = [
 
 
 class FloatOrbit:
-    """The orbit of `start` in double precision: iterate once over (step, x), then look at `end`.
+    """The orbit of `start` in double precision: iterate over (step, x), then look at `end`.
 
     `start` holds exact numbers, `eps` is half the time step, `steps` how many steps to take (None: no limit), `every`
     says which of them are delivered, `backward` steps by the inverse map. With `form`, the normal form of the system,
@@ -87,7 +88,8 @@ class FloatOrbit:
         self.every = every
         self.dim = system.dim
         self.end: OrbitEnd | None = None
-        self._ensemble = FloatEnsemble(
+        self._fresh = partial(
+            FloatEnsemble,
             system,
             eps,
             self.start[None],
@@ -98,6 +100,7 @@ class FloatOrbit:
             integrals=integrals,
             sampled=sampled,
         )
+        self._ensemble = self._fresh()
         self._interrupted = False
 
     @property
@@ -136,6 +139,8 @@ class FloatOrbit:
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
         """The same in portions: the step reached, and the points (count, dim) delivered on the way."""
+        if self.end is not None or self._ensemble.step:  # an ensemble would go on from where the last walk was
+            self._ensemble = self._fresh()
         ensemble = self._ensemble
         for x in ensemble.records(_FOR_EVER if self.steps is None else self.steps, self.every):
             points = x[:, 0]

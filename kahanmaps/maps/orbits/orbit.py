@@ -34,7 +34,7 @@ from kahanmaps.maps.orbits.iteration import (
     require_steps,
 )
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method, why_no_reduction
-from kahanmaps.maps.orbits.writers import OutputFull, Writer, form_of, writer_to
+from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
@@ -117,6 +117,8 @@ def orbit(
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
+        if at is not None or method not in (None, "generic"):
+            raise InputError(f"over {field} orbits go step by step: found at= or method=, expected steps alone")
         phi = map_.at(1 if eps is None else eps, field)
         return _orbit_at_one_eps(asked._replace(map=phi, eps=None), field)
     asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
@@ -272,20 +274,30 @@ class Trajectory:
         Args:
             to: a path, beside which a .csv file gets what it is of; a stream of text; or a writer.
             form: "text", "json", "jsonl", "csv", "npz", for the points of float orbits alone "npy"; by default what
-                the ending of the path stands for.
+                the ending of the path stands for, for a stream text.
             name: that of the system.
             told: is called with every step that was computed.
 
         Returns:
             How it ended, as the file says it; "budget" where an npz file cannot hold more.
+
+        Raises:
+            InputError: for other formats, and for npy where it cannot hold what is wanted.
         """
-        if not form and isinstance(to, str | Path):
-            form = form_of(to)
+        if not form:
+            form = form_of(to) if isinstance(to, str | Path) else "text"
+        if form not in FORMATS:
+            raise InputError(f"found the format {form!r}, expected {', '.join(FORMATS)}")
         if form == "npy":
             from kahanmaps.maps.floats.fast import stream_orbit
 
-            stream_orbit(self.orbit, to, progress=told)  # type: ignore[arg-type]  # a path
-            return self._ended(self.end)[0]
+            if not isinstance(to, str | Path):
+                raise InputError("npy grows in a file: found a stream, expected a path")
+            if self.arithmetic.kind != "float":
+                raise InputError("npy is for float orbits: take npz, or jsonl, which holds numbers of any length")
+            if self._asked.at is not None or self.integrals:
+                raise InputError("npy holds the points of steps= and every=: for at= or integrals take npz")
+            return self._ended(stream_orbit(self.orbit, to, progress=told))[0]
         columns = (self.variables, list(self.integrals))
         with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
             writer.header(self.header(name))

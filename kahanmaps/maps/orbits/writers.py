@@ -204,7 +204,10 @@ def writer_to(
 ) -> Iterator[Writer]:
     """What writes points in one of the formats `WRITERS` to a path, on the disk at the end, or a stream of text."""
     if not isinstance(to, str | Path):
-        yield WRITERS[form](to.buffer if form == "npz" else to, variables, integrals)  # type: ignore[attr-defined]
+        stream = getattr(to, "buffer", None) if form == "npz" else to  # bytes, behind a stream that is not in memory
+        if stream is None:
+            raise InputError("npz is not text: found a stream without a buffer of bytes, expected a path")
+        yield WRITERS[form](stream, variables, integrals)
         return
     if form == "csv" and os.path.isdir(meta_of(to)):  # said before an older table is lost
         raise InputError(f"found a folder {meta_of(to)}, where what the table is of is written")
