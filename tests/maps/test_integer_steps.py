@@ -1,8 +1,9 @@
 """Exact steps on integers over one common denominator.
 
 Specified here: the steps are those of fractions solved entry by entry, whichever way the linear systems are solved (the
-threshold between the two ways is put to 0 and to infinity); long numbers that grow slowly are solved modulo powers of 2
-(test_two_adic.py); rows of the equation that do not depend on x are taken out, and the steps stay the same.
+thresholds between the ways are put to 0 and to infinity); long numbers of members are found by elimination
+(test_elimination.py), others that grow slowly modulo powers of 2 (test_two_adic.py); rows of the equation that do not
+depend on x are taken out, and the steps stay the same.
 """
 
 from math import prod
@@ -105,20 +106,38 @@ def test_a_step_on_integers_is_the_step_on_fractions(pair, eps):
 @pytest.mark.parametrize("threshold", [0, 10**9])
 def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, threshold, monkeypatch):
     monkeypatch.setattr(integer_steps, "_LONG", threshold)
+    monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", threshold)
     x = start(system.dim)
     for point in walk(system, eps, steps)[1:]:
         x = rational_step(system, QQ.convert(eps), x)
         assert point.rationals() == x
 
 
-@pytest.mark.parametrize("name", ["m = 3", "m = 3, irreducible", "m = 4"])
-def test_on_integrable_orbits_long_numbers_are_found_modulo_powers_of_2(name, short_solutions):
-    # Were their growth guessed wrongly, FLINT's solver would silently do all the work.
-    orbit = walk(FAMILY[name], "1/10", 20)
+def test_long_numbers_of_a_large_system_are_found_modulo_powers_of_2(short_solutions):
+    # Were their growth guessed wrongly, other solvers would silently do all the work.
+    orbit = walk(FAMILY["m = 4"], "1/10", 20)
     found = [point for point, _ in short_solutions]
     assert len(found) > 5
     assert found == orbit[-len(found) :]
     assert all(0.95 * point.bits < bits < 1.2 * point.bits for point, bits in short_solutions)
+
+
+@pytest.mark.parametrize("name", ["clebsch_first_flow", "lagrange_top"])
+def test_and_those_of_a_small_one_where_elimination_finds_nothing(name, short_solutions):
+    orbit = walk(load(name).system, "3/11", 15)
+    found = [point for point, _ in short_solutions]
+    assert len(found) > 1
+    assert found == orbit[-len(found) :]
+
+
+@pytest.mark.parametrize("name", ["m = 3", "m = 3, irreducible"])
+def test_for_the_family_the_elimination_itself_finds_every_step(name, monkeypatch):
+    # It relies on rank 2 modulo the denominator; were that wrong, FLINT's solver would silently do all the work.
+    found: list[IntegerPoint | None] = []
+    eliminate = integer_steps.eliminated
+    monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", 0)
+    monkeypatch.setattr(integer_steps, "eliminated", lambda *a: found.append(eliminate(*a)) or found[-1])
+    assert walk(FAMILY[name], "1/10", 12)[1:] == found
 
 
 def test_where_numbers_double_nothing_is_tried_modulo_powers_of_2(short_solutions):

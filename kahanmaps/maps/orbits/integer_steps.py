@@ -13,6 +13,7 @@ from math import inf
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.maps.orbits.constant_rows import ConstantRows
+from kahanmaps.maps.orbits.elimination import eliminated
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.two_adic import short_solution
 
@@ -44,6 +45,7 @@ class IntegerSteps:
                     sign = 1 if j < n else -1
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
+        self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
         self._growth = inf  # the bits of the last image over those of its point
         self._is_diagonal = all(i == j or not terms[i][j] for i in range(n) for j in range(n))
         self._constant = self._constant_rows()
@@ -54,20 +56,29 @@ class IntegerSteps:
         if self._is_diagonal:
             return _quotients(matrix, right)
         found = None
-        is_long = self._dim > _CRAMER_DIMENSION and point.bits * self._dim**2 >= _LONG
-        if is_long and self._growth < _SLOW_GROWTH:
+        is_long = point.bits * self._dim**2 >= _LONG and self._growth < _SLOW_GROWTH
+        if is_long and self._dim >= (_SMALL_DIMENSION if self._constant is not None or not self._trials else _LARGE):
             found = short_solution(matrix, right, int(point.bits * (self._growth + 1 / 64)))
         if found is None:
-            found = self._solution(matrix, right, point.denominator**self._degree)
+            found = self._solution(matrix, right, point.denominator)
         self._growth = inf if found is None else found.bits / point.bits
         return found
 
-    def _solution(self, matrix: fmpz_mat, right: fmpz_mat, scale: fmpz) -> IntegerPoint | None:
+    def _solution(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
         if self._constant is None:
-            return _solved(matrix, right)
+            return self._by_elimination(matrix, right, below) or _solved(matrix, right)
+        scale = below**self._degree
         rest, side = self._constant.without(matrix, right, scale)
         found = _solved(rest, side) if rest.nrows() else IntegerPoint((), fmpz(1))
         return found and _lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
+
+    def _by_elimination(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
+        is_medium = _CRAMER_DIMENSION < self._dim <= _ELIMINATION_DIMENSION
+        if not (self._trials and is_medium and below.bit_length() >= _ELIMINATION_BITS):
+            return None
+        found = eliminated(matrix, right, below)
+        self._trials -= found is None
+        return found
 
     def _constant_rows(self) -> ConstantRows | None:
         """The rows without x to the left; None where there are none or they do not pay, and for a singular equation."""
@@ -103,10 +114,15 @@ def _monomial(X: Sequence[fmpz], exponents: Exponents) -> fmpz:
 
 
 _CRAMER_DIMENSION = 3
-# Solutions modulo powers of 2 are faster than FLINT's own solver where a point has more than _LONG / n^2 bits, and
-# numbers grow by less than _SLOW_GROWTH in a step (measured in dimension n = 4 to 10).
+# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
+_ELIMINATION_BITS = 4000
+_ELIMINATION_DIMENSION = 16  # and above this dimension as well
+_TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
+# Solutions modulo powers of 2 are faster where a point has more than _LONG / n^2 bits and numbers grow by less than
+# _SLOW_GROWTH in a step: from _SMALL_DIMENSION on where elimination does not help, from _LARGE on in any case.
 _LONG = 120_000
 _SLOW_GROWTH = 1.5
+_SMALL_DIMENSION, _LARGE = 5, 8
 
 
 def _quotients(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:

@@ -101,7 +101,7 @@ class _Factors:
             for row in rows:
                 _swap(row, j, k)
             _swap(self._columns, j, k)
-            inverse = _inverse_modulo_power_of_two(rows[k][k] >> self.zeros, bits)
+            inverse = inverse_modulo_power_of_two(rows[k][k] >> self.zeros, bits)
             self._pivots.append((self.zeros, inverse))
             for row in rows[k + 1 :]:
                 if row[k]:
@@ -142,13 +142,13 @@ def _least_even(rows: Sequence[Sequence[fmpz]], k: int, bits: int) -> tuple[int,
     for i in range(k, len(rows)):
         for j in range(k, len(rows)):
             if rows[i][j]:
-                least = min(least, (_trailing_zeros(rows[i][j]), i, j))
+                least = min(least, (trailing_zeros(rows[i][j]), i, j))
                 if least[0] == 0:
                     return least
     return least
 
 
-def _inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:
+def inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:
     """1 / odd modulo 2^bits, by Newton's iteration."""
     precision = 64
     inverse = fmpz(pow(int(odd & ((1 << 64) - 1)), -1, 1 << 64))
@@ -159,7 +159,8 @@ def _inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:
     return inverse & ((fmpz(1) << bits) - 1)
 
 
-def _trailing_zeros(value: fmpz) -> int:
+def trailing_zeros(value: fmpz) -> int:
+    """The number of factors 2 of an integer that is not 0."""
     low = int(value & ((1 << 64) - 1))
     if low:
         return (low & -low).bit_length() - 1

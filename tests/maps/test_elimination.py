@@ -1,0 +1,116 @@
+"""Fraction-free elimination that takes out what minors share, against FLINT's solver.
+
+Specified here: it finds what FLINT's solver finds, on matrices of every size, regular or singular, whose minors share
+everything, something or nothing with the number that is offered; and what it finds is not believed without a proof.
+"""
+
+import random
+
+import pytest
+from flint import fmpq_mat, fmpz, fmpz_mat
+
+from kahanmaps.maps.orbits import elimination
+from kahanmaps.maps.orbits.elimination import eliminated
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+
+
+def random_integers(rows: int, columns: int, rng: random.Random, bits: int) -> fmpz_mat:
+    return fmpz_mat(rows, columns, [rng.randint(-(2**bits), 2**bits) for _ in range(rows * columns)])
+
+
+def divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
+    return eliminated(matrix, right, likely) or by_flint(matrix, right)
+
+
+def by_flint(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
+    try:
+        return IntegerPoint.from_rationals(fmpq_mat(matrix).solve(fmpq_mat(right)).entries())
+    except ZeroDivisionError:
+        return None
+
+
+sizes = pytest.mark.parametrize("n", range(1, 9))
+LONG_PRIME = fmpz(2**127 - 1)
+
+
+@sizes
+@pytest.mark.parametrize("bits", [1, 8, 200])
+def test_elimination_solves_random_systems(n, bits):
+    rng = random.Random(f"{n} {bits}")
+    for _ in range(20):
+        matrix, right = random_integers(n, n, rng, bits), random_integers(n, 1, rng, bits)
+        assert divide(matrix, right, fmpz(rng.getrandbits(300) | 1)) == by_flint(matrix, right)
+
+
+@pytest.mark.parametrize("n", range(2, 9))
+@pytest.mark.parametrize("consistent", [True, False], ids=["consistent", "inconsistent"])
+def test_a_singular_system_has_no_solution_even_if_it_is_consistent(n, consistent):
+    rng = random.Random(n)
+    for rank in range(1, n):
+        matrix = random_integers(n, rank, rng, 50) * random_integers(rank, n, rng, 50)
+        right = matrix * random_integers(n, 1, rng, 50) if consistent else random_integers(n, 1, rng, 50)
+        assert divide(matrix, right, LONG_PRIME) is None
+
+
+def of_rank_two_modulo(W: fmpz, n: int, rng: random.Random) -> tuple[fmpz_mat, fmpz_mat]:
+    """A matrix and a right side, congruent modulo W to a matrix of rank 2 and a column of its image."""
+
+    plane = random_integers(n, 2, rng, 6)
+    matrix = plane * random_integers(2, n, rng, 6) + random_integers(n, n, rng, 6) * W
+    return matrix, plane * random_integers(2, 1, rng, 6) + random_integers(n, 1, rng, 6) * W
+
+
+CONTENTS = {
+    "a long prime": (LONG_PRIME, LONG_PRIME),
+    "its square": (LONG_PRIME**2, LONG_PRIME**2),
+    "a product with small primes": (LONG_PRIME * 2**40 * 3**20, LONG_PRIME * 2**40 * 3**20),
+    "powers of two": (fmpz(2) ** 300, fmpz(2) ** 300),
+    "a part of the number offered": (LONG_PRIME, LONG_PRIME * (2**521 - 1)),
+    "more than the number offered": (LONG_PRIME * (2**89 - 1), LONG_PRIME),
+    "a number too short to matter": (fmpz(2**31 - 1), fmpz(2**31 - 1)),
+    "nothing": (fmpz(1), LONG_PRIME),
+}
+
+
+@pytest.mark.parametrize("n", range(3, 9))
+@pytest.mark.parametrize(("W", "offered"), CONTENTS.values(), ids=CONTENTS.keys())
+def test_minors_with_common_content_are_solved_correctly(n, W, offered):
+    rng = random.Random(n)
+    for _ in range(5):
+        matrix, right = of_rank_two_modulo(W, n, rng)
+        assert divide(matrix, right, offered) == by_flint(matrix, right)
+
+
+@pytest.mark.parametrize("n", range(3, 9))
+def test_common_content_is_taken_out_by_the_elimination_itself(n):
+    rng = random.Random(n)
+    matrix, right = of_rank_two_modulo(LONG_PRIME, n, rng)
+    assert elimination._eliminate(matrix, right, LONG_PRIME) == by_flint(matrix, right)
+
+
+@pytest.mark.parametrize("n", range(3, 9))
+def test_a_vanishing_pivot_makes_the_elimination_step_aside(n):
+    matrix = fmpz_mat(n, n, [int(i + j == n - 1) for i in range(n) for j in range(n)])  # the reversal
+    right = fmpz_mat(n, 1, list(range(n)))
+    assert elimination._eliminate(matrix, right, LONG_PRIME) is None
+    assert divide(matrix, right, LONG_PRIME).numerators == tuple(reversed(range(n)))
+
+
+# Of the six minors of order 3 the elimination looks at every second one and finds d in all of them; the others do not
+# contain it, so that the divisions by d are not exact.
+D = LONG_PRIME
+DECEPTIVE_BLOCKS = {
+    "regular": [[D, 1], [D**2, 2 * D]],
+    "singular": [[D, 1], [D**2, D]],
+}
+
+
+def deceptive(block) -> fmpz_mat:
+    return fmpz_mat([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, *block[0]], [0, 0, *block[1]]])
+
+
+@pytest.mark.parametrize("block", DECEPTIVE_BLOCKS.values(), ids=DECEPTIVE_BLOCKS.keys())
+@pytest.mark.parametrize("right", [(1, 1, 0, 0), (1, 2, int(D), 5), (0, 0, int(D), int(D) ** 2)], ids=len)
+def test_divisions_that_are_not_exact_do_no_harm(block, right):
+    matrix, column = deceptive(block), fmpz_mat(4, 1, list(right))
+    assert divide(matrix, column, D) == by_flint(matrix, column)
