@@ -106,6 +106,7 @@ def test_a_step_on_integers_is_the_step_on_fractions(pair, eps):
 @pytest.mark.parametrize("threshold", [0, 10**9])
 def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, threshold, monkeypatch):
     monkeypatch.setattr(integer_steps, "_LONG", threshold)
+    monkeypatch.setattr(integer_steps, "_VERY_LONG", threshold)
     monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", threshold)
     x = start(system.dim)
     for point in walk(system, eps, steps)[1:]:

@@ -56,13 +56,19 @@ class IntegerSteps:
         if self._is_diagonal:
             return _quotients(matrix, right)
         found = None
-        is_long = point.bits * self._dim**2 >= _LONG and self._growth < _SLOW_GROWTH
-        if is_long and self._dim >= (_SMALL_DIMENSION if self._constant is not None or not self._trials else _LARGE):
+        if self._growth < _SLOW_GROWTH and point.bits >= self._short_from():
             found = short_solution(matrix, right, int(point.bits * (self._growth + 1 / 64)))
         if found is None:
             found = self._solution(matrix, right, point.denominator)
         self._growth = inf if found is None else found.bits / point.bits
         return found
+
+    def _short_from(self) -> float:
+        """From how many bits of a point on its image is looked for modulo powers of 2."""
+        if self._dim < _SHORT_DIMENSION:
+            return inf
+        helps = self._dim < _LARGE_DIMENSION and self._constant is None and self._trials > 0
+        return _VERY_LONG if helps else _LONG / self._dim**2
 
     def _solution(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
         if self._constant is None:
@@ -118,11 +124,11 @@ _CRAMER_DIMENSION = 3
 _ELIMINATION_BITS = 4000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 _TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
-# Solutions modulo powers of 2 are faster where a point has more than _LONG / n^2 bits and numbers grow by less than
-# _SLOW_GROWTH in a step: from _SMALL_DIMENSION on where elimination does not help, from _LARGE on in any case.
-_LONG = 120_000
+# Solutions modulo powers of 2 are faster where numbers grow by less than _SLOW_GROWTH in a step and a point has more
+# than _LONG / n^2 bits, or _VERY_LONG where elimination helps, as it may below _LARGE_DIMENSION.
 _SLOW_GROWTH = 1.5
-_SMALL_DIMENSION, _LARGE = 5, 8
+_LONG, _VERY_LONG = 120_000, 8000
+_SHORT_DIMENSION, _LARGE_DIMENSION = 5, 8
 
 
 def _quotients(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
