@@ -17,7 +17,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit
-from kahanmaps.maps.residues.ensemble import Arithmetic, ModularEnsemble, _split
+from kahanmaps.maps.residues.ensemble import ModularEnsemble, ResidueArithmetic, _split
 from kahanmaps.maps.residues.numba_kernel import kernels
 
 MERSENNE = 2**61 - 1
@@ -184,7 +184,7 @@ def hard(prime, rng, count):
 
 @pytest.mark.parametrize("prime", PRIMES)
 def test_sums_of_products_are_exact_also_at_the_ends(prime):
-    rng, arithmetic = random.Random(prime), Arithmetic(prime)
+    rng, arithmetic = random.Random(prime), ResidueArithmetic(prime)
     for terms in (1, 2, 3, 4):
         columns = [hard(prime, rng, 5_000) for _ in range(2 * terms)]
         arrays = [arithmetic.array(column) for column in columns]

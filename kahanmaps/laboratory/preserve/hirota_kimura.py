@@ -48,10 +48,11 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 class OrbitRelations:
     """The polynomials up to a degree that vanish along one orbit.
 
-    They span a space of this `dimension`, and the columns of `kernel` that are not 0 are a basis on the monomials of
-    `exponents_up_to` that degree, or on those in the places `support`, where the others follow. `leading` are the last
-    monomials of the basis, whose multiples are dependent in any higher degree; `normals` is a basis of the span of the
-    gradients at the last point, `end`; `period` is the number of points of an orbit that closed, else None.
+    They span a space of this `dimension`. The columns of `kernel` that are not 0 are a basis, on the monomials of
+    `exponents_up_to` that degree or, where multiples were left out, on the others; the rest of the space follows.
+    `leading` are the last monomials of the basis, whose multiples are dependent in any higher degree; `normals` is a
+    basis of the span of the gradients at the last point, `end`; `period` is the number of points of an orbit that
+    closed, else None.
     """
 
     kernel: nmod_mat

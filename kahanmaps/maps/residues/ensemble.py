@@ -44,7 +44,7 @@ def _sum(arrays: Iterable[Any]) -> Any:
     return first
 
 
-class Arithmetic:
+class ResidueArithmetic:
     """Arrays of residues modulo p < 2^61 in numpy.
 
     For p < 2^31 four products fit into 64 bits. Otherwise the sum X of up to four products a b is taken in two parts,
@@ -166,7 +166,7 @@ class ModularEnsemble:
         self.field = field = GF(prime)
         self.system = system
         self.prime = prime
-        self.arithmetic = Arithmetic(prime)
+        self.arithmetic = ResidueArithmetic(prime)
         # Montgomery's form needs an odd modulus.
         self.kernel = "numpy" if prime == 2 else choose_kernel(kernel, long=True)
         if threads < 1:
@@ -266,7 +266,7 @@ class _Planes:
 
     method = "planes"
 
-    def __init__(self, splitting: Splitting, arithmetic: Arithmetic, kernel: str) -> None:
+    def __init__(self, splitting: Splitting, arithmetic: ResidueArithmetic, kernel: str) -> None:
         self.arithmetic, self.compiled = arithmetic, kernel == "numba"
         p, n = arithmetic.prime, splitting.dim
         unit = [[int(i == j) for i in range(n)] for j in range(n)]
@@ -344,7 +344,7 @@ def _step_coefficients(block: Any, p: int) -> list[int]:
     return [e % p for e in (b, 2 * c, 3 * d, -3 * a, -2 * b, -c, *(int(e) for e in block.D))]
 
 
-def _times(values: Residues, factor: int, arithmetic: Arithmetic) -> Residues:
+def _times(values: Residues, factor: int, arithmetic: ResidueArithmetic) -> Residues:
     return arithmetic.mul(values, arithmetic.array([factor]))
 
 
@@ -353,7 +353,7 @@ class _General:
 
     method = "elimination"
 
-    def __init__(self, map_over: StepOver, arithmetic: Arithmetic, kernel: str) -> None:
+    def __init__(self, map_over: StepOver, arithmetic: ResidueArithmetic, kernel: str) -> None:
         equation = map_over.equation
         assert map_over.field.characteristic == arithmetic.prime
         self.arithmetic, self.compiled = arithmetic, kernel == "numba"
