@@ -169,6 +169,7 @@ SOURCES: dict[str, str] = {
     "diller-favre-2001": (
         "J. Diller, C. Favre. Dynamics of bimeromorphic maps of surfaces. Amer. J. Math. 123 (2001), 1135-1169"
     ),
+    "mumford-1970": "D. Mumford. Abelian varieties. Oxford University Press, 1970",
     "hartshorne-1977": "R. Hartshorne. Algebraic geometry. Graduate Texts in Mathematics 52, Springer, 1977",
     "fatou-1906": "P. Fatou. Series trigonometriques et series de Taylor. Acta Math. 30 (1906), 335-400",
     "massey-1969": (

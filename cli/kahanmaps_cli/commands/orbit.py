@@ -99,8 +99,9 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
             **opt.given(options, "steps", "at", "every", "backward", "arithmetic", "method", "max_digits", "kernel"),
         )
     walk.integrals = functions
+    said = walk.why
     if verbose and not quiet:
-        say(walk.why)
+        say(said)
     on_terminal = output is None and sys.stdout.isatty()
     is_table = on_terminal and form == "text"
     to: Any = sys.stdout if output is None else output
@@ -121,6 +122,8 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
     with interruptible(walk.interrupt), Progress(quiet or on_terminal) as progress:  # points themselves show it
         end = walk.write(to, form, file.name, told)
+    if verbose and not quiet and walk.why != said:
+        say(walk.why)
     if output is not None and not quiet:
         say(f"{output}: {end.text}")
     elif end.status not in _STATUS and not (quiet or unread or is_table):  # whose last line says it

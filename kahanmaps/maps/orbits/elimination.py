@@ -8,7 +8,6 @@ from functools import lru_cache, partial
 from flint import fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.two_adic import inverse_modulo_power_of_two, trailing_zeros
 
 # A common divisor shorter than this is not worth a division of every entry.
 _USEFUL_BITS = 64
@@ -18,14 +17,17 @@ _PRIME = 2**61 - 1
 def eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
     """The solution of matrix x = right; `likely` is an integer whose powers may divide the minors. None if in doubt.
 
-    The elimination assumes that certain divisions are exact. What makes the result certain is this: it is a
-    solution, and there is no other, since the determinant does not vanish modulo a prime.
+    The elimination assumes that certain divisions are exact; what it finds is tried in the equation.
     """
     found = _eliminate(matrix, right, likely)
-    if found is None or int(nmod_mat(matrix, _PRIME).det()) == 0:
-        return None
-    column = fmpz_mat(right.nrows(), 1, found.numerators)
-    return found if matrix * column == right * found.denominator else None
+    return found if found is not None and is_the_solution(found, matrix, right) else None
+
+
+def is_the_solution(found: IntegerPoint, matrix: fmpz_mat, right: fmpz_mat) -> bool:
+    """Whether matrix x = right has this solution and no other; False also if det is 0 modulo a certain prime only."""
+    if not int(nmod_mat(matrix, _PRIME).det()):
+        return False
+    return bool(matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator)
 
 
 def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
@@ -139,7 +141,7 @@ class _ExactDivisor:
 
     def __init__(self, divisor: fmpz) -> None:
         self._divisor = divisor
-        self._zeros = trailing_zeros(divisor)
+        self._zeros = _trailing_zeros(divisor)
         self._bits = 0
         self._inverse = fmpz(0)
 
@@ -172,7 +174,7 @@ class _ExactDivisor:
         """The inverse of the odd part of the divisor modulo 2^bits."""
         if bits > self._bits:
             self._bits = bits
-            self._inverse = inverse_modulo_power_of_two(self._divisor >> self._zeros, bits)
+            self._inverse = _inverse_modulo_power_of_two(self._divisor >> self._zeros, bits)
         return self._inverse & ((fmpz(1) << bits) - 1)
 
 
@@ -181,3 +183,22 @@ def _signed(residues: list[fmpz], bits: int) -> list[fmpz]:
     modulus = fmpz(1) << bits
     half = modulus >> 1
     return [residue - modulus if residue >= half else residue for residue in residues]
+
+
+def _inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:
+    """1 / odd modulo 2^bits, by Newton's iteration."""
+    precision = 64
+    inverse = fmpz(pow(int(odd & ((1 << 64) - 1)), -1, 1 << 64))
+    while precision < bits:
+        precision = min(2 * precision, bits)
+        mask = (fmpz(1) << precision) - 1
+        inverse = (inverse * (2 - (odd & mask) * inverse)) & mask
+    return inverse & ((fmpz(1) << bits) - 1)
+
+
+def _trailing_zeros(value: fmpz) -> int:
+    """The number of factors 2 of an integer that is not 0."""
+    low = int(value & ((1 << 64) - 1))
+    if low:
+        return (low & -low).bit_length() - 1
+    return int((value & -value).bit_length()) - 1

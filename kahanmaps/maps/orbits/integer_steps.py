@@ -8,14 +8,13 @@ number is formed on the way: a rational constructor runs a gcd that costs more t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.maps.orbits.constant_rows import ConstantRows
-from kahanmaps.maps.orbits.elimination import eliminated
+from kahanmaps.maps.orbits.elimination import eliminated, is_the_solution
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.two_adic import short_solution
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
@@ -29,7 +28,7 @@ class IntegerSteps:
     """
 
     def __init__(self, exponents: Sequence[Exponents], terms: Sequence[Sequence[Terms]]) -> None:
-        n = self._dim = len(terms)
+        n = self.dim = len(terms)
         self._degree = sum(exponents[0])
         self._exponents = exponents
         entries = [fmpz(0)] * (n * (n + 1) * len(exponents))
@@ -46,40 +45,24 @@ class IntegerSteps:
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
-        self._growth = inf  # the bits of the last image over those of its point
-        self._is_diagonal = all(i == j or not terms[i][j] for i in range(n) for j in range(n))
-        self._constant = self._constant_rows()
+        self._order = _substitution_order([[bool(entry) for entry in row[:n]] for row in terms])
+        self._constant = None if self._order else self._constant_rows()
+        self._rows = None if self._degree == 1 or self._constant else [self._without_powers(i) for i in range(n)]
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
         matrix, right = self._equation(point)
-        if self._is_diagonal:
-            return _quotients(matrix, right)
-        found = None
-        if self._growth < _SLOW_GROWTH and point.bits >= self._short_from():
-            found = short_solution(matrix, right, int(point.bits * (self._growth + 1 / 64)))
-        if found is None:
-            found = self._solution(matrix, right, point.denominator)
-        self._growth = inf if found is None else found.bits / point.bits
-        return found
-
-    def _short_from(self) -> float:
-        """From how many bits of a point on its image is looked for modulo powers of 2."""
-        if self._dim < _SHORT_DIMENSION:
-            return inf
-        helps = self._dim < _LARGE_DIMENSION and self._constant is None and self._trials > 0
-        return _VERY_LONG if helps else _LONG / self._dim**2
-
-    def _solution(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
+        if self._order:
+            return _substituted(matrix, right, self._order)
         if self._constant is None:
-            return self._by_elimination(matrix, right, below) or _solved(matrix, right)
-        scale = below**self._degree
+            return self._by_elimination(matrix, right, point.denominator) or _solved(matrix, right)
+        scale = point.denominator**self._degree
         rest, side = self._constant.without(matrix, right, scale)
         found = _solved(rest, side) if rest.nrows() else IntegerPoint((), fmpz(1))
-        return found and _lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
+        return found and lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
 
     def _by_elimination(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
-        is_medium = _CRAMER_DIMENSION < self._dim <= _ELIMINATION_DIMENSION
+        is_medium = _CRAMER_DIMENSION < self.dim <= _ELIMINATION_DIMENSION
         if not (self._trials and is_medium and below.bit_length() >= _ELIMINATION_BITS):
             return None
         found = eliminated(matrix, right, below)
@@ -88,7 +71,7 @@ class IntegerSteps:
 
     def _constant_rows(self) -> ConstantRows | None:
         """The rows without x to the left; None where there are none or they do not pay, and for a singular equation."""
-        n, forms = self._dim, self._forms.tolist()
+        n, forms = self.dim, self._forms.tolist()
         alone = [k for k, exponent in enumerate(self._exponents) if not any(exponent[:-1])]
         others = [k for k in range(len(self._exponents)) if k not in alone]
         rows = [i for i in range(n) if not any(forms[i * (n + 1) + j][k] for j in range(n) for k in others)]
@@ -100,18 +83,57 @@ class IntegerSteps:
     def determinant(self, point: IntegerPoint) -> fmpq:
         """det M(x)."""
         matrix, _ = self._equation(point)
-        return fmpq(matrix.det(), self._scale * point.denominator ** (self._dim * self._degree))
+        degrees = [self._degree] * self.dim if self._rows is None else [sum(row[0][0]) for row in self._rows]
+        return fmpq(matrix.det(), self._scale * point.denominator ** sum(degrees))
+
+    def is_image(self, point: IntegerPoint, image: IntegerPoint) -> bool:
+        """Whether the map is sure to have this value there."""
+        return is_the_solution(image, *self._equation(point))
+
+    def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
+        """So many points from this one on modulo a prime below 2^63, each with 1 behind its coordinates."""
+        n, forms = self.dim, nmod_mat(self._forms, prime)
+        denominator = int(point.denominator % prime)
+        if not denominator:
+            return None
+        inverse = pow(denominator, -1, prime)
+        points = [[*(int(entry * inverse % prime) for entry in point.numerators), 1]]
+        while len(points) < length:
+            monomials = [int(_monomial(points[-1], exponent) % prime) for exponent in self._exponents]
+            values = (forms * nmod_mat(len(monomials), 1, monomials, prime)).entries()
+            rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
+            try:
+                image = nmod_mat([row[:n] for row in rows], prime).solve(nmod_mat([row[n:] for row in rows], prime))
+            except ZeroDivisionError:
+                return None
+            points.append([*(int(entry) for entry in image.entries()), 1])
+        return points
 
     def _equation(self, point: IntegerPoint) -> tuple[fmpz_mat, fmpz_mat]:
-        """W^d M(x) and W^d r(x), each row times a common denominator of its coefficients."""
-        n, X = self._dim, [*point.numerators, point.denominator]
-        if self._degree != 1:
-            X = [_monomial(X, exponent) for exponent in self._exponents]
-        values = fmpz_mat(n, n + 1, (self._forms * fmpz_mat(len(X), 1, X)).entries()).tolist()
+        """M(x) and r(x), each row times a common denominator of its coefficients and the least power of W."""
+        n, X = self.dim, [*point.numerators, point.denominator]
+        if self._rows is not None:
+            values = [(forms * _monomials(X, exponents)).entries() for exponents, forms in self._rows]
+        else:
+            column = fmpz_mat(n + 1, 1, X) if self._degree == 1 else _monomials(X, self._exponents)
+            values = fmpz_mat(n, n + 1, (self._forms * column).entries()).tolist()
         return fmpz_mat([row[:n] for row in values]), fmpz_mat([[row[n]] for row in values])
 
+    def _without_powers(self, i: int) -> tuple[list[Exponents], fmpz_mat]:
+        """The monomials of a row, without the power of W that they share, and its forms of these."""
+        forms = self._forms.tolist()[i * (self.dim + 1) : (i + 1) * (self.dim + 1)]
+        used = [k for k in range(len(self._exponents)) if any(form[k] for form in forms)] or [0]
+        shared = min(self._exponents[k][-1] for k in used)
+        exponents = [(*self._exponents[k][:-1], self._exponents[k][-1] - shared) for k in used]
+        return exponents, fmpz_mat([[form[k] for k in used] for form in forms])
 
-def _monomial(X: Sequence[fmpz], exponents: Exponents) -> fmpz:
+
+def _monomials(X: Sequence[fmpz], exponents: Sequence[Exponents]) -> fmpz_mat:
+    """Their values in a column."""
+    return fmpz_mat(len(exponents), 1, [_monomial(X, exponent) for exponent in exponents])
+
+
+def _monomial(X: Sequence[Any], exponents: Exponents) -> fmpz:
     total = fmpz(1)
     for entry, exponent in zip(X, exponents, strict=True):
         if exponent:
@@ -124,19 +146,32 @@ _CRAMER_DIMENSION = 3
 _ELIMINATION_BITS = 4000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 _TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
-# Solutions modulo powers of 2 are faster where numbers grow by less than _SLOW_GROWTH in a step and a point has more
-# than _LONG / n^2 bits, or _VERY_LONG where elimination helps, as it may below _LARGE_DIMENSION.
-_SLOW_GROWTH = 1.5
-_LONG, _VERY_LONG = 120_000, 8000
-_SHORT_DIMENSION, _LARGE_DIMENSION = 5, 8
 
 
-def _quotients(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
-    """The solution for a diagonal matrix: gcds of two entries each are shorter than those with the determinant."""
-    n = matrix.nrows()
-    if any(matrix[i, i] == 0 for i in range(n)):
-        return None
-    return IntegerPoint.from_rationals([fmpq(right[i, 0], matrix[i, i]) for i in range(n)])
+def _substitution_order(is_used: Sequence[Sequence[bool]]) -> list[tuple[int, int]]:
+    """Rows and unknowns in an order in which each row has only one that is new; empty where there is none."""
+    order: list[tuple[int, int]] = []
+    left = list(range(len(is_used)))
+    while left:
+        known = {j for _, j in order}
+        new = {i: [j for j, used in enumerate(is_used[i]) if used and j not in known] for i in left}
+        i = next((i for i in left if len(new[i]) == 1), None)
+        if i is None:
+            return []
+        order.append((i, new[i][0]))
+        left.remove(i)
+    return order
+
+
+def _substituted(matrix: fmpz_mat, right: fmpz_mat, order: Sequence[tuple[int, int]]) -> IntegerPoint | None:
+    """The solution, unknown by unknown: gcds of a few entries each are shorter than those with the determinant."""
+    found: dict[int, fmpq] = {}
+    for i, j in order:
+        if matrix[i, j] == 0:
+            return None
+        side = sum((-matrix[i, k] * x for k, x in found.items() if matrix[i, k] != 0), right[i, 0])
+        found[j] = fmpq(side) / matrix[i, j] if isinstance(side, fmpq) else fmpq(side, matrix[i, j])
+    return IntegerPoint.from_rationals([found[j] for j in range(len(order))])
 
 
 def _solved(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
@@ -170,10 +205,10 @@ def _cramer(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
             r * cofactors[1] + s * (a * i - c * g) + t * (c * d - a * f),
             r * cofactors[2] + s * (b * g - a * h) + t * (a * e - b * d),
         ]
-    return _lowest(numerators, denominator)
+    return lowest(numerators, denominator)
 
 
-def _lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
+def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
     """The point in lowest terms; None where the denominator is 0."""
     if denominator == 0:
         return None

@@ -21,6 +21,7 @@ from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
+from kahanmaps.maps.orbits.bilinear_steps import RationalOrbit
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
@@ -141,6 +142,12 @@ class Orbit(Displayed):
         self.first: list[OrbitPoint] = []  # up to FIRST_POINTS of them
         self.last: OrbitPoint | None = None
         self._interrupted = False
+        self._walk: RationalOrbit | None = None
+
+    @property
+    def bilinear_since(self) -> int | None:
+        """From which step on bilinear forms that hold along the orbit are in use; None where they are not."""
+        return None if self._walk is None else self._walk.since
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
@@ -208,10 +215,8 @@ class Orbit(Displayed):
                     value = self.map.step(value)
                 yield value
         elif field is QQ:
-            point: IntegerPoint | None = IntegerPoint.from_rationals(self.start)
-            while point is not None:
-                yield point
-                point = self.map.integer_step(point, _bits(self.max_digits))
+            walk = self._walk = RationalOrbit(self.map, IntegerPoint.from_rationals(self.start), _bits(self.max_digits))
+            yield from walk
         else:
             value = self.start
             while True:

@@ -188,13 +188,19 @@ class Trajectory:
     def __init__(self, orbit: Any, asked: _Asked, arithmetic: Arithmetic, chosen: Method, remark: str = "") -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
-        self.method, self.why = chosen.name, chosen.text
+        self.method, self._why = chosen.name, chosen.text
         self.variables: tuple[str, ...] = asked.map.variables
         self.integrals: Mapping[str, Any] = {}
         self._asked, self._remark = asked, remark
 
     def __repr__(self) -> str:
         return f"Trajectory({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
+
+    @property
+    def why(self) -> str:
+        """The method and the reason for it, of long orbits over Q also what came to be known on the way."""
+        since = getattr(self.orbit, "bilinear_since", None)
+        return self._why if since is None else f"{self._why}; bilinear forms along the orbit from step {since} on"
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""

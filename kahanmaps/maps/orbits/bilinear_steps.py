@@ -1,0 +1,253 @@
+"""Steps by bilinear forms that hold along one orbit: few products, and no gcds of long integers.
+
+By Cramer's rule the integers of the next point come out as determinants, several times as long as in lowest terms. But
+where an orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation there, homogeneous
+coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), products of a coordinate at
+step n + 1 and one at step n - lag are sections of the same bundle as products of one at step n and one at step
+n + 1 - lag. Where the latter span what they have to,
+
+    f_n X_i(n + 1) X_j(n - lag) = B_ij(X(n), X(n + 1 - lag)),      lag = 1 or 2,
+
+with bilinear forms B_ij that have integer coefficients and are the same for all n. The factors f_n are integers, if
+all points are in lowest terms, and divide one integer R (see `_bound`): a step is some products, exact divisions by the
+last coordinate at step n - lag, and gcds with R. Kahan's discretizations of integrable systems are called after Hirota,
+whose method makes bilinear equations of them.
+
+The forms are found modulo primes. Nothing has to be proved of them: what they give is put into the equation of the
+step, exactly, and only a point without common factor rests on them.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Iterator, Sequence
+from itertools import count
+
+from flint import fmpq, fmpz, fmpz_mat, nmod_mat
+
+from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
+
+# Forms are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers grow
+# by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay.
+_LONG = 350
+_SLOW_GROWTH = 1.5
+_MOST_PRIMES = 50  # for the coefficients
+_PRIME = 2**61 - 1
+_BOUND_DIMENSION = 4  # above, R is so long that it takes more time to find than it saves
+_SPARE = 8  # points beyond the unknowns: each lets wrong forms pass with a chance of 2^-60
+
+
+class RationalOrbit:
+    """The points of an orbit over Q: iterate once; ends where the map has no value, or after one with too many bits.
+
+    `since` is the number of the step from which on bilinear forms are in use, None before.
+    """
+
+    def __init__(self, map_over: MapOver, start: IntegerPoint, max_bits: int | None = None) -> None:
+        self.map, self.start, self.max_bits = map_over, start, max_bits
+        self.since: int | None = None
+
+    def __iter__(self) -> Iterator[IntegerPoint]:
+        last = deque([self.start], maxlen=3)
+        forms: BilinearForms | None = None
+        is_tried = len(self.map.factors) > 1
+        yield self.start
+        for step in count(2):
+            image = None if forms is None else forms.step(last)
+            if image is None:
+                image = self.map.integer_step(last[-1], self.max_bits)
+            if image is None:
+                return
+            yield image
+            last.append(image)
+            if not is_tried and len(last) == 3 and image.bits >= _LONG * (self.map.dim + 1) ** 2:
+                is_tried = True
+                if image.bits < _SLOW_GROWTH * last[1].bits:
+                    forms = bilinear_forms(self.map.factors[0].integer_steps, image)
+                    self.since = None if forms is None else step
+
+
+class BilinearForms:
+    """The forms B_ij for the last j: a row of coefficients for each i, a column for each of the products."""
+
+    def __init__(
+        self,
+        steps: IntegerSteps,
+        lag: int,
+        products: Sequence[tuple[int, int]],
+        coefficients: fmpz_mat,
+        bound: fmpz | None,
+    ) -> None:
+        self.lag, self.products, self.coefficients, self.bound = lag, products, coefficients, bound
+        self._steps = steps
+
+    def step(self, last: Sequence[IntegerPoint]) -> IntegerPoint | None:
+        """The point after the last ones; None where the forms do not give it."""
+        point = last[-1]
+        X, Y = ([*one.numerators, one.denominator] for one in (point, last[-self.lag]))
+        column = fmpz_mat(len(self.products), 1, [X[i] * Y[j] for i, j in self.products])
+        values: list[fmpz] = (self.coefficients * column).entries()
+        if self.bound is None:
+            image = lowest(values[:-1], values[-1])
+        else:
+            divisor = last[-1 - self.lag].denominator
+            values = [value // divisor for value in values]
+            common = self.bound
+            for value in values:
+                common = common.gcd(value % common)
+            common = common if values[-1] > 0 else -common
+            *numerators, denominator = (value // common for value in values)
+            image = IntegerPoint(tuple(numerators), denominator) if denominator else None
+        return image if image is not None and self._steps.is_image(point, image) else None
+
+
+def bilinear_forms(steps: IntegerSteps, point: IntegerPoint) -> BilinearForms | None:
+    """The forms along the orbit of a point, with lag 1 if there are such; None where none are found."""
+    found = (_Search(steps, point, lag).found() for lag in (1, 2))
+    return next((forms for forms in found if forms is not None), None)
+
+
+class _Search:
+    """The forms along the orbit of a point: modulo primes, then over Q."""
+
+    def __init__(self, steps: IntegerSteps, point: IntegerPoint, lag: int) -> None:
+        self._steps, self._point, self._lag = steps, point, lag
+        self._last = [(i, steps.dim) for i in range(steps.dim + 1)]
+        pairs = [(i, j) for i in range(steps.dim + 1) for j in range(steps.dim + 1)]
+        self._wanted = pairs if steps.dim <= _BOUND_DIMENSION else self._last  # i and j of the forms
+        self._products = [(i, j) for i, j in pairs if lag > 1 or i <= j]
+        self._others = list[tuple[int, int]]()  # products that are left out, since these span them
+        self._unit: int | None = None  # which coefficient of the forms is made 1
+
+    def found(self) -> BilinearForms | None:
+        """The forms; None where there are none, or their coefficients are too long."""
+        rng = random.Random(0)  # of unlucky primes only the work is wasted
+        residues, modulus, guess = list[int](), 1, None
+        for _ in range(_MOST_PRIMES):
+            prime = random_prime(rng)
+            new = self._modulo(prime)
+            if new is None:
+                return None
+            if guess is not None and all((x.p - r * x.q) % prime == 0 for x, r in zip(guess, new, strict=True)):
+                return self._forms(guess)
+            residues, modulus = (chinese(residues, modulus, new, prime), modulus * prime) if residues else (new, prime)
+            guess = rational_vector(residues, modulus)
+        return None
+
+    def _forms(self, entries: Sequence[fmpq]) -> BilinearForms:
+        columns = len(self._products)
+        count = len(self._wanted) * columns
+        numbers = _over_one_denominator(entries[:count])[0]
+        rows = [numbers[k : k + columns] for k in range(0, count, columns)]
+        bound = _bound(rows) * _over_one_denominator(entries[count:])[1] if self._wanted != self._last else fmpz(0)
+        last = [row for row, pair in zip(rows, self._wanted, strict=True) if pair in self._last]
+        return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last), bound or None)
+
+    def _modulo(self, prime: int) -> list[int] | None:
+        """The coefficients of the forms modulo a prime, one of them 1, then those of the products that are left out."""
+        lag, length = self._lag, 3 * len(self._products) // 2 + _SPARE
+        points = self._steps.residues(self._point, prime, length + 1 + lag)
+        if points is None:
+            return None
+        ahead, here, before, behind = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
+        values = _table(self._products, here, before, prime)
+        if self._unit is None:
+            pivots = _pivots(values, prime)
+            self._others = [pair for k, pair in enumerate(self._products) if k not in pivots]
+            self._products = [self._products[k] for k in pivots]
+            values = [[row[k] for k in pivots] for row in values]
+        factors = _factors(values, ahead, behind, prime)
+        if factors is None:
+            return None
+        left = [
+            [entry * f % prime for entry in row]
+            for f, row in zip(factors, _table(self._wanted, ahead, behind, prime), strict=True)
+        ]
+        sides = [a + b for a, b in zip(left, _table(self._others, here, before, prime), strict=True)]
+        columns = _solved(values, sides, prime)
+        if columns is None and self._unit is None and self._wanted != self._last:
+            self._wanted = self._last
+            return self._modulo(prime)
+        if columns is None:
+            return None
+        entries = [entry for column in columns for entry in column]
+        if self._unit is None:
+            self._unit = next(k for k, entry in enumerate(entries) if entry)
+        if not entries[self._unit]:
+            return None
+        inverse = pow(entries[self._unit], -1, prime)
+        count = len(self._wanted) * len(self._products)
+        return [*(entry * inverse % prime for entry in entries[:count]), *entries[count:]]
+
+
+Rows = list[list[int]]
+
+
+def _table(pairs: Sequence[tuple[int, int]], first: Rows, second: Rows, prime: int) -> Rows:
+    """The products of coordinates i of the first and j of the second point, a row for each pair of points."""
+    return [[x[i] * y[j] % prime for i, j in pairs] for x, y in zip(first, second, strict=True)]
+
+
+def _pivots(rows: Rows, prime: int) -> list[int]:
+    """The columns that those before them do not span."""
+    reduced, rank = nmod_mat(rows, prime).rref()
+    return [next(k for k in range(len(rows[0])) if int(reduced[i, k])) for i in range(rank)]
+
+
+def _factors(values: Rows, ahead: Rows, behind: Rows, prime: int) -> list[int] | None:
+    """f_n for points with last coordinate 1; None where there are none, or several.
+
+    f and g(X(n + 1)) f and g(X(n - lag)) f are in the span of the columns, where g is a combination of coordinates that
+    has no zeros in common with the last one along a whole divisor.
+    """
+    unknowns = len(values[0])
+    zeros = [0] * unknowns
+    rows = []
+    for row, *points in zip(values, ahead, behind, strict=True):
+        g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in points)
+        rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
+        rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
+    kernel, nullity = nmod_mat(rows, prime).nullspace()
+    if nullity != 1:
+        return None
+    weights = nmod_mat(unknowns, 1, [int(kernel[2 * unknowns + k, 0]) for k in range(unknowns)], prime)
+    return [int(entry) for entry in (nmod_mat(values, prime) * weights).entries()]
+
+
+def _solved(values: Rows, sides: Rows, prime: int) -> Rows | None:
+    """The combinations of the columns of the first that are the columns of the second; None if one of them is not."""
+    unknowns = len(values[0])
+    try:
+        found = nmod_mat(values[:unknowns], prime).solve(nmod_mat(sides[:unknowns], prime))
+    except ZeroDivisionError:
+        return None
+    if nmod_mat(values, prime) * found != nmod_mat(sides, prime):
+        return None
+    return [[int(entry) for entry in column] for column in found.transpose().tolist()]
+
+
+def _over_one_denominator(numbers: Sequence[fmpq]) -> tuple[list[fmpz], fmpz]:
+    """Numerators without common factor, as far as they are all divided by the same integer, and the denominator."""
+    below = fmpz(1)
+    for number in numbers:
+        below = below.lcm(number.q)
+    above = [number.p * (below // number.q) for number in numbers]
+    common = fmpz(0)
+    for entry in above:
+        common = common.gcd(entry)
+    return [entry // common for entry in above] if common else above, below
+
+
+def _bound(forms: Sequence[Sequence[fmpz]]) -> fmpz:
+    """An integer that is divisible by all f_n, up to the denominator for products that are left out; 0 if none is seen.
+
+    As many forms as there are products, with determinant D, give D times each product as integers times f_n: f_n
+    divides D times what the products have in common. All products together have no common factor.
+    """
+    unknowns = len(forms[0])
+    pivots = _pivots([[int(row[k] % _PRIME) for row in forms] for k in range(unknowns)], _PRIME)
+    return abs(fmpz_mat([forms[k] for k in pivots]).det()) if len(pivots) == unknowns else fmpz(0)
