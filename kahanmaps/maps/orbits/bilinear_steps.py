@@ -33,10 +33,11 @@ from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
 # Forms are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers grow
 # by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay.
-_LONG = 350
+_LONG = 500
 _SLOW_GROWTH = 1.5
 _MOST_PRIMES = 50  # for the coefficients
 _PRIME = 2**61 - 1
+_MOST_DIMENSION = 12  # where to look for forms of 169 products takes some seconds
 _BOUND_DIMENSION = 4  # above, R is so long that it takes more time to find than it saves
 _SPARE = 8  # points beyond the unknowns: each lets wrong forms pass with a chance of 2^-60
 
@@ -54,7 +55,7 @@ class RationalOrbit:
     def __iter__(self) -> Iterator[IntegerPoint]:
         last = deque([self.start], maxlen=3)
         forms: BilinearForms | None = None
-        is_tried = len(self.map.factors) > 1
+        is_tried = len(self.map.factors) > 1 or self.map.dim > _MOST_DIMENSION
         yield self.start
         for step in count(2):
             image = None if forms is None else forms.step(last)
@@ -122,6 +123,7 @@ class _Search:
         self._products = [(i, j) for i, j in pairs if lag > 1 or i <= j]
         self._others = list[tuple[int, int]]()  # products that are left out, since these span them
         self._unit: int | None = None  # which coefficient of the forms is made 1
+        self._used: list[int] | None = None  # which unknowns for f_n are not 0; fewer are sought after the first prime
 
     def found(self) -> BilinearForms | None:
         """The forms; None where there are none, or their coefficients are too long."""
@@ -149,7 +151,8 @@ class _Search:
 
     def _modulo(self, prime: int) -> list[int] | None:
         """The coefficients of the forms modulo a prime, one of them 1, then those of the products that are left out."""
-        lag, length = self._lag, 3 * len(self._products) // 2 + _SPARE
+        lag, unknowns = self._lag, len(self._products)
+        length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _SPARE
         points = self._steps.residues(self._point, prime, length + 1 + lag)
         if points is None:
             return None
@@ -157,12 +160,14 @@ class _Search:
         values = _table(self._products, here, before, prime)
         if self._unit is None:
             pivots = _pivots(values, prime)
-            self._others = [pair for k, pair in enumerate(self._products) if k not in pivots]
+            if self._wanted != self._last:
+                self._others = [pair for k, pair in enumerate(self._products) if k not in pivots]
             self._products = [self._products[k] for k in pivots]
             values = [[row[k] for k in pivots] for row in values]
-        factors = _factors(values, ahead, behind, prime)
-        if factors is None:
+        found = _factors(values, ahead, behind, self._used, prime)
+        if found is None:
             return None
+        factors, self._used = found
         left = [
             [entry * f % prime for entry in row]
             for f, row in zip(factors, _table(self._wanted, ahead, behind, prime), strict=True)
@@ -198,8 +203,10 @@ def _pivots(rows: Rows, prime: int) -> list[int]:
     return [next(k for k in range(len(rows[0])) if int(reduced[i, k])) for i in range(rank)]
 
 
-def _factors(values: Rows, ahead: Rows, behind: Rows, prime: int) -> list[int] | None:
-    """f_n for points with last coordinate 1; None where there are none, or several.
+def _factors(
+    values: Rows, ahead: Rows, behind: Rows, used: list[int] | None, prime: int
+) -> tuple[list[int], list[int]] | None:
+    """f_n for points with last coordinate 1, and which unknowns are not 0; None where there are none, or several.
 
     f and g(X(n + 1)) f and g(X(n - lag)) f are in the span of the columns, where g is a combination of coordinates that
     has no zeros in common with the last one along a whole divisor.
@@ -211,11 +218,13 @@ def _factors(values: Rows, ahead: Rows, behind: Rows, prime: int) -> list[int] |
         g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in points)
         rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
         rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
-    kernel, nullity = nmod_mat(rows, prime).nullspace()
+    used = list(range(3 * unknowns)) if used is None else used
+    kernel, nullity = nmod_mat([[row[k] for k in used] for row in rows], prime).nullspace()
     if nullity != 1:
         return None
-    weights = nmod_mat(unknowns, 1, [int(kernel[2 * unknowns + k, 0]) for k in range(unknowns)], prime)
-    return [int(entry) for entry in (nmod_mat(values, prime) * weights).entries()]
+    weights = {k: int(kernel[i, 0]) for i, k in enumerate(used)}
+    factors = [sum(weights.get(2 * unknowns + k, 0) * entry for k, entry in enumerate(row)) % prime for row in values]
+    return factors, [k for k, weight in weights.items() if weight]
 
 
 def _solved(values: Rows, sides: Rows, prime: int) -> Rows | None:

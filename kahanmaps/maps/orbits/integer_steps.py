@@ -99,7 +99,9 @@ class IntegerSteps:
         inverse = pow(denominator, -1, prime)
         points = [[*(int(entry * inverse % prime) for entry in point.numerators), 1]]
         while len(points) < length:
-            monomials = [int(_monomial(points[-1], exponent) % prime) for exponent in self._exponents]
+            monomials = points[-1]
+            if self._degree != 1:
+                monomials = [int(_monomial(monomials, exponent) % prime) for exponent in self._exponents]
             values = (forms * nmod_mat(len(monomials), 1, monomials, prime)).entries()
             rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
             try:
