@@ -31,6 +31,8 @@ from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
+Rows = list[list[int]]
+
 # Forms are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers grow
 # by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay.
 _LONG = 500
@@ -65,11 +67,11 @@ class RationalOrbit:
                 return
             yield image
             last.append(image)
-            if not is_tried and len(last) == 3 and image.bits >= _LONG * (self.map.dim + 1) ** 2:
+            is_long = len(last) == 3 and image.bits >= _LONG * (self.map.dim + 1) ** 2
+            if is_long and not is_tried and image.bits < _SLOW_GROWTH * last[1].bits:
                 is_tried = True
-                if image.bits < _SLOW_GROWTH * last[1].bits:
-                    forms = bilinear_forms(self.map.factors[0].integer_steps, image)
-                    self.since = None if forms is None else step
+                forms = bilinear_forms(self.map.factors[0].integer_steps, image)
+                self.since = None if forms is None else step
 
 
 class BilinearForms:
@@ -122,7 +124,6 @@ class _Search:
         self._wanted = pairs if steps.dim <= _BOUND_DIMENSION else self._last  # i and j of the forms
         self._products = [(i, j) for i, j in pairs if lag > 1 or i <= j]
         self._others = list[tuple[int, int]]()  # products that are left out, since these span them
-        self._unit: int | None = None  # which coefficient of the forms is made 1
         self._used: list[int] | None = None  # which unknowns for f_n are not 0; fewer are sought after the first prime
 
     def found(self) -> BilinearForms | None:
@@ -150,15 +151,15 @@ class _Search:
         return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last), bound or None)
 
     def _modulo(self, prime: int) -> list[int] | None:
-        """The coefficients of the forms modulo a prime, one of them 1, then those of the products that are left out."""
-        lag, unknowns = self._lag, len(self._products)
+        """The coefficients of the forms modulo a prime, then those of the products that are left out."""
+        lag, unknowns, is_first = self._lag, len(self._products), self._used is None
         length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _SPARE
         points = self._steps.residues(self._point, prime, length + 1 + lag)
         if points is None:
             return None
         ahead, here, before, behind = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
         values = _table(self._products, here, before, prime)
-        if self._unit is None:
+        if self._used is None:
             pivots = _pivots(values, prime)
             if self._wanted != self._last:
                 self._others = [pair for k, pair in enumerate(self._products) if k not in pivots]
@@ -174,22 +175,10 @@ class _Search:
         ]
         sides = [a + b for a, b in zip(left, _table(self._others, here, before, prime), strict=True)]
         columns = _solved(values, sides, prime)
-        if columns is None and self._unit is None and self._wanted != self._last:
-            self._wanted = self._last
+        if columns is None and is_first and self._wanted != self._last:
+            self._wanted, self._others, self._used = self._last, [], None
             return self._modulo(prime)
-        if columns is None:
-            return None
-        entries = [entry for column in columns for entry in column]
-        if self._unit is None:
-            self._unit = next(k for k, entry in enumerate(entries) if entry)
-        if not entries[self._unit]:
-            return None
-        inverse = pow(entries[self._unit], -1, prime)
-        count = len(self._wanted) * len(self._products)
-        return [*(entry * inverse % prime for entry in entries[:count]), *entries[count:]]
-
-
-Rows = list[list[int]]
+        return None if columns is None else [entry for column in columns for entry in column]
 
 
 def _table(pairs: Sequence[tuple[int, int]], first: Rows, second: Rows, prime: int) -> Rows:
