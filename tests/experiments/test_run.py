@@ -162,14 +162,14 @@ def test_nothing_is_handed_out_after_an_interrupt():
 def test_what_is_not_done_within_the_grace_is_given_up():
     class Slow(Scripted):
         def wait(self, timeout: float) -> list[Record]:
-            time.sleep(0.05)
+            time.sleep(0.005)
             return []
 
     executor = Slow()
-    batch = Batch(jobs(5), executor, grace=0.2)
+    batch = Batch(jobs(5), executor, grace=0.02)
     batch.interrupt()
     assert not any(batch)
-    batch = Batch(jobs(5), executor, grace=0.2)
+    batch = Batch(jobs(5), executor, grace=0.02)
     executor.jobs = list(jobs(2))
     batch.interrupt()
     assert not any(batch)
@@ -200,7 +200,7 @@ def test_jobs_are_taken_one_by_one_as_they_are_needed():
     assert taken < 110
 
 
-@pytest.mark.parametrize(("kills", "last"), [(1, 80), pytest.param(50, 12_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "last"), [(1, 40), pytest.param(50, 12_000, marks=pytest.mark.slow)])
 def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path, kills: int, last: int):
     text = PAUSES.format(milliseconds=4, last=last)
     (tmp_path / "spec.toml").write_text(text)
