@@ -28,9 +28,10 @@ big = "(1 + x1 + 2*x2 + x3/3 - x4)^11"
 """
 LONG_NUMBER = f'variables = ["x"]\n[system]\nrhs = ["{"7" * 5000}*x"]'
 SPECIAL = """
-import string
+import builtins, keyword, string, sympy
 from sympy import Symbol, sympify
-for name in [a + b for a in ("", *string.ascii_letters) for b in string.ascii_letters] + ["beta", "gamma", "zeta"]:
+known = (name for name in (*dir(sympy), *dir(builtins), *keyword.kwlist) if len(name) == 2 and name.isalpha())
+for name in [*string.ascii_letters, *known, "beta", "gamma", "zeta"]:
     try:
         same = sympify(name) == Symbol(name)
     except Exception:
