@@ -25,14 +25,14 @@ name = "mixed"
 limits = { time = "30 s", memory = "150 MB" }
 [experiments.faults]
 task = "fault"
-axes = { order = [2, 6, 8], seed = "0..1" }
+axes = { order = [6, 8], seed = "0..1" }
 [experiments.space]
 task = "family-space"
 system = "family"
-axes = { m = 2, seed = "0..2" }
+axes = { m = 2, seed = "0..1" }
 [experiments.top]
 task = "check-integrals"
-system = ["euler_top", "lorenz", "henon_heiles"]
+system = ["euler_top", "lorenz"]
 axes = { time_step = "1/5" }
 """
 PAUSES = """
@@ -49,8 +49,7 @@ def undisturbed(fault_tasks, tmp_path_factory) -> str:
     db = tmp_path_factory.mktemp("undisturbed") / "results.db"
     records = list(run(MIXED, db))
     assert Counter(record.outcome for record in records) == {
-        Outcome.OK: 3 + 3 + 2,
-        Outcome.CRASHED: 1,
+        Outcome.OK: 2 + 2 + 1,
         Outcome.FAILED: 1 + 1,
         Outcome.OUT_OF_MEMORY: 1,
     }
@@ -61,7 +60,7 @@ def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_int
     undisturbed: str, tmp_path: Path
 ):
     found = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
-    assert len(list(islice(found, 2))) == 2
+    assert len(list(islice(found, 1))) == 1
     found.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
