@@ -88,9 +88,7 @@ def _imports(body: list[ast.stmt], package: list[str], only_while_loading: bool 
 
     With `only_while_loading`, leaves out what loading the file does not run: functions and `if TYPE_CHECKING`.
     """
-    waiting: deque[ast.AST] = deque(body)
-    while waiting:
-        node = waiting.popleft()
+    for node in _statements(body, only_while_loading):
         if isinstance(node, ast.Import):
             for name in node.names:
                 yield node.lineno, name.name
@@ -99,9 +97,17 @@ def _imports(body: list[ast.stmt], package: list[str], only_while_loading: bool 
             base = [*above, *(node.module.split(".") if node.module else [])]
             for name in node.names:
                 yield node.lineno, ".".join([*base, name.name])
-        elif only_while_loading and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+
+
+def _statements(body: list[ast.stmt], only_while_loading: bool = False) -> Iterator[ast.AST]:
+    """All statements, and those within them."""
+    waiting: deque[ast.AST] = deque(body)
+    while waiting:
+        node = waiting.popleft()
+        yield node
+        if only_while_loading and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
-        elif only_while_loading and isinstance(node, ast.If) and _is_type_checking(node.test):
+        if only_while_loading and isinstance(node, ast.If) and _is_type_checking(node.test):
             waiting += node.orelse
         else:
             waiting += (one for part in _PARTS for one in getattr(node, part, ()))
@@ -232,7 +238,7 @@ WIDE_DOORS = {("kahanmaps/maps/orbits/orbit.py", "orbit")}
 def wide_functions(path: str, source: str) -> list[str]:
     """Functions that take more values than a caller can keep apart: some of them belong together, under a name."""
     found = []
-    for node in ast.walk(parsed(source)):
+    for node in _statements(parsed(source).body):
         if isinstance(node, ast.FunctionDef) and (path, node.name) not in WIDE_DOORS:
             count = len([*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs])
             if count > MOST_PARAMETERS:

@@ -1,7 +1,5 @@
 """kahanmaps degrees: the sequence, its recurrence, what is told where there is none, and exit statuses."""
 
-from schema_helpers import mistakes
-
 
 def test_the_degrees_of_the_euler_top(kahanmaps):
     outcome = kahanmaps("degrees euler_top")
@@ -32,12 +30,3 @@ def test_generic_eps_is_told_as_such(kahanmaps):
     found = kahanmaps("degrees weierstrass --terms 3 --json").json
     assert (found["eps"], found["time_step"]) == ("generic", "generic")
     assert found["lines"][0]["eps_residue"] != found["lines"][1]["eps_residue"]
-
-
-# -- a table over values
-
-
-def test_a_table_in_json_has_a_record_for_each_value(kahanmaps):
-    records = kahanmaps("degrees henon_heiles -p c=-1..0 --terms 2 --json").records
-    assert [record["document"]["parameters"] for record in records] == [{"c": "-1"}, {"c": "0"}]
-    assert [mistakes("degrees", record) for record in records] == [[], []]

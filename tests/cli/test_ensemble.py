@@ -118,9 +118,9 @@ def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanma
 def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
     for more in ("", " --integral F1", " --arithmetic mod:10007"):
-        kahanmaps(f"{TOP} --random 3 --steps 1000{more} -o", path)
+        kahanmaps(f"{TOP} --random 3 --steps 100{more} -o", path)
         two = np.load(path)
-        kahanmaps(f"{TOP} --random 3 --steps 1000 --every 500{more} -o", path)
+        kahanmaps(f"{TOP} --random 3 --steps 100 --every 50{more} -o", path)
         assert two.tolist() == np.load(path)[::2].tolist()
         assert two.dtype == (np.int64 if "mod" in more else np.float64)
 
@@ -130,7 +130,7 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
 
 def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**9} --random 5 --every 100 -o {path} --json"
+    words = f"{TOP} --steps {10**9} --random 5 --every 10 -o {path} --json"
     process = subprocess.Popen(
         [*COMMAND, *shlex.split(words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -141,7 +141,7 @@ def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     found = json.loads(out)
     assert (process.returncode, found["status"]) == (130, "interrupted")
     assert f"interrupted after step {found['steps_taken']}" in err
-    assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 100 + 1, 5, 3)
+    assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 10 + 1, 5, 3)
 
 
 # Wrong use

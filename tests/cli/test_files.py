@@ -158,7 +158,7 @@ def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_p
     try:
         while len(list(tmp_path.iterdir())) == 1:  # the new one, beside it
             time.sleep(0.01)
-        time.sleep(0.3)
+        time.sleep(0.1)
         process.send_signal(number)
         process.wait(60)
     finally:
@@ -224,7 +224,7 @@ def is_read_or_refused(read: Callable[[str], Any], path: Path) -> bool:
 def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name):
     content = (made / name.replace("orbits.npy", "starts.npy")).read_bytes()
     path = tmp_path / name
-    for damaged in damages(content, 25):
+    for damaged in damages(content, 12):
         path.write_bytes(damaged)
         assert is_read_or_refused(READERS[name], path)
 

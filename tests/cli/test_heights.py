@@ -20,12 +20,6 @@ def test_eps_that_disagree_are_told(monkeypatch):
     assert found.text == "heights of exact orbits are undecided: the eps disagree (2 periodic, 2 quadratic)"
 
 
-def test_the_time_ends_it(kahanmaps):
-    outcome = kahanmaps("heights weierstrass --steps 20 --seconds 0.0001")
-    assert (outcome.status, len(outcome.rows)) == (3, 2)
-    assert outcome.err == "stopped early: the time was over before all orbits were finished\n"
-
-
 def test_no_orbit_is_begun_after_the_time(monkeypatch):
     def slow(*arguments, **options):
         time.sleep(0.02)

@@ -16,7 +16,7 @@ def piped(monkeypatch):
 
 def test_several_systems_are_one_picture(kahanmaps, tmp_path):
     target = tmp_path / "d.svg"
-    done = kahanmaps("plot degrees euler_top lotka_volterra --size 8.6x7 -o", target)
+    done = kahanmaps("plot degrees euler_top harmonic --size 8.6x7 -o", target)
     assert done.status == 0
     assert done.err.startswith(f"{target}: 8.6 x 7.0 cm")
     assert target.read_bytes().startswith(b"<?xml")

@@ -28,7 +28,7 @@ def test_the_title_of_an_inline_system_are_its_equations(once):
 
 def test_a_title_parameters_and_eps_are_taken_over(kahanmaps):
     page = require_sound(
-        kahanmaps("report lotka_volterra -p a=2 --eps 1/10 --seconds 1 --no-pictures --title 'My map'").out
+        kahanmaps("report lotka_volterra -p a=2 --eps 1/10 --from checks --no-pictures --title 'My map'").out
     )
     assert page.headings[0] == (1, "My map")
     assert "a = 2" in page.text

@@ -9,7 +9,7 @@ import tomllib
 import pytest
 from cli_helpers import COMMAND
 
-QUICK = "lotka_volterra --over a --terms 3 --primes 11,13,17"
+QUICK = "lotka_volterra --over a --terms 2 --primes 11,13,17"
 FAMILY_OF_PLANES = """--rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --terms 4"""
 PLANE = f"{FAMILY_OF_PLANES} --primes 31,37,41"
 
@@ -24,10 +24,20 @@ def begun(command, kept):
     return process
 
 
-def test_blocks_say_degrees_growth_and_where(kahanmaps):
-    outcome = kahanmaps(f"scan {PLANE}")
-    assert (outcome.status, outcome.err) == (0, "")
-    assert outcome.out.splitlines() == [
+@pytest.fixture
+def plane(once, cases):
+    """What a scan of planes says, whose members are in the folder `cases`."""
+    return once(f"scan {PLANE} --write-to {cases}")
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    return tmp_path_factory.mktemp("plane") / "cases"
+
+
+def test_blocks_say_degrees_growth_and_where(plane):
+    assert plane.status == 0
+    assert plane.out.splitlines() == [
         "# scan: inline over g, every eps (the time step is 2 eps)",
         "in general\t2, 4, 8, 16",
         "degrees\t1, 1, 1, 1\tbounded growth, dynamical degree 1, measured",
@@ -63,15 +73,11 @@ def test_the_json_has_what_is_needed_to_run_it_again_and_files_of_an_earlier_sca
     assert tomllib.loads((tmp_path / "lotka_volterra-1.toml").read_text())["parameters"]["a"] == "-1"
 
 
-def test_an_inline_system_need_not_declare_what_varies(kahanmaps, tmp_path):
-    folder = tmp_path / "cases"
-    outcome = kahanmaps(f"scan {PLANE} --write-to {folder}")
-    assert outcome.status == 0
-    assert "at g =\t1" in outcome.out.splitlines()
-    files = sorted(folder.iterdir())
+def test_an_inline_system_need_not_declare_what_varies(kahanmaps, plane, cases):
+    files = sorted(cases.iterdir())
     values = {tomllib.loads(path.read_text())["parameters"]["g"] for path in files}
     assert {"-2", "-1", "0", "1", "2"} <= values
-    assert outcome.err == f"{folder}: {len(files)} system files\n"
+    assert plane.err == f"{cases}: {len(files)} system files\n"
     assert kahanmaps(f"degrees {files[0]} --terms 2").status == 0
 
 
@@ -81,9 +87,9 @@ def test_members_are_printed_as_system_files(kahanmaps):
     assert tomllib.loads(found)["parameters"]["a"] == "-1"
 
 
-def test_verdicts_are_asked_for(kahanmaps):
-    assert "verdict\t" in kahanmaps(f"scan {QUICK} --analyze 1").out
-    assert "verdict" not in kahanmaps(f"scan {QUICK}").out
+def test_verdicts_are_asked_for(kahanmaps, plane):
+    assert "verdict\t" in kahanmaps(f"scan {QUICK} --analyze 0.01").out
+    assert "verdict" not in plane.out
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_the_scan(kahanmaps, tmp_path, monkeypatch):

@@ -46,8 +46,8 @@ def test_without_options_a_random_member_with_m_3_is_drawn_and_everything_is_ver
     assert keys(outcome.json) == expected(3)
 
 
-def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, tmp_path):
-    first = kahanmaps(f"{QUICK} --json").json
+def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, once, tmp_path):
+    first = once(f"{QUICK} --json").json
     family = first["document"]["family"]
     path = tmp_path / "again.toml"
     path.write_text(f"name = 'again'\n[family]\nA = {json.dumps(family['A'])}\nH = '{family['H']}'\n")
@@ -59,12 +59,12 @@ def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, tmp_pat
 
 
 def test_controls_are_refuted_and_that_is_success(once):
-    outcome = once("verify --m 2 --controls --json")
+    outcome = once(f"{QUICK} --controls --json")
     assert outcome.status == 0
     *found, last = outcome.json["claims"]
     assert {claim["verdict"] for claim in found} == {"refuted"}
     assert all(claim["control"] and claim["expected"] == "refuted" for claim in found)
-    assert {claim["key"] for claim in found} == set(expected(2))
+    assert {claim["key"] for claim in found} == set(expected(2, 6))
     assert last["verdict"] == "proved"
 
 
@@ -79,10 +79,10 @@ def test_balls_enclose_the_complex_roots(kahanmaps):
 
 
 def test_in_a_pipe_every_statement_stands_on_a_line_with_its_verdict(once):
-    outcome = once("verify --m 2")
+    outcome = once("verify --m 1")
     rows = [row for row in outcome.rows if row[0] and len(row) == 2 and row[0] not in ("note", "verdict")]
-    assert len(rows) == len(expected(2))
-    assert {row[0] for row in rows} <= {"proved", "supported", "refuted (as expected)"}
+    assert len(rows) == len(expected(1))
+    assert {row[0] for row in rows} - {"supported"} == {"proved", "refuted (as expected)"}
     assert outcome.out.splitlines()[-1] in ("verdict\tproved", "verdict\tsupported")
 
 

@@ -25,14 +25,14 @@ name = "mixed"
 limits = { time = "30 s", memory = "150 MB" }
 [experiments.faults]
 task = "fault"
-axes = { order = [2, 6, 8], seed = "0..1" }
+axes = { order = [6, 8], seed = "0..1" }
 [experiments.space]
 task = "family-space"
 system = "family"
-axes = { m = 2, seed = "0..2" }
+axes = { m = 2, seed = "0..1" }
 [experiments.top]
 task = "check-integrals"
-system = ["euler_top", "lorenz", "henon_heiles"]
+system = ["euler_top", "lorenz"]
 axes = { time_step = "1/5" }
 """
 PAUSES = """
@@ -49,8 +49,7 @@ def undisturbed(fault_tasks, tmp_path_factory) -> str:
     db = tmp_path_factory.mktemp("undisturbed") / "results.db"
     records = list(run(MIXED, db))
     assert Counter(record.outcome for record in records) == {
-        Outcome.OK: 3 + 3 + 2,
-        Outcome.CRASHED: 1,
+        Outcome.OK: 2 + 2 + 1,
         Outcome.FAILED: 1 + 1,
         Outcome.OUT_OF_MEMORY: 1,
     }
@@ -61,7 +60,7 @@ def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_int
     undisturbed: str, tmp_path: Path
 ):
     found = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
-    assert len(list(islice(found, 2))) == 2
+    assert len(list(islice(found, 1))) == 1
     found.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
@@ -162,14 +161,14 @@ def test_nothing_is_handed_out_after_an_interrupt():
 def test_what_is_not_done_within_the_grace_is_given_up():
     class Slow(Scripted):
         def wait(self, timeout: float) -> list[Record]:
-            time.sleep(0.05)
+            time.sleep(0.005)
             return []
 
     executor = Slow()
-    batch = Batch(jobs(5), executor, grace=0.2)
+    batch = Batch(jobs(5), executor, grace=0.02)
     batch.interrupt()
     assert not any(batch)
-    batch = Batch(jobs(5), executor, grace=0.2)
+    batch = Batch(jobs(5), executor, grace=0.02)
     executor.jobs = list(jobs(2))
     batch.interrupt()
     assert not any(batch)
@@ -200,7 +199,7 @@ def test_jobs_are_taken_one_by_one_as_they_are_needed():
     assert taken < 110
 
 
-@pytest.mark.parametrize(("kills", "last"), [(1, 80), pytest.param(50, 12_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "last"), [(1, 40), pytest.param(50, 12_000, marks=pytest.mark.slow)])
 def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path, kills: int, last: int):
     text = PAUSES.format(milliseconds=4, last=last)
     (tmp_path / "spec.toml").write_text(text)

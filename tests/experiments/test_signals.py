@@ -16,6 +16,7 @@ from pathlib import Path
 from signal import Signals
 
 import pytest
+from helpers import quick
 from small_databases import exported
 
 from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, Task
@@ -87,7 +88,7 @@ def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
     assert tries(tmp_path, signal.SIGABRT, ALWAYS) == 2
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.05, 0.15])
+@pytest.mark.parametrize("seconds", quick([0.0, 0.05, 0.15], [0.05]))
 def test_ctrl_c_does_not_reach_a_child_that_begins(tmp_path: Path, seconds: float):
     """There Python has no place for it: it ended in a fatal error with status 1, or in RuntimeError."""
     children = LocalChildren(1, {}.__getitem__)

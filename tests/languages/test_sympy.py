@@ -28,15 +28,25 @@ big = "(1 + x1 + 2*x2 + x3/3 - x4)^11"
 """
 LONG_NUMBER = f'variables = ["x"]\n[system]\nrhs = ["{"7" * 5000}*x"]'
 SPECIAL = """
-import string
+import builtins, keyword, string, sympy
 from sympy import Symbol, sympify
-for name in [a + b for a in ("", *string.ascii_letters) for b in string.ascii_letters] + ["beta", "gamma", "zeta"]:
+known = (name for name in (*dir(sympy), *dir(builtins), *keyword.kwlist) if len(name) == 2 and name.isalpha())
+for name in [*string.ascii_letters, *known, "beta", "gamma", "zeta"]:
     try:
         same = sympify(name) == Symbol(name)
     except Exception:
         same = False
     if not same:
         print(name)
+"""
+
+
+# The image of (1, 1, 1) at eps = 1/4 where a1 is a square root of 2, or 2, against a point over Q(t).
+ALGEBRAIC = """
+from sympy import Integer, Matrix, Rational, expand, radsimp, sqrt, sympify
+for t in (sqrt(2), -sqrt(2), Integer(2)):
+    image = kahan_map(Matrix([1, 1, 1]), Rational(1, 4), t)
+    print(all(expand(radsimp(a - sympify(b).subs("t", t))) == 0 for a, b in zip(image, POINT, strict=True)))
 """
 
 
@@ -61,6 +71,9 @@ def printed() -> dict[str, list[str]]:
     long = convert(km.parse_system(LONG_NUMBER, "long"), "sympy", ["system"])
     scripts["long number"] = long + "print(vector_field([1])[0] == sum(7*10**k for k in range(5000)))"
     scripts["special"] = SPECIAL
+    file = km.load("euler_top", a1="root of t^2 - 2 near 1.4")
+    *_, end = km.orbit(file, [1, 1, 1], "1/4", 1)
+    scripts["algebraic"] = convert(file, "sympy") + ALGEBRAIC.replace("POINT", repr(list(end.text)))
     return run_python(scripts)
 
 
@@ -86,6 +99,10 @@ def test_short_names_that_sympify_reads_otherwise_are_replaced(printed):
 
 def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themselves(printed):
     assert printed["symbols"] == ["6*a1 14"]
+
+
+def test_an_algebraic_parameter_is_an_argument(printed):
+    assert printed["algebraic"] == ["True", "True", "False"]
 
 
 def test_a_sum_of_many_terms_does_not_exhaust_the_parser(printed):

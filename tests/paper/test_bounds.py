@@ -6,6 +6,7 @@ input, where the two sides differ, written out as rational functions of x and ep
 
 import pytest
 from bound_helpers import covers, lowest, true_size
+from helpers import together
 from paper.members import member
 
 from kahanmaps.checks.settings import Settings
@@ -40,7 +41,7 @@ LETTERS = {
     "slope of H~": lambda o: o.slope(lambda o, x: o.H_tilde(x), o.x, o.vector("v")),
     "inhomogeneous x~": lambda o: o.inhomogeneous().step(o.inhomogeneous().f, o.x),
 }
-LARGE = {"Phi(Phi(x))", "Pi^-1", "inhomogeneous x~", "slope of H~", "dPhi"}
+SMALL = LETTERS.keys() - {"Phi(Phi(x))", "Pi^-1", "inhomogeneous x~", "slope of H~", "dPhi"}
 
 
 def both(name, letter):
@@ -55,11 +56,8 @@ def both(name, letter):
     )
 
 
-@pytest.mark.parametrize("name", ["m=1", "m=2, split"])
-@pytest.mark.parametrize("letter", LETTERS)
+@together("letter, name", [*((letter, "m=1") for letter in LETTERS), *((letter, "m=2, split") for letter in SMALL)])
 def test_a_letter_is_bounded(letter, name):
-    if name != "m=1" and letter in LARGE:
-        name = "m=1"
     bound, entries = both(name, LETTERS[letter])
     assert all(covers(bound, entry) for entry in entries)
 
@@ -100,7 +98,7 @@ def difference_sizes(claim, o):
     return found
 
 
-@pytest.mark.parametrize(("claim", "control"), BROKEN, ids=[f"{claim.key}, {control}" for claim, control in BROKEN])
+@together("claim, control", BROKEN)
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
     found = member("m=1")
     examined = _MemberVerifier(found, Settings(), VerifyOptions())

@@ -21,12 +21,11 @@ from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.registry import SECTIONS, Claim, Kind, claim, claims
 
 QUICK = ["m=1", "m=2, irreducible", "m=2, complex", "m=3, split", "m=3, partly split"]
+FEW = ["m=1", "m=2, irreducible", "m=3, split"]
 LARGER = [name for name in (*SPECTRA, *LARGE_SPECTRA) if name not in QUICK]
 CLAIMS = claims()
 RIGHT = [found for found in CLAIMS if not found.misprint]
-over_right_claims = pytest.mark.parametrize("claim", RIGHT, ids=[found.key for found in RIGHT])
 MISPRINTS = [found for found in CLAIMS if found.misprint]
-over_misprints = pytest.mark.parametrize("claim", MISPRINTS, ids=[found.key for found in MISPRINTS])
 
 
 # The list
@@ -142,7 +141,7 @@ def failing(claim, spectra):
     return [name for name, found in outcomes.items() if not found or any(equal is not wanted for equal in found)]
 
 
-@over_right_claims
+@together("claim", RIGHT)
 def test_a_claim_holds_for_every_kind_of_spectrum(claim):
     assert members_of(claim, QUICK)
     assert failing(claim, QUICK) == []
@@ -150,12 +149,12 @@ def test_a_claim_holds_for_every_kind_of_spectrum(claim):
 
 @pytest.mark.slow
 @pytest.mark.thorough
-@over_right_claims
+@together("claim", RIGHT)
 def test_a_claim_holds_for_further_members(claim):
     assert failing(claim, LARGER) == []
 
 
-@over_misprints
+@together("claim", MISPRINTS)
 def test_a_misprint_fails_as_printed(claim):
     names = members_of(claim, SPECTRA)
     assert names
@@ -177,8 +176,8 @@ def outcome(claim, name, control):
     return None
 
 
-@pytest.mark.parametrize("spectra", quick((QUICK, LARGER), (QUICK,)), ids=["some", "further"])
-@over_right_claims
+@pytest.mark.parametrize("spectra", quick((FEW, QUICK, LARGER), (FEW,)), ids=["few", "some", "further"])
+@together("claim", RIGHT)
 def test_every_control_that_a_claim_names_refutes_it(claim, spectra):
     idle = [
         (name, control, found)

@@ -126,7 +126,7 @@ INDEXED_LETTERS = {
 }
 
 
-@over_cases
+@mostly_over_m2
 @pytest.mark.parametrize("letter", LETTERS)
 def test_a_letter_is_what_the_independent_implementation_says(case, letter):
     theirs, ours = LETTERS[letter]

@@ -24,7 +24,6 @@ from kahanmaps.paper.verifier import ClaimAtPoints, VerifyOptions
 from kahanmaps.paper.verify import _MemberVerifier, _UniversalVerifier
 
 IDENTITIES = [c for c in claims() if c.kind is Kind.EQUAL and not c.misprint and c.symplectic]
-over_identities = pytest.mark.parametrize("claim", IDENTITIES, ids=[c.key for c in IDENTITIES])
 
 
 @pytest.fixture(autouse=True)
@@ -143,7 +142,7 @@ def changed(claim):
     return replace(claim, function=function)
 
 
-@over_identities
+@together("claim", IDENTITIES)
 def test_a_claim_with_a_changed_side_has_no_proof(claim, only):
     only(changed(claim))
     m = claim.only_m or max(claim.least_m, 2)

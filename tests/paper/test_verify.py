@@ -31,7 +31,7 @@ from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
-QUICK = ("m=1", "m=2, split", "m=2, complex")
+QUICK = ("m=1", "m=2, split")
 LONGER = [pytest.mark.slow, pytest.mark.timeout(900)]
 over_members = pytest.mark.parametrize(
     "name",
@@ -115,7 +115,7 @@ def test_every_misprint_is_refuted(name):
     assert keys(whole(name), REFUTED) == misprints(member(name).m)
 
 
-@pytest.mark.parametrize("name", ["m=2, split", "m=2, complex"])
+@pytest.mark.parametrize("name", quick(["m=2, split", "m=2, complex"], ["m=2, split"]))
 def test_a_refuted_misprint_shows_both_sides_and_counts_as_a_control(name):
     report = whole(name)
     for key in misprints(member(name).m):
@@ -127,14 +127,14 @@ def test_a_refuted_misprint_shows_both_sides_and_counts_as_a_control(name):
 
 
 def test_beside_a_proof_stand_random_points_with_an_error_bound():
-    report = verify(file("m=3, split"), options=SIXTH)
+    report = verify(file("m=2, irreducible"), options=SIXTH)
     for finding in report.findings:
         points = [evidence for evidence in finding.also if evidence.method == "random points over GF(p)"]
         assert len(points) == 1
         assert bits(points[0]) >= 100
 
 
-@pytest.mark.parametrize("asked", [1, 60, 300])
+@pytest.mark.parametrize("asked", quick([1, 60, 300], [1, 300]))
 def test_error_bounds_are_at_least_what_was_asked_for(asked):
     report = verify(file("m=2, irreducible"), Settings(error_bits=asked), SIXTH)
     found = [bits(evidence) for evidence in all_evidence(report) if "error_bound" in evidence.data]
@@ -148,14 +148,14 @@ def test_the_roots_enter_the_error_bound_where_chi_does_not_split():
     assert conjugates == [1, 2]
 
 
-@pytest.mark.parametrize("name", ["m=3, irreducible", "m=2, complex"])
+@pytest.mark.parametrize("name", quick(["m=3, irreducible", "m=2, complex"], ["m=2, complex"]))
 def test_claims_about_one_block_hold_over_the_algebra_of_all_roots(name):
     report = verify(file(name), options=SIXTH)
     methods = [evidence.method for evidence in by_key(report)["commutativity"].also]
     assert "exact over Q[t]/chi" in methods
 
 
-@pytest.mark.parametrize("name", ["m=2, complex", "m=3, irreducible", "m=3, split"])
+@pytest.mark.parametrize("name", quick(["m=2, complex", "m=3, irreducible", "m=3, split"], ["m=2, complex"]))
 def test_complex_balls_overlap_to_within_a_few_bits(name):
     report = verify(file(name), options=VerifyOptions(sections=(6,), ball_bits=200))
     for finding in report.findings:
@@ -175,7 +175,7 @@ def test_roots_are_shown_to_twenty_digits_however_narrow_the_balls():
     assert objects_over.root_enclosures(member, 40)[1].startswith("[1.41421356237309")
 
 
-@pytest.mark.parametrize("section", range(1, 11))
+@pytest.mark.parametrize("section", quick(range(1, 11), [4, 7, 10]))
 def test_a_section_alone_is_what_it_is_among_all(section):
     part = verify(file("m=2, split"), options=VerifyOptions(sections=(section,)))
     among = [finding for finding in whole("m=2, split").findings if finding.place["section"] == section]
@@ -184,7 +184,7 @@ def test_a_section_alone_is_what_it_is_among_all(section):
 
 
 def test_the_same_seed_says_the_same_and_another_takes_other_primes():
-    first, again, other = (verify(file("m=2, split"), Settings(seed=seed), SIXTH).to_json() for seed in (1, 1, 2))
+    first, again, other = (verify(file("m=1"), Settings(seed=seed), SIXTH).to_json() for seed in (1, 1, 2))
     assert first == again
     primes = [report["claims"][0]["also"][0]["primes"] for report in (first, other)]
     assert primes[0] != primes[1]
@@ -203,7 +203,7 @@ def test_series_go_to_the_third_order_unless_asked_for_more():
     assert verify(file("m=1"), options=VerifyOptions(sections=(6,))).context["order"] == 3
 
 
-@pytest.mark.parametrize("order", [1, 3, 6])
+@pytest.mark.parametrize("order", quick([1, 3, 6], [1, 6]))
 def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(7,), order=order))
     assert by_key(report)["series-of-the-integrals"].verdict is PROVED
@@ -243,7 +243,7 @@ REPEATED = {
     "1, 1, 2": draw_with_eigenvalues([1, 1, 2], seed=3),
     "1, 1": draw_with_eigenvalues([1, 1], seed=3),
 }
-over_repeated = pytest.mark.parametrize("name", quick(REPEATED, ["(t-1)^2", "1, 1"]))
+over_repeated = pytest.mark.parametrize("name", quick(REPEATED, ["1, 1"]))
 
 
 @cache
@@ -374,7 +374,7 @@ def test_identities_are_proved_for_a_special_member_as_well():
 
 
 def test_the_zero_hamiltonian_refutes_nothing():
-    report = verify(SystemFile.from_member(of_two_planes("x1 - x1")))
+    report = verify(SystemFile.from_member(of_two_planes("x1 - x1")), options=VerifyOptions(sections=(1, 3, 7, 8)))
     assert keys(report, REFUTED) <= misprints(2)
     told = {key: finding.evidence.summary for key, finding in by_key(report).items()}
     assert "both sides agree at 4 random points" in told["associated-fields-are-pairwise-different"]

@@ -11,7 +11,6 @@ import pytest
 from kahanmaps.errors import InputError
 from kahanmaps.plots.figures import (
     FORMATS,
-    RASTERISE_ABOVE,
     drawing,
     format_of,
     label_of,
@@ -45,9 +44,8 @@ def test_the_same_picture_is_the_same_bytes(kind):
     assert picture_bytes(a_figure(), kind, STYLE) == the_bytes(kind)
 
 
-@pytest.mark.parametrize("kind", FORMATS)
-def test_another_picture_is_other_bytes(kind):
-    assert picture_bytes(a_figure(11), kind, STYLE) != the_bytes(kind)
+def test_another_picture_is_other_bytes():
+    assert picture_bytes(a_figure(11), "svg", STYLE) != the_bytes("svg")
 
 
 def test_the_size_is_in_centimetres():
@@ -56,9 +54,9 @@ def test_the_size_is_in_centimetres():
     assert (round(width / 72 * 2.54, 3), round(height / 72 * 2.54, 3)) == (8.6, 5)
 
 
-def test_many_points_are_an_image_inside_the_picture():
-    few = picture_bytes(a_figure(RASTERISE_ABOVE), "svg", STYLE)
-    many = picture_bytes(a_figure(RASTERISE_ABOVE + 1), "svg", STYLE)
+def test_many_points_are_an_image_inside_the_picture(monkeypatch):
+    monkeypatch.setattr("kahanmaps.plots.figures.RASTERISE_ABOVE", 5000)
+    few, many = (picture_bytes(a_figure(count), "svg", STYLE) for count in (5000, 5001))
     assert b"<image" not in few
     assert b"<image" in many
     assert len(many) < len(few) / 10

@@ -16,7 +16,7 @@ rhs = ["x*(a*x + y)", "y*(x + b*y)"]"""
 
 @pytest.fixture(scope="module")
 def found():
-    return scan(parse_system(PLANE), ["a", "b"], terms=3, primes=[17, 19, 23])
+    return scan(parse_system(PLANE), ["a", "b"], terms=3, primes=[11, 13, 17])
 
 
 def of_growth(found, kind):
@@ -62,14 +62,14 @@ def test_conditions_are_written_beside_what_they_describe(found):
 
 
 def test_the_plane_modulo_a_prime_has_every_slow_member(found):
-    [axes] = draw_scan(found, modulo=19).axes
-    sweep = next(one for one in found.sweeps if one.prime == 19)
+    [axes] = draw_scan(found, modulo=13).axes
+    sweep = next(one for one in found.sweeps if one.prime == 13)
     drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
     assert sorted(drawn) == sorted(sweep.slow)
     a, b = {text.get_text(): text.xy for text in axes.texts}["2*a*b - a - b = 0"]
-    assert (2 * a * b - a - b) % 19 == 0
-    with pytest.raises(InputError, match="expected one modulo which all members were tried: 17, 19, 23"):
-        draw_scan(found, modulo=37)
+    assert (2 * a * b - a - b) % 13 == 0
+    with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
+        draw_scan(found, modulo=19)
 
 
 def test_conditions_do_not_overlap_and_none_is_of_exponential_growth(found):
