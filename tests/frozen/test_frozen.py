@@ -176,8 +176,12 @@ EVERY_DAY = {
     "polynomial_map",
     "riccati",
     "riccati_pair",
+    "so4_euler_manakov",
+    "three_wave",
     "two_planar_cubics",
+    "volterra_periodic_5",
     "weierstrass",
+    "zander_111",
 }
 
 
