@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, settings
 # complaint that examples are drawn slowly, which there is no reason for but the same. An identity of polynomials that
 # is wrong fails at nearly every point, so that twenty say what hypothesis' hundred would; `make test-slow`
 # takes fifty.
-for profile, examples in [("quick", 20), ("thorough", 50)]:
+for profile, examples in [("quick", 10), ("thorough", 50)]:
     settings.register_profile(
         profile, max_examples=examples, deadline=None, suppress_health_check=[HealthCheck.too_slow]
     )
