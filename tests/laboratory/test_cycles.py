@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 from flint import fmpq_mat
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
@@ -139,7 +139,6 @@ def test_cycles_on_reducible_level_curves_do_not_refuse_an_integral(name):
     assert "0 cannot lie on a reducible curve" in found.reasons["integrable bound"]
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.lists(st.integers(-9, 9), min_size=9, max_size=9), st.sampled_from([23, 31, 47, 61, 83, 101]))
 def test_cubic_hamiltonians_of_the_plane_are_never_refused(coefficients, prime):
     for eps in default_eps(prime):

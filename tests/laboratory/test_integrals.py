@@ -137,7 +137,10 @@ def test_maps_that_are_none_are_told(rhs, eps, words):
 
 def test_too_little_time_is_told():
     found = find_integrals(load("volterra_periodic_5"), seconds=1e-9)
-    assert ([one.text for one in found.integrals], found.profile.complete) == (["x1 + x2 + x3 + x4 + x5"], False)  # by a theorem
+    assert ([one.text for one in found.integrals], found.profile.complete) == (
+        ["x1 + x2 + x3 + x4 + x5"],
+        False,
+    )  # by a theorem
     assert "relations of degree 1 and more were not tried" in found.reason
 
 

@@ -146,7 +146,7 @@ def test_a_wrong_iterate_does_not_pass(monkeypatch):
     iterate = tau_table.iterate
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 700)
+        NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 100)
 
 
 @over_fields
