@@ -20,7 +20,7 @@ from kahanmaps.laboratory.growth.degrees import DegreeGrowth, _Search, degree_gr
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-DAILY = ["riccati", "weierstrass", "euler_top", "volterra_periodic_3", "henon_heiles", "zander_120", "paper_m3"]
+DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "paper_m3"]
 OPEN = Patterns((), None, False, "not looked at")
 
 

@@ -41,7 +41,7 @@ def long(rng: random.Random, *factors: int) -> int:
     return prod(factors) * (rng.getrandbits(200) | 1)
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 6, 8])
+@pytest.mark.parametrize("n", [2, 3, 6])
 @pytest.mark.parametrize("of_W", [1, 2**30, 3**2 * 5 * 7, 2**127 - 1])
 @pytest.mark.parametrize("of_X", [1, 2**20 * 3, 5 * (2**127 - 1), 0])
 def test_the_solution_is_found_in_lowest_terms(n, of_W, of_X):
@@ -75,11 +75,11 @@ def test_a_solution_may_be_much_shorter_than_the_entries():
 
 
 @pytest.mark.parametrize("bits", [1, 8, 200])
-@pytest.mark.parametrize("n", range(2, 8))
+@pytest.mark.parametrize("n", [2, 3, 5, 7])
 def test_a_longer_solution_is_never_answered_wrongly(n, bits):
     rng = random.Random(f"{n} {bits}")
     answered = set()
-    for allowed in range(0, 4000, 100):
+    for allowed in range(0, 4000, 200):
         matrix, right = (fmpz_mat(n, k, [rng.randint(-(2**bits), 2**bits) for _ in range(n * k)]) for k in (n, 1))
         expected, found = by_flint(matrix, right), short_solution(matrix, right, allowed)
         assert found in (None, expected)
