@@ -41,7 +41,7 @@ def elsewhere(H, seed: int) -> QuadraticSystem:
 
 def analysed(system: QuadraticSystem):
     """What is found at once: the structure needs no time, and the rest is not asked for here."""
-    return analyze(SystemFile.from_system(system), seconds=0.01)
+    return analyze(SystemFile.from_system(system), seconds=0.03)
 
 
 def proved(found) -> list[str]:

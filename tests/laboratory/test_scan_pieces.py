@@ -104,7 +104,7 @@ def test_a_coordinate_may_need_a_field_of_its_own():
 def test_points_that_are_not_conjugate_are_told_apart_also_among_others():
     rng = random.Random(5)
     both = [zeros(lambda a: a**2 - 5), zeros(lambda a: a**3 - a - 1)]
-    points = {p: [*{*both[0][p], *both[1][p], (rng.randrange(p),)}] for p in FIELD_PRIMES}
+    points = {p: [*{*both[0][p], *both[1][p], (rng.randrange(p),)}] for p in FIELD_PRIMES[:9]}
     found = lifted_conjugates(points, "a", random.Random(1))
     assert {str(equations[0]) for equations, _ in found} == {"a^2 - 5", "a^3 - a - 1"}
 
