@@ -68,9 +68,9 @@ def three_lines(*exponents: int) -> QuadraticSystem:
 
 # System, eps, growth and closed form of its degrees, and for how many steps the latter has to be tried.
 SLOW_GROWTH = [
-    (resonant(12), None, "bounded", "12 for n >= 11", 40),
+    (resonant(12), None, "bounded", "12 for n >= 11", 20),
     (resonant("41/2"), None, "linear", "n + 1", 60),
-    (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 60),
+    (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 54),
     (
         QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]),
         None,

@@ -46,7 +46,7 @@ def test_the_points_are_those_of_plain_gcds(cubic, start):
 
 @pytest.mark.parametrize("seed", quick(range(4), [0]))
 def test_the_points_of_random_planes_are_those_of_plain_gcds(seed):
-    for block in random_blocks(f"tau {seed}", 44):
+    for block in random_blocks(f"tau {seed}", 24):
         assert walked(block, 9) == by_gcds(block, 9)
 
 
