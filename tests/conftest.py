@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, settings
 
 # No deadline: exact numbers vary in size, and the time of one example with them, the more so on a busy machine; nor a
 # complaint that examples are drawn slowly, which there is no reason for but the same. An identity of polynomials that
-# is wrong fails at nearly every point, so that twenty say what hypothesis' hundred would; `make test-slow`
+# is wrong fails at nearly every point, so that ten say what hypothesis' hundred would; `make test-slow`
 # takes fifty.
 for profile, examples in [("quick", 10), ("thorough", 50)]:
     settings.register_profile(
