@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, settings
 
 # No deadline: exact numbers vary in size, and the time of one example with them, the more so on a busy machine; nor a
 # complaint that examples are drawn slowly, which there is no reason for but the same. An identity of polynomials that
-# is wrong fails at nearly every point, so that twenty say what hypothesis' hundred would; `make test-slow`
+# is wrong fails at nearly every point, so that ten say what hypothesis' hundred would; `make test-slow`
 # takes fifty.
-for profile, examples in [("quick", 20), ("thorough", 50)]:
+for profile, examples in [("quick", 10), ("thorough", 50)]:
     settings.register_profile(
         profile, max_examples=examples, deadline=None, suppress_health_check=[HealthCheck.too_slow]
     )

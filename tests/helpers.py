@@ -37,7 +37,7 @@ parsed = cache(ast.parse)  # several tests read all files of the project
 DIMENSION = {name: dim for name, (dim, _) in titles().items()}
 
 # For tests that run once a field: fewer examples each, and GF(2), where most matrices are singular, is tolerated.
-some = settings(max_examples=25, suppress_health_check=[HealthCheck.filter_too_much])
+some = settings(suppress_health_check=[HealthCheck.filter_too_much])
 
 # For cases beside others of the same test that are quick, or that see the same.
 THOROUGH = (pytest.mark.slow, pytest.mark.thorough)

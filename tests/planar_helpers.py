@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly, fq_default_ctx
+from helpers import quick
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.matrices import det
@@ -265,7 +266,9 @@ UNSPLIT: dict[str, tuple[QuadraticSystem, CubicHamiltonian]] = {
     "m = 2, sqrt 2, another J": _drawn(draw_with_chi(_t**2 - 2, 4), invertible(4, 8)),
 }
 MEMBERS = {**SPLIT, **UNSPLIT}
-over_members = pytest.mark.parametrize("name", MEMBERS)
+DAILY = ["m = 1", "m = 2", "m = 2, another J", "m = 3, undisguised", "m = 3, one plane at rest, one double root"]
+DAILY += ["m = 2, sqrt 2", "m = 2, i", "m = 3, partly split", "m = 2, sqrt 2, another J"]
+over_members = pytest.mark.parametrize("name", quick(MEMBERS, DAILY))
 
 
 @lru_cache

@@ -8,20 +8,36 @@ import operator
 import random
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import cache
 from itertools import islice
 from typing import Any
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.settings import random_starts
+from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import SingularStep
+from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.modular_points import ModularMap, rank
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
 OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+
+
+@cache
+def analysis_of(name: str) -> Analysis:
+    """The analysis of a system of the catalogue, once for all tests: nobody is to change it."""
+    return analyze(load(name))
+
+
+@cache
+def integrals_of(name: str, *symbols: str) -> IntegralSearch:
+    """The integrals of the Kahan map of a system of the catalogue, once for all tests."""
+    return find_integrals(load(name), symbols=symbols)
 
 
 def system(names: str, *rhs: str, **parameters: Any) -> SystemFile:

@@ -262,7 +262,15 @@ class SystemOver:
     def hessian_times(self, vector: Sequence[Any]) -> Any:
         """The matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
         with self.field.working():
-            return self.field.matrix(self.dim, self.dim, (self.tensor * self.field.column(vector)).entries())
+            first, *others = (slope * self.field.convert(v) for slope, v in zip(self._slopes, vector, strict=True))
+            return sum(others, first)
+
+    @cached_property
+    def _slopes(self) -> list[Any]:
+        """The derivative of f' by each variable: f''(v) as their sum costs a third of a product of the whole tensor."""
+        n, entries = self.dim, self.tensor.entries()
+        with self.field.working():
+            return [self.field.matrix(n, n, entries[k::n]) for k in range(n)]
 
     def jacobian(self, point: Sequence[Any]) -> Any:
         """The Jacobi matrix f'(x)."""

@@ -7,7 +7,7 @@ from math import comb
 
 import pytest
 from flint import fmpq
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
@@ -102,7 +102,6 @@ def random_functions(draw: st.DrawFn) -> tuple[list[str], list[RationalFunction]
     ]
 
 
-@settings(max_examples=60)
 @given(random_functions())
 def test_random_functions(case: tuple[list[str], list[RationalFunction]]):
     names, known = case

@@ -5,7 +5,7 @@ import time
 
 import pytest
 from flint import fmpq
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import ring
@@ -24,7 +24,6 @@ def points(found):
 
 
 @given(st.sets(st.tuples(*[st.integers(-3, 3)] * 3), min_size=1, max_size=4), st.integers(0, 5))
-@settings(max_examples=25, deadline=None)
 def test_all_points_of_a_finite_set_are_found(wanted, shear):
     """The ideal of a finite set: all products of one linear form for each point."""
     forms = [[x - a + shear * (y - b), y - b + shear * (z - c), z - c] for a, b, c in wanted]

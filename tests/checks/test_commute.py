@@ -23,7 +23,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
-from hypothesis import given, settings
+from hypothesis import given
 
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks import commute, judge, theorems
@@ -44,7 +44,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 pytestmark = pytest.mark.usefixtures("at_points_only")
 PROVED, REFUTED, SUPPORTED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED
-few = settings(max_examples=20)
 
 
 def pair(f: QuadraticSystem, g: QuadraticSystem, how: Settings = QUICK, **more: object) -> Report:
@@ -183,7 +182,6 @@ def test_one_member_at_the_same_and_at_the_opposite_step_is_proved(eps2):
     assert check_commute(file, file, Settings(eps="1/5", steps=2), eps2=eps2).verdict is PROVED
 
 
-@few
 @given(systems(dims=(2,)), systems(dims=(2,)), points(2, rationals(9)))
 def test_the_verdict_on_a_random_pair_agrees_with_an_independent_computation(f, g, x):
     found = only(pair(f, g))

@@ -23,7 +23,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
@@ -44,7 +44,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
 pytestmark = pytest.mark.usefixtures("at_points_only")
-few = settings(max_examples=20)
 
 HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
 WEIERSTRASS = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
@@ -76,7 +75,6 @@ def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Verdict
 # Hamiltonian systems
 
 
-@few
 @given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
 def test_modified_h_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
     found = set(proved(hamiltonian, Settings(eps=eps, steps=2)))
@@ -201,7 +199,7 @@ def test_without_the_theorem_the_integrals_of_the_class_are_supported(member, cl
 
 
 def test_every_map_of_a_class_conserves_the_integrals_of_the_whole_class():
-    member = FAMILY["m=3"][0]
+    member = FAMILY["m=2"][0]
     for associate in member.associated():
         other = FamilyMember(member.A, member.H, associate.signs)
         report = check_integrals(SystemFile.from_member(other), Settings(steps=1))

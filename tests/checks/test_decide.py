@@ -17,7 +17,7 @@ import pytest
 from check_helpers import exact, verify_witness
 from flint import fmpq
 from helpers import fraction, rationals
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.bounds import BoundField, Size
@@ -156,7 +156,6 @@ def test_beyond_degree_2_to_the_60_there_is_no_bound(degree, poles):
     st.lists(rationals(50), min_size=1, max_size=6),
     st.integers(0, 5),
 )
-@settings(max_examples=40)
 def test_two_polynomials_are_refuted_exactly_when_they_differ(first, second, seed):
     def value(coefficients):
         return lambda x, e, K: sum((K.convert(c) * x**k for k, c in enumerate(coefficients)), K.zero)

@@ -8,7 +8,7 @@ from bound_helpers import check, covers_polynomial, differences, true_size
 from check_helpers import claim, hamiltonian_of, hamiltonians, system_of
 from flint import fmpq
 from helpers import HENON_HEILES, LOTKA_VOLTERRA, matrices, rationals, systems
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.bounds import BoundField, Size
@@ -22,14 +22,12 @@ from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-few = settings(max_examples=15)
 some_eps = st.one_of(st.none(), rationals(6).filter(lambda eps: eps != 0))
 
 
 # Commutativity
 
 
-@few
 @given(st.sampled_from([1, 2]), st.data(), some_eps)
 def test_commutativity_is_bounded(n, data, eps):
     f, g = (data.draw(systems(dims=(n,))) for _ in range(2))
@@ -101,19 +99,16 @@ def test_a_step_makes_degrees_as_large_as_the_documentation_says(n, eps):
 # Integrals and densities: of another system, so that the two sides differ
 
 
-@few
 @given(hamiltonians(dims=(2,)), hamiltonians(dims=(2,)))
 def test_conservation_of_another_modified_h_is_bounded(hamiltonian, other):
     check(conservation(hamiltonian.system, ModifiedHamiltonian(other), fmpq(2, 3)))
 
 
-@few
 @given(hamiltonians(dims=(2,), homogeneous=True, standard=True), systems(dims=(2,)), some_eps)
 def test_conservation_of_the_papers_integral_is_bounded(hamiltonian, system, eps):
     check(conservation(system, PaperIntegral(hamiltonian), eps))
 
 
-@few
 @given(hamiltonians(dims=(2,), homogeneous=True, standard=True), matrices(2, 2), systems(dims=(2,)), some_eps)
 def test_conservation_of_an_integral_of_the_commutant_is_bounded(hamiltonian, A, system, eps):
     check(conservation(system, CommutantIntegral(hamiltonian, A, 2), eps))
@@ -148,13 +143,11 @@ def test_determinants_that_must_not_be_zero_count_among_the_poles():
 # Poisson tensors
 
 
-@few
 @given(hamiltonians(dims=(1, 2)), some_eps)
 def test_the_transformation_law_is_bounded(hamiltonian, eps):
     check(transformation_identity(Kahan(hamiltonian.system), HamiltonianTensor(hamiltonian), eps))
 
 
-@few
 @given(hamiltonians(dims=(3,)), some_eps)
 def test_the_jacobi_identity_is_bounded(hamiltonian, eps):
     check(jacobi_identity(HamiltonianTensor(hamiltonian), eps))

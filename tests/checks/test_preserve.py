@@ -34,7 +34,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_poly
 from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.written.text import parse_rational_function
@@ -53,7 +53,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
 pytestmark = pytest.mark.usefixtures("at_points_only")
-few = settings(max_examples=15)
 
 PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
 ODD = hamiltonian_of("x y z", "x^3/3 - x*y*z + z^2/2 + y", [[0, 1, 2], [-1, 0, 1], [-2, -1, 0]])
@@ -82,7 +81,6 @@ def at_witness(found: Finding, system: QuadraticSystem):
 # Densities
 
 
-@few
 @given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
 def test_the_determinant_density_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
     found = only(check_measure(file(hamiltonian), Settings(eps=eps, steps=2)))
@@ -232,7 +230,6 @@ def test_without_the_theorem_the_tensor_of_a_generic_member_is_supported(member,
     assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
 
 
-@few
 @given(hamiltonians(dims=(2,)))
 def test_in_dimension_two_the_tensor_is_proved_for_every_h(hamiltonian):
     assert verdicts(check_poisson(file(hamiltonian), QUICK)) == [PROVED, PROVED]
@@ -250,7 +247,6 @@ def test_the_tensor_of_a_generic_hamiltonian_in_dimension_four_is_refuted():
     verify_jacobi(jacobi, GENERIC)
 
 
-@few
 @given(hamiltonians(dims=(3,)))
 def test_in_dimension_three_the_tensor_is_supported_without_a_theorem(hamiltonian):
     # J has rank 2: the phase space is made of planes, on each of which dimension 2 applies.

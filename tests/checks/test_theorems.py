@@ -18,7 +18,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, LOTKA_VOLTERRA, matrices, points, rationals, systems
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
@@ -29,8 +29,6 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-
-few = settings(max_examples=25)
 
 MEMBER = draw_with_eigenvalues([1, -2, 3], seed=3)
 X = exact("1/2", "-1/3", 1, 2, "2/5", -1)
@@ -159,7 +157,6 @@ def test_a_hamiltonian_in_dimension_four_has_none_by_the_theorem():
     assert theorems.poisson_tensor_invariant(hamiltonian_of("x y z w", "x^3 + y*z*w"), None) is None
 
 
-@few
 @given(hamiltonian=hamiltonians())
 def test_every_cubic_hamiltonian_and_every_j_fulfil_the_hypotheses(hamiltonian):
     assert theorems.cubic_hamiltonian(hamiltonian) is not None
@@ -193,7 +190,6 @@ def test_a_broken_hamiltonian_system_proves_nothing(fields):
 DECOUPLED = system_of("x y z", "x^2 - 3*x + 1", "y*z + 2*y - 1/2", "y^2 - z + 5")
 
 
-@few
 @given(matrices(3, 3))
 def test_a_linear_relation_is_found_where_there_is_one(C):
     assert theorems.linear_relation(DECOUPLED, DECOUPLED.transformed(C)) == C
@@ -207,7 +203,6 @@ def test_where_components_depend_only_plus_and_minus_f_are_recognised():
     assert theorems.linear_relation(LOTKA_VOLTERRA, EULER_TOP) is None
 
 
-@few
 @given(systems(dims=(1, 2, 3), homogeneous=True), st.integers(0, 60), st.data())
 def test_a_relation_up_to_a_tiny_term_is_none(f, power, data):
     # A linear term leaves the span of homogeneous components, however small it is.
@@ -219,7 +214,6 @@ def test_a_relation_up_to_a_tiny_term_is_none(f, power, data):
 # The splitting lemma
 
 
-@few
 @given(systems(dims=(1, 2)), systems(dims=(1, 2)), points(4, rationals(9)))
 def test_two_systems_side_by_side_and_one_of_them_reversed_commute(first, second, x):
     f, g = side_by_side(first, second), side_by_side(first, second.scaled(-1))

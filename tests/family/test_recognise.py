@@ -13,7 +13,6 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import random_point
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from planar_helpers import invertible, moved
 
@@ -123,7 +122,6 @@ def test_a_is_as_simple_as_it_can_be():
     st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]),
     st.integers(0, 10**6),
 )
-@hypothesis_settings(max_examples=25)
 def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
     member = draw_with_eigenvalues(eigenvalues, seed % 5)
     S = random_symplectic(member.m, random.Random(seed))

@@ -240,9 +240,7 @@ def constant_at(gamma: fmpq, doublings: int = 8) -> Fraction:
     return Fraction(3 * height([x]), 2 * 4**doublings)  # the height of x belongs to the divisor 2 (O)
 
 
-@pytest.mark.parametrize(
-    "name", quick(["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"], ["m = 1", "m = 2"])
-)
+@pytest.mark.parametrize("name", quick(["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"], ["m = 2"]))
 def test_the_constant_of_a_member_is_the_sum_of_the_canonical_heights_of_its_planes(name):
     normal_form, system = structure_and_system(name)
     start = [fmpq(1, 2), fmpq(1, 3), fmpq(-1, 5), fmpq(2, 7), fmpq(3, 4), fmpq(-2, 3)][: system.dim]

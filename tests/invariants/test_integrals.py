@@ -20,7 +20,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_poly
 from helpers import fraction, over_exact_fields, points, rationals
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ
@@ -29,7 +29,6 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.systems.hamiltonian import standard_structure
 
-some = settings(max_examples=40)
 nonzero = rationals(6).filter(lambda eps: eps != 0)
 
 HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
@@ -45,7 +44,6 @@ def with_points(draw, dims=(1, 2, 3), homogeneous=False, standard=False):
 # Modified H
 
 
-@some
 @given(with_points(), nonzero)
 def test_modified_h_is_what_its_formula_says(drawn, eps):
     hamiltonian, x = drawn
@@ -54,7 +52,6 @@ def test_modified_h_is_what_its_formula_says(drawn, eps):
     assert fraction(ModifiedHamiltonian(hamiltonian).value(QQ, eps, x)) == expected
 
 
-@some
 @given(with_points(), nonzero)
 def test_modified_h_is_conserved(drawn, eps):
     hamiltonian, x = drawn
@@ -68,7 +65,6 @@ def test_modified_h_is_conserved(drawn, eps):
 # The paper's H~
 
 
-@some
 @given(with_points(dims=(2, 4), homogeneous=True, standard=True), nonzero)
 def test_modified_h_is_minus_one_sixth_of_the_papers_integral(drawn, eps):
     hamiltonian, x = drawn
@@ -139,7 +135,6 @@ def test_a_claimed_function_is_shown_as_text_that_reads_back():
 
 @over_exact_fields
 @given(x=points(2, rationals(9)))
-@settings(max_examples=10)
 def test_over_a_prime_field_every_integral_is_its_rational_value_reduced(field, x):
     eps = fmpq(5, 11)
     for integral in (ModifiedHamiltonian(PLANE_CUBIC), PaperIntegral(PLANE_CUBIC)):

@@ -16,7 +16,7 @@ from check_helpers import (
     unit,
 )
 from helpers import LOTKA_VOLTERRA, fraction, points, rationals, systems_with_points
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
@@ -26,11 +26,9 @@ from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, ja
 from kahanmaps.invariants.phase_functions import where
 from kahanmaps.maps.kahan import KahanMap
 
-some = settings(max_examples=40)
 nonzero = rationals(6).filter(lambda eps: eps != 0)
 
 
-@some
 @given(systems_with_points(), nonzero)
 def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, eps):
     system, x = drawn
@@ -44,7 +42,6 @@ def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, e
     assert determinant(jacobian) == fraction(above) / fraction(below)
 
 
-@some
 @given(systems_with_points(), nonzero)
 def test_the_density_is_the_determinant_of_i_minus_eps_jacobian(drawn, eps):
     system, x = drawn
@@ -58,7 +55,6 @@ def hamiltonian_with_point(draw):
     return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
 
 
-@some
 @given(hamiltonian_with_point(), nonzero, st.data())
 def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, eps, data):
     # det(I - eps f') is even in eps: the law, with dPhi multiplied out, holds for any two points x and y in place of

@@ -24,7 +24,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import fraction, points, random_point, rationals
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ
@@ -35,7 +35,6 @@ from kahanmaps.invariants.poisson import HamiltonianTensor, jacobi_defects, pois
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
-some = settings(max_examples=30)
 nonzero = rationals(6).filter(lambda eps: eps != 0)
 
 GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
@@ -52,7 +51,6 @@ def hamiltonian_with_point(draw, dims=(1, 2, 3)):
     return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
 
 
-@some
 @given(hamiltonian_with_point(), nonzero)
 def test_the_tensor_is_j_minus_eps_squared_jacobian_squared_j(drawn, eps):
     hamiltonian, x = drawn
@@ -75,7 +73,6 @@ def sides(hamiltonian: CubicHamiltonian, eps: fmpq, x: tuple[fmpq, ...]) -> tupl
     return transformation_sides(kahan, HamiltonianTensor(hamiltonian), x, kahan.step(x))
 
 
-@some
 @given(hamiltonian_with_point(dims=(2, 3)), nonzero)
 def test_the_two_sides_are_the_law_for_dphi_multiplied_out(drawn, eps):
     # With D = I - eps f'(x): left - right = D (dPhi Pi(x) dPhi^T - Pi(x~)) D^T.

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from flint import fmpq, fmpq_mat
 from helpers import EULER_TOP, LORENZ, random_point, systems
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import kahanmaps
@@ -106,7 +106,6 @@ def with_hyperplane(draw: st.DrawFn) -> tuple[QuadraticSystem, fmpq_mat]:
     return QuadraticSystem(linear_combinations(T.inv(), in_x)), T
 
 
-@settings(max_examples=40)
 @given(with_hyperplane(), st.integers(0, 100))
 def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
     case: tuple[QuadraticSystem, fmpq_mat], seed: int

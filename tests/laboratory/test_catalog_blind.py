@@ -5,6 +5,7 @@ Hirota-Kimura bases are facts of the files, which `analyze` does not read (test_
 """
 
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from analysis_helpers import Answer, differences, residues_of
@@ -24,6 +25,7 @@ SECONDS |= {"paper_m3": 60, "paper_m3_irreducible": 90, "three_wave": 30}
 SLOW = (*SECONDS, "lorenz", "zander_120", "paper_m2", "volterra_periodic_4")
 
 
+@cache
 def blind(name):
     """The analysis of the right-hand sides, without anything else that the file says."""
     return analyze(SystemFile.from_system(load(name).system, "somebody"), seconds=SECONDS.get(name))
@@ -64,12 +66,12 @@ def test_the_facts_of_the_file_are_found_blind(name):
 
 
 def test_wrong_facts_are_seen_to_be_wrong():
-    found, answer = blind("lotka_volterra"), facts_of("lotka_volterra")
+    found, answer = blind("zander_111"), facts_of("zander_111")
     degrees = list(answer.degrees)
     degrees[3] -= 1
     assert differences(found, replace(answer, degrees=tuple(degrees))) == {"degrees"}
     assert differences(found, replace(answer, integrals=answer.integrals + 1)) == {"count"}
-    assert differences(found, replace(answer, verdict="integrable")) == {"verdict"}
+    assert differences(found, replace(answer, verdict="not integrable")) == {"verdict"}
     assert differences(found, replace(answer, growth="linear")) == {"growth"}
     assert differences(found, replace(answer, dynamical_degree="x - 7")) == {"dynamical degree"}
     foreign = residues_of(facts_of("nahm_tetrahedral").formulas[0])

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from bound_helpers import check
 from flint import fmpq, fmpq_mat
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps import KahanMap, draw_with_eigenvalues
@@ -145,7 +145,6 @@ def test_multiples_are_refuted_as_a_family():
 
 
 @given(st.lists(st.integers(-2, 2), min_size=12, max_size=12))
-@settings(max_examples=20, deadline=None)
 def test_everything_found_commutes_exactly(numbers):
     f = system_of(("x", "y"), [[fmpq(n) for n in numbers[:6]], [fmpq(n) for n in numbers[6:]]])
     found = commuting_systems(f, "quadratic", seconds=5)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 from flint import fmpq_mat
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
@@ -139,7 +139,6 @@ def test_cycles_on_reducible_level_curves_do_not_refuse_an_integral(name):
     assert "0 cannot lie on a reducible curve" in found.reasons["integrable bound"]
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.lists(st.integers(-9, 9), min_size=9, max_size=9), st.sampled_from([23, 31, 47, 61, 83, 101]))
 def test_cubic_hamiltonians_of_the_plane_are_never_refused(coefficients, prime):
     for eps in default_eps(prime):
@@ -164,13 +163,13 @@ def test_maps_with_too_few_integrals_are_refused(system, prime):
 def test_lotka_volterra_goes_like_a_random_reversible_map_and_not_along_curves():
     system = load("lotka_volterra").system
     R = find_reversor(system)
-    for eps in default_eps(499):
-        census = cycle_census(system, eps, 499, reversor=R)
+    for eps in default_eps(311):
+        census = cycle_census(system, eps, 311, reversor=R)
         found = compare(census)
         assert found.compatible == ("random reversible",)
         assert set(found.refused) == {"integrable bound", "random permutation"}
-        assert census.longest > hasse_weil(499)
-        assert found.model_scale == pytest.approx(499.5, abs=1)
+        assert census.longest > hasse_weil(311)
+        assert found.model_scale == pytest.approx(311.5, abs=1)
         assert f", where 2 N/(fixed points) = {found.model_scale:.1f}, " in found.reasons["random reversible"]
         assert census.lost == 3  # the base points of a quadratic map of the plane
 
@@ -318,13 +317,13 @@ def test_wrong_primes_and_eps_are_refused(eps, prime, kind, words):
 
 
 def test_whole_graphs_in_high_dimensions_are_smaller():
-    """The minors of a point cost 2^n: over GF(3), 9841 points in dimension 8 are few enough, 797161 in 12 not."""
+    """The minors of a point cost 2^n: over GF(3), 3280 points in dimension 7 are few enough, 797161 in 12 not."""
 
     def squares(n: int) -> QuadraticSystem:
         names = [f"x{k}" for k in range(n)]
         return QuadraticSystem.from_text(names, [f"{name}^2" for name in names])
 
-    assert cycle_census(squares(8), "1/10", 3).complete
+    assert cycle_census(squares(7), "1/10", 3).complete
     found = cycle_census(squares(12), "1/10", 3, steps=2)
     assert (found.points, found.complete) == (797161, False)
 

@@ -17,9 +17,11 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, _Search, degree_growth
+from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-DAILY = ["riccati", "weierstrass", "euler_top", "volterra_periodic_3", "henon_heiles", "zander_120", "paper_m3"]
+DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "paper_m3"]
+OPEN = Patterns((), None, False, "not looked at")
 
 
 def zander() -> QuadraticSystem:
@@ -34,7 +36,7 @@ def test_the_degrees_of_the_catalogue(name):
     assert (list(found.degrees), found.ended, found.notes) == ([1, *known], "terms", ())
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_polynomials_with_gcds_give_the_same_for_random_systems(seed):
     rng = random.Random(seed)
     names = ["x", "y", "z"][: 1 + seed % 3]
@@ -49,7 +51,7 @@ def test_without_a_recurrence_there_is_an_estimate_that_says_so():
     assert (found.recurrence, found.growth, found.dynamical_degree) == (None, Growth.UNKNOWN, None)
     assert found.looks_exponential
     assert found.growth_text == "exponential growth by a factor of about 2.31183 (estimated: no recurrence in 7 terms)"
-    shorter = replace(degree_growth(load("henon_heiles").system, max_terms=5), patterns=None)
+    shorter = replace(found, degrees=found.degrees[:6])
     assert not shorter.looks_exponential
     assert shorter.growth_text.startswith("no recurrence found in 6 terms; d_n/d_(n-1) is 2.38")
     assert shorter.growth_text.endswith("an estimate only")
@@ -99,8 +101,8 @@ def test_the_largest_degree_is_reached_exactly_by_series_and_by_minors(largest, 
     """Degrees 1, 3, 7, 17: a bound of 17 admits the last one and a bound of 16 does not."""
     monkeypatch.setattr(curves, "_MINORS", largest)
     system = load("henon_heiles").system
-    assert degree_growth(system, max_terms=3, max_degree=17).degrees == (1, 3, 7, 17)
-    found = degree_growth(system, max_terms=3, max_degree=16)
+    assert degree_growth(system, max_terms=3, max_degree=17, patterns=OPEN).degrees == (1, 3, 7, 17)
+    found = degree_growth(system, max_terms=3, max_degree=16, patterns=OPEN)
     assert (found.degrees, found.ended) == ((1, 3, 7), "degree")
 
 
@@ -140,7 +142,7 @@ def test_the_time_and_the_degree_are_limits():
     assert (found.ended, found.degrees[:2]) == ("time", (1, 3))
     found = degree_growth(load("riccati").system, seconds=0.05, max_terms=10_000)
     assert (found.ended, found.growth) == ("time", Growth.BOUNDED)
-    found = degree_growth(henon_heiles, max_degree=50)
+    found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
     assert (found.ended, found.degrees, found.message) == (
         "degree",
         (1, 3, 7, 17, 39),

@@ -21,7 +21,7 @@ PLANAR = [name for name in (*names(), *map_names()) if DIMENSION[name] == 2]
 POSITIVE = ["lotka_volterra", "fibonacci", "hietarinta_viallet", "zander_120", "lotka_volterra_symplectic_euler"]
 
 
-@pytest.mark.parametrize("name", quick(POSITIVE, POSITIVE[:3]))
+@pytest.mark.parametrize("name", quick(POSITIVE, ["fibonacci"]))
 def test_the_bounds_enclose_the_dynamical_degree_that_is_explained(name):
     found = degree_growth(load(name).map, seconds=20)
     exact = float(found.dynamical_degree.digits)
@@ -32,7 +32,7 @@ def test_the_bounds_enclose_the_dynamical_degree_that_is_explained(name):
     "name", quick([name for name in PLANAR if name not in POSITIVE], ["harmonic", "nahm_tetrahedral", "mcmillan"])
 )
 def test_no_map_of_slow_growth_gets_a_bound(name):
-    assert enclose(load(name).map, None, seconds=1) is None
+    assert enclose(load(name).map, None, seconds=0.2) is None
 
 
 @given(st.integers(1, 10**6), st.integers(7, 200))

@@ -138,7 +138,7 @@ def hamiltonians(draw: st.DrawFn) -> CubicHamiltonian:
     return CubicHamiltonian(context.from_dict({m: fmpq(c) for m, c in terms.items()}), J)
 
 
-@settings(max_examples=80)
+@settings(max_examples=20)
 @given(hamiltonians(), st.integers(0, 50))
 def test_random_structures(hamiltonian: CubicHamiltonian, seed: int) -> None:
     found = checked(hamiltonian.system)

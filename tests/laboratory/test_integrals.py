@@ -1,14 +1,13 @@
 """Integrals found from the right-hand sides alone: those of the literature, conserved to the last digit; no others."""
 
 import random
-from functools import cache
 
 import pytest
 from flint import fmpq
 from helpers import DIMENSION
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from search_helpers import random_system, ranks, system, values_on_orbits
+from search_helpers import integrals_of, random_system, ranks, system, values_on_orbits
 
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
@@ -31,11 +30,6 @@ FOUND = {name: load(name).catalog["codimension"] for name in PLANE_AND_SPACE}
 SYMBOLS = [("euler_top", ["a1", "a2", "a3"]), ("weierstrass", ["g2"])]
 
 
-@cache
-def searched(name):
-    return find_integrals(load(name))
-
-
 def independent(functions, file, others=(), symbols=()):
     return ranks(list(functions), list(others), Laboratory(file, symbols).maps[0])
 
@@ -43,7 +37,7 @@ def independent(functions, file, others=(), symbols=()):
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in PLANE_AND_SPACE])
 def test_the_integrals_of_the_literature_are_found(name):
     file = load(name)
-    found = searched(name)
+    found = integrals_of(name)
     functions = [one.function for one in found.integrals]
     assert len(functions) == found.codimension == FOUND[name]
     assert all(one.verdict is Verdict.PROVED for one in found.integrals)
@@ -57,7 +51,7 @@ def test_the_integrals_of_the_literature_are_found(name):
 @pytest.mark.parametrize("name", ["euler_top", "nahm_octahedral", "volterra_periodic_4"])
 def test_formulas_are_constant_along_exact_orbits(name):
     file = load(name)
-    for one in searched(name).integrals:
+    for one in integrals_of(name).integrals:
         values = values_on_orbits(file, one.text, EPS)
         assert [len(each) for each in values] == [1] * 9
         assert len(set().union(*values)) >= 3  # and not constants
@@ -69,7 +63,7 @@ def test_the_exact_orbits_tell_a_wrong_formula():
 
 @pytest.mark.parametrize(("name", "symbols"), SYMBOLS)
 def test_formulas_with_symbols_are_those_with_numbers(name, symbols):
-    general = find_integrals(load(name), symbols=symbols)
+    general = integrals_of(name, *symbols)
     assert (len(general.integrals), general.symbols) == (load(name).catalog["codimension"], tuple(symbols))
     assert all(one.verdict is Verdict.PROVED for one in general.integrals)
     rng = random.Random(name)
@@ -142,8 +136,11 @@ def test_maps_that_are_none_are_told(rhs, eps, words):
 
 
 def test_too_little_time_is_told():
-    found = find_integrals(load("lagrange_top"), seconds=1e-9)
-    assert ([one.text for one in found.integrals], found.profile.complete) == (["m3"], False)  # by a theorem
+    found = find_integrals(load("volterra_periodic_5"), seconds=1e-9)
+    assert ([one.text for one in found.integrals], found.profile.complete) == (
+        ["x1 + x2 + x3 + x4 + x5"],
+        False,
+    )  # by a theorem
     assert "relations of degree 1 and more were not tried" in found.reason
 
 
@@ -154,7 +151,7 @@ def test_the_same_seed_gives_the_same():
     assert documents[0]["integrals"][0]["integral"] == documents[2]["integrals"][0]["integral"]
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(st.tuples(*[st.integers(-3, 3)] * 10))
 def test_hamiltonian_planes_always_have_one(coefficients):
     """H any cubic in the plane: the integral of cmoq-2013 is found, or H is so simple that there is more."""
@@ -169,7 +166,7 @@ def test_hamiltonian_planes_always_have_one(coefficients):
         assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_spaces_that_are_conjugate_over_an_extension_do_no_harm(seed):
     """At eps = 1, y + sqrt(-3) x and its conjugate have constant cofactors: spaces modulo one prime in two only."""
     found = find_integrals(system("x y", "y", "-3*x"), eps=1, seed=seed)
@@ -185,7 +182,7 @@ def test_quotients_of_affine_functions_come_first():
 
 def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_for_one():
     """v.f = 0 is all there is to it; where it fails, or v.x is not what was given, the general way decides."""
-    n = 9
+    n = 7
     names_ = [f"x{i}" for i in range(n)]
     sites = [f"{names_[i]}*({names_[(i + 1) % n]} - {names_[i - 1]})" for i in range(n)]
     file = system(" ".join(names_), *sites)
@@ -255,4 +252,4 @@ def test_formulas_with_symbols_that_depend_at_the_values_of_the_file_say_so():
     said = "at a1 = 0, a2 = 0, a3 = 1 only 0 of the 2 formulas are independent"
     symbols = ["a1", "a2", "a3"]
     assert said in find_integrals(load("euler_top", {"a1": 0, "a2": 0}), symbols=symbols).reason
-    assert find_integrals(load("euler_top"), symbols=symbols).reason == ""
+    assert integrals_of("euler_top", *symbols).reason == ""

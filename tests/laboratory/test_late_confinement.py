@@ -14,6 +14,7 @@ import pytest
 from degree_helpers import polynomial_degrees
 from flint import fmpq
 from helpers import quick
+from search_helpers import analysis_of
 from search_helpers import system as file_from
 
 from kahanmaps.algebra.fields import GF
@@ -67,9 +68,9 @@ def three_lines(*exponents: int) -> QuadraticSystem:
 
 # System, eps, growth and closed form of its degrees, and for how many steps the latter has to be tried.
 SLOW_GROWTH = [
-    (resonant(12), None, "bounded", "12 for n >= 11", 40),
+    (resonant(12), None, "bounded", "12 for n >= 11", 20),
     (resonant("41/2"), None, "linear", "n + 1", 60),
-    (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 60),
+    (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 54),
     (
         QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]),
         None,
@@ -94,11 +95,12 @@ def test_where_growth_is_slow_the_law_holds_far_beyond_the_last_confinement(syst
 @pytest.mark.parametrize(("exponents", "first"), THREE_LINES)
 def test_three_lines_of_late_confinement_have_no_dynamical_degree_2(exponents, first):
     system = three_lines(*exponents)
-    found = degree_growth(system, max_degree=3000)
-    true = polynomial_degrees(system, 11, 5)
+    found = degree_growth(system, max_degree=3 * 2**first)
+    steps = first + 1
+    true = polynomial_degrees(system, steps, 5)
     assert next(n for n, d in enumerate(true, 1) if d < 2**n) == first
-    assert list(found.degrees[1:12]) == true[: len(found.degrees) - 1]
-    assert found.recurrence.predict(11) == true[10]
+    assert list(found.degrees[1 : steps + 1]) == true[: len(found.degrees) - 1]
+    assert found.recurrence.predict(steps) == true[-1]
     assert found.dynamical_degree is None or found.dynamical_degree.text != "2"
 
 
@@ -107,7 +109,7 @@ def test_seven_degrees_are_explained_by_a_pattern_that_is_longer():
     system = three_lines(1, 2, 6)
     found = degree_growth(system, max_terms=7)
     assert found.degrees == tuple(2**n for n in range(8))
-    assert [found.explained.predict(n) for n in range(1, 13)] == polynomial_degrees(system, 12, 5)
+    assert [found.explained.predict(n) for n in range(1, 12)] == polynomial_degrees(system, 11, 5)
     assert (found.basis, found.unconfirmed) == ("explained: no other confinement within 1000 steps", "")
     # Without what the singularities explain there is an estimate only.
     length = max(found.patterns.lengths)
@@ -129,10 +131,11 @@ def test_degrees_that_the_singularities_do_not_explain_are_no_result():
 
 
 def test_a_map_that_confines_nothing_is_said_to_do_so_within_the_steps_that_were_tried():
-    found = degree_growth(load("lotka_volterra").system)
+    found = degree_growth(load("lotka_volterra").system, enclosed=False)
     assert found.growth_text == ("exponential growth, dynamical degree 2 (explained: no confinement within 400 steps)")
-    assert degree_growth(load("lotka_volterra").system, steps=30).basis == "explained: no confinement within 30 steps"
-    assert degree_growth(load("euler_top").system).basis == "explained"
+    few = degree_growth(load("lotka_volterra").system, steps=30, max_terms=5, enclosed=False)
+    assert few.basis == "explained: no confinement within 30 steps"
+    assert degree_growth(load("euler_top").system, max_terms=5).basis == "explained"
 
 
 # The patterns themselves
@@ -150,7 +153,7 @@ def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
 
 def test_a_hypersurface_that_is_followed_as_a_point_comes_back():
     """Nothing is divided out before step 51, so that only the orbit of a point is computed until then."""
-    run = singularities(planar("1", "x*y"), "1/7")
+    run = singularities(planar("1", "x*y"), "1/7", steps=60)
     (late,) = [h for h in run.hypersurfaces if h.status == CONFINED]
     assert (late.confined_at, [step.common for step in late.steps[:50]]) == (51, [0] * 50)
 
@@ -164,7 +167,7 @@ def test_the_lengths_of_patterns_in_the_catalogue(name, lengths, searched):
     assert (found.lengths, found.searched, found.running) == (lengths, searched, "")
 
 
-@pytest.mark.parametrize("name", ["weierstrass", "volterra_periodic_4"])
+@pytest.mark.parametrize("name", ["euler_top", "weierstrass", "volterra_periodic_4"])
 def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
     system = load(name).system
     written = patterns(system, None)
@@ -182,13 +185,13 @@ def test_random_points_have_the_degrees_of_polynomials_for_explicit_maps(name, m
 
 
 def test_two_eps_that_differ_leave_the_patterns_open():
-    runs = [singularities(planar("1", "x*y"), eps) for eps in ("1/7", "2/7")]
+    runs = [singularities(planar("1", "x*y"), eps, steps=80) for eps in ("1/7", "2/7")]
     assert patterns_of(runs).running == "the singularities at two values of eps differ (--eps)"
     assert patterns_of(runs[:1]).running == ""
 
 
 def test_a_pattern_that_goes_on_changing_is_running():
-    run = singularities(resonant(20), "1/7")
+    run = singularities(resonant(20), "1/7", steps=50)
     one = next(h for h in run.hypersurfaces if h.status == CONFINED)
     open_run = replace(run, hypersurfaces=(replace(one, status=NOT_CONFINED, settled_at=None, followed=40),))
     assert patterns_of([open_run]).running == (
@@ -219,7 +222,7 @@ def test_a_recurrence_needs_terms_beyond_all_patterns():
 
 
 LATE = [
-    (("x y", "x^2", "17*x*y"), "linearisable", "bounded"),
+    (("x y", "x^2", "9*x*y"), "linearisable", "bounded"),
     (("x y", "2*x*(x + 2*y) + 12*x*y", "-(y*(x + 2*y) + 6*x*y)"), "not integrable", "exponential"),
 ]
 
@@ -229,7 +232,7 @@ def test_the_parts_of_a_report_do_not_contradict_each_other(given, kind, growth)
     found = analyze(file_from(*given), seconds=20)
     assert (found.conclusion.kind, found.conclusion.growth) == (kind, growth)
     assert contradictions(found) == []
-    true = polynomial_degrees(found.file.system, 14 if growth == "exponential" else 30, 3)
+    true = polynomial_degrees(found.file.system, 14 if growth == "exponential" else 20, 3)
     law = found.degrees.recurrence
     assert law is None or [law.predict(n) for n in range(1, len(true) + 1)] == true
     assert "estimated" in found.conclusion.sentence or law is not None
@@ -245,7 +248,7 @@ def test_the_parts_of_a_report_do_not_contradict_each_other(given, kind, growth)
 
 
 def test_heights_of_orbits_shorter_than_the_last_pattern_are_no_finding():
-    found = analyze(load("weierstrass"))
+    found = analysis_of("weierstrass")
     assert doubt_of_heights(found) == ""
     late = replace(found.degrees, patterns=Patterns((50,), None, True))
     doubt = doubt_of_heights(replace(found, degrees=late))
@@ -258,7 +261,7 @@ def test_heights_of_orbits_shorter_than_the_last_pattern_are_no_finding():
 
 
 def test_what_excludes_each_other_is_undecided():
-    found = analyze(load("weierstrass"))
+    found = analysis_of("weierstrass")
     exponential = replace(found.degrees, degrees=tuple(2**n for n in range(12)), patterns=None)
     both = replace(found, degrees=exponential)
     assert (both.conclusion.kind, contradictions(both)) == (
@@ -370,7 +373,6 @@ def test_formulas_are_written_only_where_the_time_is_long_enough_for_their_numbe
     assert can_be_written(four, fmpq(2, 11), 0.001)  # a few digits always
     with pytest.raises(InputError, match=r"in dimension 4 formulas with longer ones are not written within 1 s"):
         singularities(four, fmpq(1, 3**400), seconds=1)
-    assert patterns(four, fmpq(1, 3**400), seconds=4).running == ""
 
 
 def hypersurface(status, settled_at, multiplicity=1, followed=100, note=""):
@@ -432,10 +434,10 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
 
 
 def test_steps_too_few_for_a_pattern_are_named_with_what_they_missed():
-    """With 10 steps nothing is seen of what comes after 20, and nothing else is claimed."""
-    found = degree_growth(resonant(20), steps=10, max_terms=15)
-    assert found.basis == "explained: no confinement within 10 steps"
-    assert degree_growth(resonant(20), max_terms=15).recurrence.closed_form_text == "20 for n >= 19"
+    """With 8 steps nothing is seen of what comes after 12, and nothing else is claimed."""
+    found = degree_growth(resonant(12), steps=8, max_terms=10)
+    assert found.basis == "explained: no confinement within 8 steps"
+    assert degree_growth(resonant(12), max_terms=10).recurrence.closed_form_text == "12 for n >= 11"
 
 
 def test_what_still_runs_is_said_before_what_was_found():

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from search_helpers import integrals_of
 
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.polynomials import evaluate
@@ -20,8 +21,8 @@ THREE_LINES = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["3*x*(x+2*y
 SUM, PRODUCT = "(x1 + x2 + x3)", "(x1*x2*x3)"
 
 
-def beside(name, **options):
-    return flow_and_map(find_integrals(load(name), **options))
+def beside(name, *symbols):
+    return flow_and_map(integrals_of(name, *symbols))
 
 
 def order_in_eps(function):
@@ -58,7 +59,7 @@ def test_integrals_of_the_map_tend_to_integrals_of_the_flow(name, leading, kept)
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass"])
 def test_the_combination_has_the_series_that_is_told(name):
     """combination - leading - eps^k second, by rational functions, is of a higher order in eps than k."""
-    search = find_integrals(load(name))
+    search = integrals_of(name)
     names = [*search.file.variables, "eps"]
     field = FunctionField(names, reduces=True)
     for one in flow_and_map(search).limits:
@@ -77,15 +78,15 @@ def test_the_combination_has_the_series_that_is_told(name):
 
 
 def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured():
-    for file, formula in ((THREE_LINES, "x*y^3*(x + 2*y)^3"), (load("zander_120"), "x*y^2")):
-        found = flow_and_map(find_integrals(file))
+    for search, formula in ((find_integrals(THREE_LINES), "x*y^3*(x + 2*y)^3"), (integrals_of("zander_120"), "x*y^2")):
+        found = flow_and_map(search)
         assert [one.text for one in found.others] == [formula]
         assert found.lost == 1
         assert ("measured", "F1 is lost up to degree 14: the map shows no integral") in found.lines()
 
 
 def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
-    search = find_integrals(load("euler_top"))
+    search = integrals_of("euler_top")
     known = flow_and_map(replace(search, integrals=search.integrals[:1]))
     assert (len(known.limits), len(known.others), known.without_limit, known.lost) == (1, 1, 1, 0)
     assert ("undecided", "what the map makes of F2: the limits of 1 integral are not known") in known.lines()
@@ -96,7 +97,7 @@ def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
 
 
 def test_integrals_of_the_flow_without_a_formula_are_counted():
-    search = find_integrals(load("zander_120"))
+    search = integrals_of("zander_120")
     flow = replace(find_integrals(load("zander_120"), flow=True), integrals=())
     assert flow_and_map(search, None, flow).lines()[0] == (
         "measured",
@@ -119,7 +120,7 @@ def test_a_transcendental_integral_is_neither_seen_nor_lost():
     [f"{SUM}^2 + 3*{SUM} + eps^3*{PRODUCT}", f"5 + eps*{SUM} + eps^2*{SUM}^2 + eps^4*{PRODUCT}"],
 )
 def test_leading_terms_that_depend_on_each_other_are_combined(second):
-    search = with_integrals(find_integrals(load("volterra_periodic_3")), f"1 + eps*{SUM}", second)
+    search = with_integrals(integrals_of("volterra_periodic_3"), f"1 + eps*{SUM}", second)
     found = flow_and_map(search)
     assert format_rational_function(found.limits[0].leading) == "x1 + x2 + x3"
     assert (len(found.limits), found.others, found.without_limit) == (2, (), 0)
@@ -127,30 +128,30 @@ def test_leading_terms_that_depend_on_each_other_are_combined(second):
 
 def test_leading_terms_that_stay_dependent_are_left_out():
     """The second is a function of the first: no combination tends to anything else."""
-    search = with_integrals(find_integrals(load("volterra_periodic_3")), SUM, f"{SUM}^2")
+    search = with_integrals(integrals_of("volterra_periodic_3"), SUM, f"{SUM}^2")
     found = flow_and_map(search)
     assert (len(found.limits), len(found.others), found.without_limit, found.lost) == (1, 1, 1, 0)
 
 
 def test_a_function_that_is_no_integral_has_no_limit_among_those_of_the_flow():
-    search = with_integrals(find_integrals(load("harmonic")), "x + eps*y")
+    search = with_integrals(integrals_of("harmonic"), "x + eps*y")
     found = flow_and_map(search)
     assert found.limits == ()
     assert found.without_limit == 1
 
 
 def test_symbols_stay_in_the_limits():
-    [one, two] = beside("euler_top", symbols=["a1", "a2", "a3"]).limits
+    [one, two] = beside("euler_top", "a1", "a2", "a3").limits
     assert format_rational_function(one.leading) == "x2^2*a1*a3 - x1^2*a2*a3"
     assert format_rational_function(two.leading) == "x3^2*a1*a2 - x1^2*a2*a3"
 
 
 def test_the_density_of_the_map_tends_to_one_of_the_flow():
     for name, phi in (("zander_120", "x*y*(x + 2*y)"), ("euler_top", "1"), ("lotka_volterra", "x*y")):
-        search, densities = find_integrals(load(name)), find_densities(load(name))
+        search, densities = integrals_of(name), find_densities(load(name))
         assert flow_and_map(search, densities).density.text == phi
         assert find_densities(load(name), flow=True).densities[0].text == phi
-    assert flow_and_map(find_integrals(load("lorenz"))).density is None
+    assert flow_and_map(integrals_of("lorenz")).density is None
 
 
 def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():

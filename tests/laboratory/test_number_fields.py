@@ -92,8 +92,8 @@ def test_commuting_systems_over_a_number_field_are_found_and_commute():
 
 
 def test_analyze_says_once_what_is_not_done_over_a_number_field():
-    found = km.analyze(km.System(TOP, a="root of t^2 - 2"), seconds=20)
-    assert found.conclusion.sentence.startswith("Superintegrable (proved): 2 independent integrals")
+    found = km.analyze(km.System("x' = y; y' = a*x^2 - 1", a="root of t^2 - 2"), seconds=20)
+    assert found.conclusion.sentence.startswith("Integrable (proved): 1 independent integral")
     assert len(found.skipped) == 1
     assert found.skipped[0].startswith("over the number field QQ[t]/(t^2 - 2): Hamiltonian structure, the commuting")
     assert "only 0, f and -f commute" in dict(found.sections)["commuting systems"][0].text

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import pytest
 from flint import fmpq
+from search_helpers import analysis_of
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.consistency import contradictions
 from kahanmaps.laboratory.preserve.poisson import pencil as module
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
@@ -122,7 +121,7 @@ def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
     "name", ["nahm_tetrahedral", "nahm_octahedral", "nahm_icosahedral", "qrt_symmetric", "somos_5"]
 )
 def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
-    found = analyze(load(name), seconds=30)
+    found = analysis_of(name)
     assert found.pencil is not None
     assert (found.pencil.genus, found.degrees.growth) == (1, Growth.QUADRATIC)
     assert "the map is a translation" in found.to_json()["invariant_curves"]["motion"]
@@ -148,7 +147,7 @@ def test_the_genus_allows_one_kind_of_growth(genus, growth, agree):
 
 
 def test_a_genus_that_the_degrees_exclude_is_no_finding():
-    found = analyze(load("weierstrass"), seconds=30)
+    found = analysis_of("weierstrass")
     wrong = replace(found, pencil=replace(found.pencil, genus=0))
     assert wrong.conclusion.kind == "undecided"
     assert "quadratic growth is impossible where the generic curve has genus 0" in wrong.conclusion.sentence

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from flint import fmpz_poly
+from flint import fmpq, fmpz_poly
 from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,6 +31,16 @@ def explained(name):
 
 
 WRITTEN = [name for name in (*names(), *map_names()) if DIMENSION[name] <= 4]
+DAILY = [
+    "riccati",
+    "weierstrass",
+    "euler_top",
+    "dressing_chain_3",
+    "lorenz",
+    "mcmillan",
+    "somos_4",
+    "hietarinta_viallet",
+]
 FURTHER = Path(__file__).parent / "further_systems"
 # In these several contracted hypersurfaces are zeros of one form over Q: the degrees of all of them.
 OF_ONE_FORM = {
@@ -43,9 +53,7 @@ OF_ONE_FORM = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", quick(WRITTEN, [name for name in WRITTEN if DIMENSION[name] < 4 and name != "qrt_asymmetric"])
-)
+@pytest.mark.parametrize("name", quick(WRITTEN, DAILY))
 def test_the_degrees_of_the_catalogue_are_explained(name):
     found = degree_growth(load(name).map, seconds=30, max_degree=500)
     if found.degrees[1] > 1:
@@ -56,7 +64,7 @@ def test_the_degrees_of_the_catalogue_are_explained(name):
 
 @pytest.mark.parametrize("name", quick(list(OF_ONE_FORM), ["kirchhoff_case", "three_wave"]))
 def test_hypersurfaces_of_one_form_are_told_apart_and_explain_degrees(name):
-    found = explained(name)
+    found = patterns(load(name).map, fmpq(2, 7))
     sizes = [h.degree for h in found.contracted]
     assert sorted(sizes) == OF_ONE_FORM[name]
     measured = degree_growth(load(name).map, seconds=60, max_terms=6, patterns=found)
@@ -73,7 +81,7 @@ def test_a_hypersurface_with_points_modulo_some_primes_only_is_met():
     """One form of degree 15: three conjugate hypersurfaces of degree 3, which cost nothing, and two others."""
     rhs = ["-x3*x4", "-x3*x1", "3*x2*x1", "2*x2*x3", "-x1*x2"]
     system = QuadraticSystem.from_text(["x1", "x2", "x3", "x4", "x5"], rhs)
-    found = patterns(system, default_eps(system, 0)[0])
+    found = patterns(system, default_eps(system, 0)[0], steps=12)
     assert sorted(h.degree for h in found.contracted) == [1, 4, 6, 9]
     measured = degree_growth(system, max_terms=5).degrees
     assert tuple(coefficients(found.fraction, 6)) == measured == (1, 5, 17, 59, 209, 743)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from flint import fmpq
 from helpers import points, rationals
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ
@@ -89,7 +89,6 @@ def generic_orbit(over, start, steps):
 def test_integers_over_one_denominator_step_as_rationals_do(name):
     over = MAPS[name].at("1/10")
 
-    @settings(max_examples=20)
     @given(points(over.dim))
     def compare(x):
         try:
@@ -108,7 +107,6 @@ def test_integers_over_one_denominator_step_as_rationals_do(name):
 def test_the_inverse_leads_back_and_forth(name):
     over = MAPS[name].at("1/10")
 
-    @settings(max_examples=20)
     @given(points(over.dim))
     def compare(x):
         try:

@@ -72,7 +72,7 @@ CONTENTS = {
 }
 
 
-@pytest.mark.parametrize("n", range(3, 9))
+@pytest.mark.parametrize("n", [3, 4, 6, 8])
 @pytest.mark.parametrize(("W", "offered"), CONTENTS.values(), ids=CONTENTS.keys())
 def test_minors_with_common_content_are_solved_correctly(n, W, offered):
     rng = random.Random(n)

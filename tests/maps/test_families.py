@@ -133,7 +133,7 @@ def numbers(name, symbols, members, top, by, prime=307):
 @pytest.mark.parametrize(
     ("name", "symbols", "top", "relations", "densities"),
     [
-        ("euler_top", ["a1"], 4, [0, 2, 8, 19], [0, 0, 0, 6]),  # orbits on an intersection of two quadrics
+        ("euler_top", ["a1"], 3, [0, 2, 8], [0, 0, 0]),  # orbits on an intersection of two quadrics
         ("lyness", ["a"], 4, [0, 0, 1, 3], [0, 1, 2, 2]),  # on cubics; x y, and its product with the integral
         ("henon_heiles", ["c"], 2, [0, 0], [0, 1]),
     ],

@@ -2,7 +2,7 @@
 
 import pytest
 from flint import fmpq
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import kahanmaps.maps.inverse as module
@@ -32,7 +32,6 @@ BIRATIONAL = [
 
 
 @pytest.mark.parametrize("map_", BIRATIONAL, ids=str)
-@settings(max_examples=10, deadline=None)
 @given(data=st.data())
 def test_the_inverse_leads_back_from_both_sides(map_, data):
     start = [fmpq(data.draw(st.integers(2, 30)), data.draw(st.integers(1, 9))) for _ in range(map_.dim)]

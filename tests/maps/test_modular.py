@@ -90,7 +90,7 @@ def test_orbits_of_members_are_the_exact_ones_and_end_where_those_end(name, prim
 @pytest.mark.parametrize(
     "system", [LOTKA_VOLTERRA, LORENZ, HENON_HEILES, EULER_TOP, FORCED_PLANE], ids=["LV", "L", "HH", "ET", "FP"]
 )
-@pytest.mark.parametrize("prime", [11, 101, 2**31 - 1, MERSENNE])
+@pytest.mark.parametrize("prime", [11, 2**31 - 1, MERSENNE])
 def test_orbits_of_any_quadratic_system_are_the_exact_ones_forward_and_backward(system, prime, kernel):
     starts = random_starts(random.Random(prime), prime, system.dim, 30)
     for backward in (False, True):
@@ -186,12 +186,12 @@ def hard(prime, rng, count):
 def test_sums_of_products_are_exact_also_at_the_ends(prime):
     rng, arithmetic = random.Random(prime), ResidueArithmetic(prime)
     for terms in (1, 2, 3, 4):
-        columns = [hard(prime, rng, 5_000) for _ in range(2 * terms)]
+        columns = [hard(prime, rng, 1_500) for _ in range(2 * terms)]
         arrays = [arithmetic.array(column) for column in columns]
         lefts, rights = map(arithmetic.left, arrays[::2]), map(arithmetic.right, arrays[1::2])
         found = arithmetic.dot(*zip(lefts, rights, strict=True)).tolist()
         pairs = list(zip(columns[::2], columns[1::2], strict=True))
-        expected = [sum(a[i] * b[i] for a, b in pairs) % prime for i in range(5_000)]
+        expected = [sum(a[i] * b[i] for a, b in pairs) % prime for i in range(1_500)]
         assert found == expected
 
 
@@ -200,8 +200,8 @@ def test_compiled_products_are_exact_too_numba(prime):
     _, _, inner_product = kernels()
     rng = random.Random(prime)
     n, R = np.uint64(-pow(prime, -1, 2**64) % 2**64), 2**64
-    rows, x = hard(prime, rng, 4000), hard(prime, rng, 4)
-    for first in range(0, 4000, 4):
+    rows, x = hard(prime, rng, 1000), hard(prime, rng, 4)
+    for first in range(0, 1000, 4):
         row = rows[first : first + 4]
         found = int(inner_product(np.array(row, np.uint64), np.array(x, np.uint64), np.uint64(prime), n))
         assert found * R % prime == sum(a * b for a, b in zip(row, x, strict=True)) % prime

@@ -22,7 +22,7 @@ from helpers import (
     step_or_none,
     systems_with_points,
 )
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from planar_helpers import over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ, RR
@@ -71,7 +71,6 @@ def test_an_orbit_takes_no_step_before_it_is_asked_for(monkeypatch):
     assert counts == [0, 0, 1, 2]
 
 
-@settings(max_examples=25)
 @given(pair=systems_with_points())
 def test_backward_undoes_forward(pair):
     system, x = pair

@@ -195,7 +195,7 @@ def test_with_the_number_of_points_modulo_small_primes_the_order_of_T_is_the_sam
 
 @pytest.mark.parametrize(
     ("name", "prime"),
-    [("m = 2", 29), ("m = 2, another J", 31), ("m = 2, i", 31), ("m = 2, i", 29), ("m = 2, sqrt 2", 13)],
+    [("m = 2", 29), ("m = 2, another J", 31), ("m = 2, i", 19), ("m = 2, i", 29), ("m = 2, sqrt 2", 13)],
 )
 def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pole(name, prime):
     normal_form, system = structure_and_system(name)

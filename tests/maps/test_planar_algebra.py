@@ -87,9 +87,9 @@ def test_an_entry_is_as_long_as_the_heights_ask_for(name):
 def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_generic_steps(chi):
     normal_form, system = member_of(chi)
     start = random_point(system.dim, 1, height=3)
-    generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, max_digits=None)]
+    generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 3, max_digits=None)]
     planes = [
-        point.value for point in Orbit(KahanMap(system, "1/10"), start, 4, normal_form=normal_form, max_digits=None)
+        point.value for point in Orbit(KahanMap(system, "1/10"), start, 3, normal_form=normal_form, max_digits=None)
     ]
     assert [point.rationals() for point in planes] == [point.rationals() for point in generic]
 
@@ -111,8 +111,8 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
 def test_the_nth_iterate_is_the_point_of_the_orbit(chi):
     normal_form, system = member_of(chi)
     start = random_point(system.dim, 4)
-    points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(start), 121))
-    for n in (30, 77, 120):
+    points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(start), 61))
+    for n in (30, 60):
         found = NthIterate(normal_form, "1/10", rational_iterate.QQ).value(start, n)
         assert found == points[n] != points[n - 1]
         assert hash(found) == hash(points[n])
@@ -146,7 +146,7 @@ def test_a_wrong_iterate_does_not_pass(monkeypatch):
     iterate = tau_table.iterate
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 700)
+        NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 100)
 
 
 @over_fields

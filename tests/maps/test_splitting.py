@@ -13,7 +13,7 @@ from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
 
-FIELDS = [QQ, GF(11), GF(101), GF(10007), GF(2**61 - 1), GF(2**89 - 1), RR(128)]
+FIELDS = [QQ, GF(11), GF(2**61 - 1), GF(2**89 - 1), RR(128)]
 over_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
 
 

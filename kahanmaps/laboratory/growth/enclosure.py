@@ -102,7 +102,7 @@ def enclose(
     >>> found = enclose(load("lotka_volterra").map, None)
     >>> found.lower, found.upper
     ('1.571456', '2')
-    >>> enclose(load("nahm_tetrahedral").map, None, seconds=0.5) is None
+    >>> enclose(load("nahm_tetrahedral").map, None, seconds=0.1) is None
     True
     """
     if map_.dim != 2 or map_.symbols or map_.root is not None:

@@ -114,7 +114,7 @@ def scan(
     ... parameters.g = 1
     ... [system]
     ... rhs = ["x*(x + 2*y)", "-y*((g + 1)*x + g*y)"]''')
-    >>> found = scan(lines, ["g"], terms=4)
+    >>> found = scan(lines, ["g"], terms=4, primes=[31, 37, 41])
     >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
     ['2', '1']
     """
