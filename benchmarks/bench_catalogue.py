@@ -59,7 +59,8 @@ def measure(quick: bool = False) -> list[Row]:
         if point.value.bits < LEAST_BITS:
             say(f"  {name}: left out, its orbit ends or has short numbers")
             continue
-        note = "" if orbit.bilinear_since is None else f"{FORMS} from step {orbit.bilinear_since} on"
+        since = orbit.bilinear_since
+        note = "" if since is None else f"dimension {map_over.dim}, {FORMS} from step {since} on"
         best, found = timed(partial(ours, map_over, steps), 1.0)
         seconds, expected = timed(partial(plain, map_over, steps), 1.0)
         require_equal(PLAIN, expected, found)
