@@ -4,6 +4,8 @@ Specified here: every point is the one that single steps give, in lowest terms a
 on elliptic curves and Abelian surfaces, and nowhere else; forms that are wrong cost time and nothing else.
 """
 
+from math import prod
+
 import pytest
 from flint import fmpq, fmpz
 from hypothesis import given, settings
@@ -11,6 +13,8 @@ from hypothesis import strategies as st
 
 import kahanmaps.maps.orbits.bilinear_steps as bilinear
 from kahanmaps import GF, Orbit, load
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
@@ -112,6 +116,29 @@ def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch):
         assert right.step(expected[10:13]) == expected[13]
     monkeypatch.setattr(bilinear, "bilinear_forms", lambda *_: changed)
     assert walked(map_over, START[:3], 25)[0] == expected
+
+
+def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_step():
+    # z -> z / (1 + z) is 1/Z, 1/(Z + 1), ..., and y is 0 but where Z + k is none of the zeros of p.
+    field = ring(["z", "y", "u", "eps"])
+    z, y, u, _ = field.gens()
+    one, last, Z = field.constant(1), 32, fmpz(2) ** 360
+    p = prod((1 - z * (Z + k) for k in range(last + 1) if k != last - 1), start=one)
+    images = [RationalFunction(z, 1 + z), RationalFunction(p + u, one), RationalFunction(y * (1 - z * (Z + last)), one)]
+    map_over = explicit_map(["z", "y", "u"], images).at(1)
+    start = (fmpq(1, Z), fmpq(0), fmpq(0))
+    points, since = walked(map_over, start, last + 3)
+    assert points == single_steps(map_over, start, last + 3)
+    assert since < last - 1
+    assert any(point.numerators[1] for point in points)
+
+
+def test_an_orbit_ends_after_a_point_with_too_many_bits():
+    start = IntegerPoint.from_rationals(START[:3])
+    *within, beyond = bilinear.RationalOrbit(over("euler_top"), start, max_bits=400)
+    assert max(point.bits for point in within) <= 400 < beyond.bits
+    # Of several factors only the first was taken.
+    assert len(list(bilinear.RationalOrbit(over("euler_top") ** 2, start, max_bits=400))) < len(within) + 1
 
 
 def test_an_image_is_told_from_other_points_and_from_a_choice_of_many():

@@ -14,7 +14,7 @@ last coordinate at step n - lag, and gcds with R. Kahan's discretizations of int
 whose method makes bilinear equations of them.
 
 The forms are found modulo primes. Nothing has to be proved of them: what they give is put into the equation of the
-step, exactly, and only a point without common factor rests on them.
+step, exactly. Only that a point is in lowest terms rests on all of them, which are tried at each step modulo a prime.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
 Rows = list[list[int]]
+Pairs = Sequence[tuple[int, int]]  # i and j of products of coordinates
 
 # Forms are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers grow
 # by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay.
@@ -66,6 +67,8 @@ class RationalOrbit:
             if image is None:
                 return
             yield image
+            if self.max_bits is not None and image.exceeding(self.max_bits):
+                return
             last.append(image)
             is_long = len(last) == 3 and image.bits >= _LONG * (self.map.dim + 1) ** 2
             if is_long and not is_tried and image.bits < _SLOW_GROWTH * last[1].bits:
@@ -75,37 +78,53 @@ class RationalOrbit:
 
 
 class BilinearForms:
-    """The forms B_ij for the last j: a row of coefficients for each i, a column for each of the products."""
+    """The forms B_ij for the last j: a row of coefficients for each i, a column for each of the products.
+
+    With a `bound` R, `relations` has residues of the rows of all B_ij and of the products that are left out, and
+    `pairs` their i and j.
+    """
 
     def __init__(
         self,
         steps: IntegerSteps,
         lag: int,
-        products: Sequence[tuple[int, int]],
+        products: Pairs,
         coefficients: fmpz_mat,
-        bound: fmpz | None,
+        bound: fmpz | None = None,
+        relations: nmod_mat | None = None,
+        pairs: tuple[Pairs, Pairs] = ((), ()),
     ) -> None:
         self.lag, self.products, self.coefficients, self.bound = lag, products, coefficients, bound
-        self._steps = steps
+        self._steps, self._relations, self._pairs = steps, relations, pairs
 
     def step(self, last: Sequence[IntegerPoint]) -> IntegerPoint | None:
         """The point after the last ones; None where the forms do not give it."""
         point = last[-1]
-        X, Y = ([*one.numerators, one.denominator] for one in (point, last[-self.lag]))
+        X, Y, behind = ([*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag))
         column = fmpz_mat(len(self.products), 1, [X[i] * Y[j] for i, j in self.products])
         values: list[fmpz] = (self.coefficients * column).entries()
-        if self.bound is None:
-            image = lowest(values[:-1], values[-1])
-        else:
-            divisor = last[-1 - self.lag].denominator
-            values = [value // divisor for value in values]
+        if self.bound is not None:
+            values = [value // behind[-1] for value in values]
             common = self.bound
             for value in values:
                 common = common.gcd(value % common)
-            common = common if values[-1] > 0 else -common
-            *numerators, denominator = (value // common for value in values)
-            image = IntegerPoint(tuple(numerators), denominator) if denominator else None
+            values = [value // common for value in values]
+        if self._relations is None or not self._hold(self._relations, values, X, Y, behind):
+            image = lowest(values[:-1], values[-1])
+        else:
+            sign = -1 if values[-1] < 0 else 1
+            image = IntegerPoint(tuple(sign * value for value in values[:-1]), sign * values[-1])
         return image if image is not None and self._steps.is_image(point, image) else None
+
+    def _hold(self, relations: nmod_mat, *points: list[fmpz]) -> bool:
+        """Whether all that R rests on is true at the points ahead, here, before and behind, modulo a prime."""
+        a, x, y, b = ([int(entry % _PRIME) for entry in one] for one in points)
+        forms, others = self._pairs
+        products = nmod_mat(len(self.products), 1, [x[i] * y[j] % _PRIME for i, j in self.products], _PRIME)
+        found = [int(entry) for entry in (relations * products).entries()]
+        f, scale = found[forms.index((len(x) - 1, len(x) - 1))], a[-1] * b[-1] % _PRIME
+        wanted = [f * a[i] * b[j] % _PRIME for i, j in forms] + [x[i] * y[j] * scale % _PRIME for i, j in others]
+        return scale != 0 and all(entry * scale % _PRIME == side for entry, side in zip(found, wanted, strict=True))
 
 
 def bilinear_forms(steps: IntegerSteps, point: IntegerPoint) -> BilinearForms | None:
@@ -146,9 +165,15 @@ class _Search:
         count = len(self._wanted) * columns
         numbers = _over_one_denominator(entries[:count])[0]
         rows = [numbers[k : k + columns] for k in range(0, count, columns)]
-        bound = _bound(rows) * _over_one_denominator(entries[count:])[1] if self._wanted != self._last else fmpz(0)
         last = [row for row, pair in zip(rows, self._wanted, strict=True) if pair in self._last]
-        return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last), bound or None)
+        bound = _bound(rows) * _over_one_denominator(entries[count:])[1] if self._wanted != self._last else fmpz(0)
+        if bound == 0:
+            return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last))
+        residues = [int(entry % _PRIME) for entry in numbers]
+        residues += [int(entry.p % _PRIME) * pow(int(entry.q), -1, _PRIME) % _PRIME for entry in entries[count:]]
+        relations = nmod_mat(len(residues) // columns, columns, residues, _PRIME)
+        pairs = (self._wanted, self._others)
+        return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last), bound, relations, pairs)
 
     def _modulo(self, prime: int) -> list[int] | None:
         """The coefficients of the forms modulo a prime, then those of the products that are left out."""
@@ -181,7 +206,7 @@ class _Search:
         return None if columns is None else [entry for column in columns for entry in column]
 
 
-def _table(pairs: Sequence[tuple[int, int]], first: Rows, second: Rows, prime: int) -> Rows:
+def _table(pairs: Pairs, first: Rows, second: Rows, prime: int) -> Rows:
     """The products of coordinates i of the first and j of the second point, a row for each pair of points."""
     return [[x[i] * y[j] % prime for i, j in pairs] for x, y in zip(first, second, strict=True)]
 
