@@ -22,10 +22,12 @@ from __future__ import annotations
 import random
 from collections import deque
 from collections.abc import Iterator, Sequence
+from functools import reduce
 from itertools import count
 
 from flint import fmpq, fmpz, fmpz_mat, nmod_mat
 
+from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -162,15 +164,16 @@ class _Search:
 
     def _forms(self, entries: Sequence[fmpq]) -> BilinearForms:
         columns = len(self._products)
-        count = len(self._wanted) * columns
-        numbers = _over_one_denominator(entries[:count])[0]
-        rows = [numbers[k : k + columns] for k in range(0, count, columns)]
+        size = len(self._wanted) * columns
+        numbers, others = primitive_integers(tuple(entries[:size])), entries[size:]
+        rows = [numbers[k : k + columns] for k in range(0, size, columns)]
         last = [row for row, pair in zip(rows, self._wanted, strict=True) if pair in self._last]
-        bound = _bound(rows) * _over_one_denominator(entries[count:])[1] if self._wanted != self._last else fmpz(0)
+        below = reduce(fmpz.lcm, (entry.q for entry in others), fmpz(1))
+        bound = below * _bound(rows) if self._wanted != self._last else fmpz(0)
         if bound == 0:
             return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last))
         residues = [int(entry % _PRIME) for entry in numbers]
-        residues += [int(entry.p % _PRIME) * pow(int(entry.q), -1, _PRIME) % _PRIME for entry in entries[count:]]
+        residues += [int(entry.p % _PRIME) * pow(int(entry.q), -1, _PRIME) % _PRIME for entry in others]
         relations = nmod_mat(len(residues) // columns, columns, residues, _PRIME)
         pairs = (self._wanted, self._others)
         return BilinearForms(self._steps, self._lag, self._products, fmpz_mat(last), bound, relations, pairs)
@@ -251,18 +254,6 @@ def _solved(values: Rows, sides: Rows, prime: int) -> Rows | None:
     if nmod_mat(values, prime) * found != nmod_mat(sides, prime):
         return None
     return [[int(entry) for entry in column] for column in found.transpose().tolist()]
-
-
-def _over_one_denominator(numbers: Sequence[fmpq]) -> tuple[list[fmpz], fmpz]:
-    """Numerators without common factor, as far as they are all divided by the same integer, and the denominator."""
-    below = fmpz(1)
-    for number in numbers:
-        below = below.lcm(number.q)
-    above = [number.p * (below // number.q) for number in numbers]
-    common = fmpz(0)
-    for entry in above:
-        common = common.gcd(entry)
-    return [entry // common for entry in above] if common else above, below
 
 
 def _bound(forms: Sequence[Sequence[fmpz]]) -> fmpz:
