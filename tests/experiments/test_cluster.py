@@ -249,7 +249,7 @@ def test_a_job_is_done_at_the_second_try_with_its_limits_in_the_environment_of_t
 def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_no_result(workers, tmp_path):
     counted = f"printf x >> {shlex.quote(str(tmp_path / 'tries'))}; exec {shlex.join(workers._command)}"
     workers._command = ["/bin/sh", "-c", counted]
-    bad, good = jobs_of(1, leave=3), jobs_of(1, kind="other")
+    bad, good = jobs_of(1, leave=3), jobs_of(1, kind="other", sleep=1)  # nobody has printed a record meanwhile
     records = {record.key: record for record in done(workers, [*bad, *good])}
     assert (tmp_path / "tries").stat().st_size == TRIES + 1
     assert (list(workers._again), workers._groups) == ([], {})  # nor is it tried again when it is told

@@ -122,6 +122,7 @@ class ClusterWorkers(Executor):
         self._groups: dict[int, JobGroup] = {}  # at the scheduler
         self._numbers = count()
         self._unfit = 0  # groups that ended by themselves before any record
+        self._untold: set[str] = set()  # the jobs of these groups
         self._is_proven = False  # a record has come from the workers
         self._silent_since: float | None = None
         self._next_word = SILENCE
@@ -152,7 +153,7 @@ class ClusterWorkers(Executor):
         """Records that are ready, as soon as there is one, or none after `timeout` seconds.
 
         Raises ClusterLost when the scheduler is gone, and WorkersUnfit when groups end by themselves one after the
-        other and none has ever printed a record.
+        other, those of every job in flight among them, and none has ever printed a record.
         """
         deadline = time.monotonic() + timeout
         while True:
@@ -231,7 +232,10 @@ class ClusterWorkers(Executor):
         if group.jobs:
             message, is_unfit = _failure_of(result, timeout)
             stderr = result.output("stderr").decode(errors="replace")[-TAIL:]
-            self._require_fit(is_unfit, message, stderr)
+            if is_unfit and not self._is_proven:
+                self._unfit += 1
+                self._untold |= group.jobs.keys()
+                self._require_fit(message, stderr)
             for key, (job, tries) in group.jobs.items():
                 failures.append((job, tries + is_alone, Record(key, Outcome.LOST, message=message, stderr=stderr)))
         finished = datetime.now(UTC).isoformat(timespec="seconds")
@@ -240,10 +244,9 @@ class ClusterWorkers(Executor):
         self._keys.difference_update(record.key for record in records)
         return records
 
-    def _require_fit(self, is_unfit: bool, message: str, stderr: str) -> None:
-        """A missing installation must not be told as thousands of lost tasks."""
-        self._unfit += is_unfit and not self._is_proven
-        if not self._is_proven and self._unfit >= UNFIT_AFTER:
+    def _require_fit(self, message: str, stderr: str) -> None:
+        """A missing installation must not be told as thousands of lost tasks, nor one deadly task as the former."""
+        if self._unfit >= UNFIT_AFTER and self._keys <= self._untold:
             command = " ".join(self._command)
             sentence = f"the workers cannot run {command!r}: {message}, and none has ever printed a record"
             raise WorkersUnfit(f"{sentence}\n{stderr.strip()}" if stderr.strip() else sentence)
