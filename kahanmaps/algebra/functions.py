@@ -9,6 +9,8 @@ quotients of many factors stay small. Work is counted beforehand and bounded by 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from hashlib import sha256
+from threading import Lock
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
@@ -22,7 +24,11 @@ from kahanmaps.algebra.written.text import format_rational_function
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
+_MOST_KEPT, _MOST_KEPT_TERMS = 100, 500_000  # matrices whose minors are kept, and terms: 30 MB
 _BY_MINORS = 7  # rows: products with single entries, of which there are 2^n n/2, are cheaper than those of elimination
+
+_kept: dict[bytes, tuple[list[fmpq_mpoly], int]] = {}  # by matrices: their minors, and the products of terms
+_keeping = Lock()
 
 
 class BudgetExceeded(KahanmapsError):
@@ -93,10 +99,19 @@ class FunctionField(Field):
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
         """A product of polynomials, paid from the budget before it is computed. Raises BudgetExceeded."""
-        self.budget -= len(left) * len(right) + 1
+        self.pay(len(left) * len(right) + 1)
+        return left * right
+
+    def pay(self, products: int) -> None:
+        """Take so many products of terms from the budget. Raises BudgetExceeded where it has not as many."""
+        self.budget -= products
         if self.budget < 0:
             raise BudgetExceeded("expanding the identity would take too many products of terms")
-        return left * right
+
+    def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
+        """Raise BudgetExceeded where the budget cannot pay for the products of all these pairs: none need be begun."""
+        if sum(len(left) * len(right) + 1 for left, right in pairs) > self.budget:
+            self.pay(self.budget + 1)
 
     def fraction(self, above: fmpq_mpoly, below: fmpq_mpoly) -> Function:
         """above / below, in lowest terms if this field reduces."""
@@ -163,9 +178,7 @@ class FunctionField(Field):
             return large / small.leading_coefficient()
         if large.total_degree() < small.total_degree():
             return None
-        self.budget -= len(large) * len(small)
-        if self.budget < 0:
-            raise BudgetExceeded("expanding the identity would take too many products of terms")
+        self.pay(len(large) * len(small))
         try:
             return large / small
         except DomainError:
@@ -304,12 +317,41 @@ class FunctionMatrix(EntryMatrix):
 
 
 def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
-    """The signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th is without column k."""
+    """The signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th is without column k.
+
+    Many identities contain the same image of the same map: the last minors are kept. They are paid for as if they were
+    computed again, so that no verdict depends on what was expanded before.
+    """
+    key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
+    minors, products = _kept.get(key, ([], 0))
+    if minors or products > field.budget:
+        field.pay(products)
+        return minors
+    budget = field.budget
+    try:
+        minors = _expanded_minors(field, rows)
+    except BudgetExceeded:
+        _keep(key, [], budget + 1)
+        raise
+    _keep(key, minors, budget - field.budget)
+    return minors
+
+
+def _keep(key: bytes, minors: list[fmpq_mpoly], products: int) -> None:
+    """Keep minors in place of the oldest; none of a matrix that takes at least so many products, and was given up."""
+    with _keeping:
+        _kept[key] = minors, products
+        while len(_kept) > _MOST_KEPT or sum(len(P) for kept, _ in _kept.values() for P in kept) > _MOST_KEPT_TERMS:
+            del _kept[next(iter(_kept))]
+
+
+def _expanded_minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
     if len(rows) > _BY_MINORS:
         columns = range(len(rows) + 1)
         return [_bareiss(field, [[*row[:k], *row[k + 1 :]] for row in rows]) * (-1) ** k for k in columns]
+    how = field.times, field.require
     entries = [[None if entry.is_zero() else entry for entry in row] for row in rows]
-    return [field.context.constant(0) if minor is None else minor for minor in kernel_minors(entries, field.times)]
+    return [field.context.constant(0) if minor is None else minor for minor in kernel_minors(entries, *how)]
 
 
 def _determinant(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> fmpq_mpoly:

@@ -8,15 +8,19 @@ from functools import cache
 from typing import Any
 
 Product = Callable[[Any, Any], Any]
+Foresight = Callable[[list[tuple[Any, Any]]], None]
 
 
-def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) -> list[Any]:
+def kernel_minors(
+    rows: Sequence[Sequence[Any]], times: Product = operator.mul, foresee: Foresight | None = None
+) -> list[Any]:
     """The vector of signed maximal minors of an n x (n + 1) matrix, which the matrix sends to zero.
 
     `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays): exact if the ring
     is. `times` multiplies two of them. All minors of the first k rows are kept, so that 2^(n+1) n/2 products are taken.
-    An entry None is a zero that costs nothing. Returns the n + 1 minors, the k-th without column k and with the sign
-    (-1)^k; None where all of its products have such a zero.
+    An entry None is a zero that costs nothing. `foresee` is given all pairs that a further row multiplies, beforehand:
+    it may raise. Returns the n + 1 minors, the k-th without column k and with the sign (-1)^k; None where all of its
+    products have such a zero.
 
     >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
     [-3, 6, -3]
@@ -26,6 +30,9 @@ def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) 
     width = len(rows) + 1
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
     for row, layer in zip(rows[1:], _layers(width), strict=True):
+        if foresee is not None:
+            pairs = ((row[j], minors[without]) for _, products in layer for j, without, _ in products)
+            foresee([(entry, minor) for entry, minor in pairs if entry is not None and minor is not None])
         larger: dict[int, Any] = {}
         for mask, products in layer:
             total: Any = None
