@@ -24,6 +24,7 @@ START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (
 def early(monkeypatch):
     """Forms are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(bilinear, "_LONG", 20)
+    monkeypatch.setattr(bilinear, "_LONGER_THAN_START", 0)
 
 
 def over(name, eps="3/11"):
@@ -169,6 +170,7 @@ def test_orbits_tell_from_which_step_on(monkeypatch):
     assert walked(over("euler_top"), START[:3], 12)[1] is None
     monkeypatch.undo()
     monkeypatch.setattr(bilinear, "_LONG", 20)
+    monkeypatch.setattr(bilinear, "_LONGER_THAN_START", 0)
     orbit = Orbit(over("euler_top"), START[:3], 12)
     assert orbit.bilinear_since is None
     points = [point.value for point in orbit]

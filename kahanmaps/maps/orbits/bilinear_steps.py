@@ -32,13 +32,16 @@ from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
+from kahanmaps.maps.orbits.symmetric_qrt import POINTS, SymmetricQRT, symmetric_qrt
 
 Rows = list[list[int]]
 Pairs = Sequence[tuple[int, int]]  # i and j of products of coordinates
 
 # Forms are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers grow
-# by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay.
+# by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay. As their coefficients
+# are about as long as the start, points have to be longer.
 _LONG = 500
+_LONGER_THAN_START = 8
 _SLOW_GROWTH = 1.5
 _MOST_PRIMES = 50  # for the coefficients
 _PRIME = 2**61 - 1
@@ -58,9 +61,10 @@ class RationalOrbit:
         self.since: int | None = None
 
     def __iter__(self) -> Iterator[IntegerPoint]:
-        last = deque([self.start], maxlen=3)
-        forms: BilinearForms | None = None
+        first, last = [self.start], deque([self.start], maxlen=3)
+        forms: BilinearForms | SymmetricQRT | None = None
         is_tried = len(self.map.factors) > 1 or self.map.dim > _MOST_DIMENSION
+        long = max(_LONG * (self.map.dim + 1) ** 2, _LONGER_THAN_START * self.start.bits)
         yield self.start
         for step in count(2):
             image = None if forms is None else forms.step(last)
@@ -72,10 +76,14 @@ class RationalOrbit:
             if self.max_bits is not None and image.exceeding(self.max_bits):
                 return
             last.append(image)
-            is_long = len(last) == 3 and image.bits >= _LONG * (self.map.dim + 1) ** 2
-            if is_long and not is_tried and image.bits < _SLOW_GROWTH * last[1].bits:
+            if len(first) < POINTS:
+                first.append(image)
+            if is_tried or len(first) < POINTS or image.bits < long:
+                continue
+            if image.bits < _SLOW_GROWTH * last[1].bits:
                 is_tried = True
-                forms = bilinear_forms(self.map.factors[0].integer_steps, image)
+                factor = self.map.factors[0]
+                forms = symmetric_qrt(factor.equation, first) or bilinear_forms(factor.integer_steps, image)
                 self.since = None if forms is None else step
 
 
