@@ -16,6 +16,7 @@ from kahanmaps import GF, Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.integer_steps import IntegerSteps
 
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
 
@@ -132,6 +133,55 @@ def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_s
     assert points == single_steps(map_over, start, last + 3)
     assert since < last - 1
     assert any(point.numerators[1] for point in points)
+
+
+@pytest.mark.parametrize("name", ["weierstrass", "planar_cubic_hamiltonian", "zander_111", "nahm_tetrahedral"])
+def test_in_the_plane_forms_are_proved_once_and_no_image_is_put_into_the_equation(name, monkeypatch):
+    map_over = over(name)
+    expected = single_steps(map_over, START[:2], 60)
+    monkeypatch.setattr(IntegerSteps, "is_image", lambda *_: pytest.fail("an image was put into the equation"))
+    points, since = walked(map_over, START[:2], 60)
+    assert points == expected
+    assert since is not None
+
+
+def test_forms_that_do_not_hold_everywhere_are_told_from_those_that_do():
+    map_over, space = over("weierstrass"), over("euler_top")
+
+    def holds_everywhere(found, equation):
+        found.try_everywhere(equation)
+        return found.holds_everywhere
+
+    def forms(map_over):
+        start = IntegerPoint.from_rationals(START[: map_over.dim])
+        return bilinear.bilinear_forms(map_over.integer_steps, start)
+
+    assert holds_everywhere(forms(map_over), map_over.equation)
+    assert not holds_everywhere(forms(map_over), over("weierstrass", "1/5").equation)
+    for k in range(9):
+        changed = forms(map_over)
+        changed.coefficients[k // 3, k % 3] += 1
+        assert not holds_everywhere(changed, map_over.equation)
+    assert not holds_everywhere(forms(space), space.equation)
+
+
+def test_where_forms_hold_everywhere_a_point_behind_that_does_not_fit_does_no_harm():
+    map_over = over("weierstrass")
+    points = single_steps(map_over, START[:2], 30)
+    forms = bilinear.bilinear_forms(map_over.integer_steps, points[0])
+    forms.try_everywhere(map_over.equation)
+    found = [forms.step([points[k - 2], points[k]]) for k in range(2, 30)]
+    assert all(image in (None, points[k + 1]) for k, image in enumerate(found, 2))
+    assert None in found
+
+
+def test_where_forms_hold_everywhere_a_singular_point_has_no_image_all_the_same():
+    map_over = over("weierstrass")
+    forms = bilinear.bilinear_forms(map_over.integer_steps, IntegerPoint.from_rationals(START[:2]))
+    forms.try_everywhere(map_over.equation)
+    pole = IntegerPoint.from_rationals((fmpq(121, 108), fmpq(5)))  # where 1 - 108 x / 121 = 0
+    assert map_over.integer_step(pole) is None
+    assert forms.step([pole, IntegerPoint.from_rationals(START[:2]), pole]) is None
 
 
 def test_an_orbit_ends_after_a_point_with_too_many_bits():

@@ -29,7 +29,9 @@ from flint import fmpq, fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
+from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.orbits.elimination import ExactDivisor
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 from kahanmaps.maps.orbits.symmetric_qrt import POINTS, SymmetricQRT, symmetric_qrt
@@ -46,6 +48,7 @@ _SLOW_GROWTH = 1.5
 _MOST_PRIMES = 50  # for the coefficients
 _PRIME = 2**61 - 1
 _MOST_DIMENSION = 12  # where to look for forms of 169 products takes some seconds
+_FORMS_DIMENSION = 2  # above, no forms of degree 2 are an image everywhere
 _BOUND_DIMENSION = 4  # above, R is so long that it takes more time to find than it saves
 _SPARE = 8  # points beyond the unknowns: each lets wrong forms pass with a chance of 2^-60
 
@@ -83,7 +86,9 @@ class RationalOrbit:
             if image.bits < _SLOW_GROWTH * last[1].bits:
                 is_tried = True
                 factor = self.map.factors[0]
-                forms = symmetric_qrt(factor.equation, first) or bilinear_forms(factor.integer_steps, image)
+                forms = symmetric_qrt(factor.equation, first)
+                if forms is None and (forms := bilinear_forms(factor.integer_steps, image)) is not None:
+                    forms.try_everywhere(factor.equation)
                 self.since = None if forms is None else step
 
 
@@ -106,6 +111,9 @@ class BilinearForms:
     ) -> None:
         self.lag, self.products, self.coefficients, self.bound = lag, products, coefficients, bound
         self._steps, self._relations, self._pairs = steps, relations, pairs
+        self.holds_everywhere = False
+        # Without a bound not all B_ij are known, and f_n may have a denominator, which divides this as soon as it is seen.
+        self._multiple = fmpz(1)
 
     def step(self, last: Sequence[IntegerPoint]) -> IntegerPoint | None:
         """The point after the last ones; None where the forms do not give it."""
@@ -113,18 +121,48 @@ class BilinearForms:
         X, Y, behind = ([*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag))
         column = fmpz_mat(len(self.products), 1, [X[i] * Y[j] for i, j in self.products])
         values: list[fmpz] = (self.coefficients * column).entries()
+        if self.holds_everywhere:
+            quotients, rests = zip(*(divmod(value, behind[-1]) for value in values), strict=True)
+            is_sure = not any(rests) and self._steps.is_regular(point)
+            return self._divided(list(quotients), X, Y, behind) if is_sure else None
+        divided = ExactDivisor(behind[-1]).into([self._multiple * value for value in values])
+        image = self._divided(divided, X, Y, behind)
+        if image is not None and self._steps.is_image(point, image):
+            return image
+        image = lowest(values[:-1], values[-1]) if self.bound is None else None
+        if image is None or not self._steps.is_image(point, image):
+            return None
+        self._multiple = self._multiple.lcm(fmpq(values[-1], image.denominator * behind[-1]).q)
+        return image
+
+    def _divided(self, values: list[fmpz], *points: list[fmpz]) -> IntegerPoint | None:
+        """The point whose multiple by f_n this is, in lowest terms; the last points are those here, before, behind."""
         if self.bound is not None:
-            values = [value // behind[-1] for value in values]
             common = self.bound
             for value in values:
                 common = common.gcd(value % common)
             values = [value // common for value in values]
-        if self._relations is None or not self._hold(self._relations, values, X, Y, behind):
-            image = lowest(values[:-1], values[-1])
-        else:
-            sign = -1 if values[-1] < 0 else 1
-            image = IntegerPoint(tuple(sign * value for value in values[:-1]), sign * values[-1])
-        return image if image is not None and self._steps.is_image(point, image) else None
+        if self._relations is None or not self._hold(self._relations, values, *points):
+            return lowest(values[:-1], values[-1])
+        sign = -1 if values[-1] < 0 else 1
+        return IntegerPoint(tuple(sign * value for value in values[:-1]), sign * values[-1])
+
+    def try_everywhere(self, equation: Equation) -> None:
+        """Find out whether the forms give the image of all points, not only of those of the orbit.
+
+        So it is for Kahan's discretizations in the plane, whose images are forms of degree 2 themselves.
+        """
+        if self.lag != 1 or equation.dim > _FORMS_DIMENSION:
+            return
+        rows = equation.polynomials()
+        X = rows[0][0].context().gens()
+        products = [X[i] * X[j] for i, j in self.products]
+        images = [
+            sum((P * c for P, c in zip(products, row, strict=True)), 0 * X[0]) for row in self.coefficients.tolist()
+        ]
+        self.holds_everywhere = all(
+            sum((a * b for a, b in zip(row, images, strict=True)), 0 * X[0]) == 0 for row in rows
+        )
 
     def _hold(self, relations: nmod_mat, *points: list[fmpz]) -> bool:
         """Whether all that R rests on is true at the points ahead, here, before and behind, modulo a prime."""

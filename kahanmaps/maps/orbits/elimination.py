@@ -41,7 +41,7 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
     """
     n = matrix.nrows()
     rows = [[*row, right[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous: _ExactDivisor | None = None
+    previous: ExactDivisor | None = None
     k = 0
     while k + 1 < n:
         a, b = rows[k], rows[k + 1]
@@ -80,7 +80,7 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
         width = n - 1 - k
         for i in below:
             rows[i][k + 2 :] = block[(i - k - 2) * width : (i - k - 1) * width]
-        previous = _ExactDivisor(pivot)
+        previous = ExactDivisor(pivot)
         k += 2
     return _substitute_back(rows)
 
@@ -111,7 +111,7 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
     return IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
 
 
-def _shared(likely: fmpz, values: list[fmpz]) -> _ExactDivisor | None:
+def _shared(likely: fmpz, values: list[fmpz]) -> ExactDivisor | None:
     """The part of `likely` without small primes that divides the values, or None where it is not worth removing.
 
     Small primes often divide minors of order 3 by accident and then not, to the power needed, those of higher order.
@@ -125,7 +125,7 @@ def _shared(likely: fmpz, values: list[fmpz]) -> _ExactDivisor | None:
             common = common.gcd(remainder)
             if common.bit_length() < _USEFUL_BITS:
                 return None
-    return _ExactDivisor(common) if common.bit_length() >= _USEFUL_BITS else None
+    return ExactDivisor(common) if common.bit_length() >= _USEFUL_BITS else None
 
 
 @lru_cache(maxsize=1)
@@ -133,7 +133,7 @@ def _small_primes() -> fmpz:
     return fmpz.primorial_ui(fmpz(1000))
 
 
-class _ExactDivisor:
+class ExactDivisor:
     """Divides many integers by one, where every division is known to be exact (otherwise quotients are meaningless).
 
     The inverse modulo a power of 2 turns each division into one multiplication.
