@@ -8,12 +8,15 @@ integers over one denominator, on many orbits bilinear forms, and reduces the co
 
 from __future__ import annotations
 
+import re
+import subprocess
 import sys
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
-from flint import fmpq
-from work import Row, require_equal, row, say, table, timed
+from bench_exact import GP_STEPS, gp_orbit
+from flint import fmpq, fmpz
+from work import Absent, Row, require_equal, row, say, table, timed
 
 from kahanmaps import Orbit, load
 from kahanmaps.documents.catalog import map_names, names
@@ -21,6 +24,7 @@ from kahanmaps.documents.catalog import map_names, names
 GROUP = "Exact orbits of the catalogue"
 OURS = "kahanmaps without normal form"
 PLAIN = "FLINT: fmpq_mat.solve, rationals"
+PARI = "PARI/GP by hand"
 FORMS = "bilinear forms"
 EPS = fmpq(3, 11)
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
@@ -45,6 +49,53 @@ def plain(map_over: Any, steps: int) -> Pairs:
     return [(entry.p, entry.q) for entry in x]
 
 
+def pari(map_over: Any, steps: int) -> tuple[float, Pairs, str]:
+    """The quickest of some formulations by hand: its time, the last iterate, and what it is. Raises Absent."""
+    start = ", ".join(map(str, START[: map_over.dim]))
+    program = [*GP_STEPS, f"start = [{start}]~"]
+    rational, whole = [], []
+    is_explicit = True
+    for k, one in enumerate(map_over.factors):
+        rows = [_integral(row) for row in one.equation.polynomials()]
+        matrix = ";".join(",".join(map(_written, row[:-1])) for row in rows)
+        side = ",".join(_written(-row[-1]) for row in rows)
+        program += [f"matrix{k}(x, z) = [{matrix}]", f"side{k}(x, z) = [{side}]~"]
+        whole.append(f"r = step(matrix{k}(r[1], r[2]), side{k}(r[1], r[2]), r[2])")
+        if all(i == j or entry.is_zero() for i, row in enumerate(rows) for j, entry in enumerate(row[:-1])):
+            formulas = ",".join(f"({_written(-row[-1])})/({_written(row[i])})" for i, row in enumerate(rows))
+            rational.append(f"x = subst_one((x, z) -> [{formulas}]~, x)")
+        else:
+            is_explicit = False
+            rational.append(f"x = matsolve(matrix{k}(x, 1), side{k}(x, 1))")
+    program += [
+        "subst_one(f, x) = f(x, 1)",
+        f"rational(N) = {{my(x = start); for(k = 1, N, {'; '.join(rational)}); x}}",
+        "orbit(step, N) = {my(d = denominator(start), r = [start*d, d]);"
+        f" for(k = 1, N, {'; '.join(whole)}); r[1]/r[2]}}",
+    ]
+    ways = {"formulas on rationals" if is_explicit else "matsolve on rationals": f"rational({steps})"}
+    ways |= {f"{name} on integers": f"orbit(by_{name[3:]}, {steps})" for name in ("matsolve", "matadjoint")}
+    if map_over.dim % 2 == 0 and map_over.dim > 2:
+        ways["elimination on integers"] = f"orbit(by_elimination, {steps})"
+    found = {}
+    for way, orbit in ways.items():
+        try:
+            found[way] = gp_orbit(program, orbit, 0.0)
+        except (RuntimeError, subprocess.CalledProcessError):  # pivots that are 0
+            continue
+    way = min(found, key=lambda name: found[name][0])
+    return *gp_orbit(program, ways[way], 1.0), way
+
+
+def _integral(row: list[Any]) -> list[Any]:
+    below = reduce(fmpz.lcm, (c.q for entry in row for c in entry.coeffs()), fmpz(1))
+    return [entry * below for entry in row]
+
+
+def _written(polynomial: Any) -> str:
+    return re.sub(r"x(\d+)", r"x[\1]", str(polynomial))
+
+
 def measure(quick: bool = False) -> list[Row]:
     """A block for each system whose orbit becomes long enough, without poles on the way."""
     rows = []
@@ -67,6 +118,14 @@ def measure(quick: bool = False) -> list[Row]:
         work = f"{name}, N = {steps}, {point.value.bits:,} bits"
         rows += [row(GROUP, OURS, work, best, 1.0, note), row(GROUP, PLAIN, work, seconds, seconds / best)]
         say(f"  {work}: {seconds / best:.3g}")
+        try:
+            seconds, expected, way = pari(map_over, steps)
+        except Absent as absent:
+            say(f"  {absent}")
+            continue
+        require_equal(PARI, expected, found)
+        rows.append(row(GROUP, PARI, work, seconds, seconds / best, way))
+        say(f"    PARI: {seconds / best:.3g}, {way}")
     return rows
 
 

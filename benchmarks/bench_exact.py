@@ -235,29 +235,24 @@ def sympy_solve(work: Work, steps: int) -> tuple[float, Pairs]:
 
 # PARI/GP -------------------------------------------------------------------------------------------------------------
 
-# Steps x -> (I - eps f'(x))^(-1) x; T[k] are the matrices with f'(x) = (sum of x_k T[k]) / L, eps = p/q. Over one
-# denominator W the system is M y = q L X with M = q L W I - p sum X_k T[k].
-_GP = [
-    "slopes(X) = sum(k = 1, n, X[k] * T[k])",
-    "whole(X, W) = q*L*W*matid(n) - p*slopes(X)",
+# Steps from (X, W) to the solution of M Y = B, of integers over one denominator.
+GP_STEPS = [
     "reduced(Y, d) = {my(g = gcd(content(Y), d)); [Y/g, d/g]}",
     "over(Y) = {my(d = denominator(Y)); [Y*d, d]}",
-    "orbit(step, N) = {my(d = denominator(start), r = [start*d, d]); for(k = 1, N, r = step(r[1], r[2])); r[1]/r[2]}",
-    "rational(N) = {my(x = start); for(k = 1, N, x = matsolve(matid(n) - p/q/L*slopes(x), x)); x}",
-    "by_solve(X, W) = over(matsolve(whole(X, W), q*L*X))",
-    "by_image(X, W) = over(matinverseimage(whole(X, W), q*L*X))",
-    "by_kernel(X, W) = {my(Y = over(matker(matconcat([whole(X, W), -q*L*X]))[, 1])[1]);"
+    "by_solve(M, B, W) = over(matsolve(M, B))",
+    "by_image(M, B, W) = over(matinverseimage(M, B))",
+    "by_kernel(M, B, W) = {my(Y = over(matker(matconcat([M, -B]))[, 1])[1], n = #B);"
     " Y /= content(Y); [Y[1..n], Y[n+1]]}",
-    "by_inverse(X, W) = over(whole(X, W)^-1 * (q*L*X))",
-    "by_adjoint(X, W) = {my(M = whole(X, W), A = matadjoint(M)); reduced(A*(q*L*X), M[1, ]*A[, 1])}",
-    "by_cramer(X, W) = {my(M = whole(X, W)); reduced(vector(n, j, my(N = M); N[, j] = q*L*X; matdet(N))~, matdet(M))}",
+    "by_inverse(M, B, W) = over(M^-1 * B)",
+    "by_adjoint(M, B, W) = {my(A = matadjoint(M)); reduced(A*B, M[1, ]*A[, 1])}",
+    "by_cramer(M, B, W) = reduced(vector(#B, j, my(N = M); N[, j] = B; matdet(N))~, matdet(M))",
     # Elimination by hand, two columns at a time, without fractions. What the minors of order 3 share with W goes by
     # one gcd, later what they share with the pivot before. (Bareiss with exact divisions and without gcds is 1.1
     # times as slow, matsolve 3 times.)
     "exact(a, b) = a \\ b",
     'iferr(install(diviiexact, "GG", exact), E, )',
-    "by_elimination(X, W) = {my(M = matconcat([whole(X, W), q*L*X]), D = vector(n), Y = vectorv(n), shared = W,"
-    " c, c1, c2, e, r, s);"
+    "by_elimination(M, B, W) = {my(n = #B, D = vector(n), Y = vectorv(n), shared = W, c, c1, c2, e, r, s);"
+    " M = matconcat([M, B]);"
     " forstep(k = 1, n - 1, 2, D[k] = M[k, k]*M[k+1, k+1] - M[k, k+1]*M[k+1, k]; if(k == n - 1, break);"
     " for(i = k + 2, n, c1 = M[k, k+1]*M[i, k] - M[k, k]*M[i, k+1]; c2 = M[k+1, k]*M[i, k+1] - M[k+1, k+1]*M[i, k];"
     " for(j = k + 2, n + 1, M[i, j] = D[k]*M[i, j] + c1*M[k+1, j] + c2*M[k, j]));"
@@ -270,6 +265,17 @@ _GP = [
     " Y[k] /= D[k]; Y[k+1] /= D[k]; c = denominator([Y[k], Y[k+1]]); if(c > 1, Y *= c; e *= c))); reduced(Y, e)}",
 ]
 
+# Steps x -> (I - eps f'(x))^(-1) x; T[k] are the matrices with f'(x) = (sum of x_k T[k]) / L, eps = p/q. Over one
+# denominator W the system is M y = q L X with M = q L W I - p sum X_k T[k].
+_GP = [
+    *GP_STEPS,
+    "slopes(X) = sum(k = 1, n, X[k] * T[k])",
+    "whole(X, W) = q*L*W*matid(n) - p*slopes(X)",
+    "orbit(step, N) = {my(d = denominator(start), r = [start*d, d]);"
+    " for(k = 1, N, r = step(whole(r[1], r[2]), q*L*r[1], r[2])); r[1]/r[2]}",
+    "rational(N) = {my(x = start); for(k = 1, N, x = matsolve(matid(n) - p/q/L*slopes(x), x)); x}",
+]
+
 
 def _by_gp(work: Work, steps: int, orbit: str) -> tuple[float, Pairs]:
     n = work.system.dim
@@ -278,19 +284,29 @@ def _by_gp(work: Work, steps: int, orbit: str) -> tuple[float, Pairs]:
     matrices = [
         "[" + ";".join(",".join(str(slopes[i * n + j][k]) for j in range(n)) for i in range(n)) + "]" for k in range(n)
     ]
-    program = [
-        f"n = {n}; p = {work.eps.p}; q = {work.eps.q}; L = {common}",
-        f"T = [{','.join(matrices)}]",
-        f"start = [{','.join(str(entry) for entry in work.start)}]~",
-        *_GP,
-        f"gettime(); last = {orbit.format(steps)}; seconds = gettime()",
+    return gp_orbit(
+        [
+            f"n = {n}; p = {work.eps.p}; q = {work.eps.q}; L = {common}",
+            f"T = [{','.join(matrices)}]",
+            f"start = [{','.join(str(entry) for entry in work.start)}]~",
+            *_GP,
+        ],
+        orbit.format(steps),
+    )
+
+
+def gp_orbit(program: list[str], orbit: str, enough: float = 3.0) -> tuple[float, Pairs]:
+    """The best time of some runs, until so many seconds are spent, and the point that an expression gives."""
+    lines = [
+        *program,
+        f"gettime(); last = {orbit}; seconds = gettime()",
         "concat([seconds], concat([[numerator(x), denominator(x)] | x <- Vec(last)]))",
     ]
     best, spent = float("inf"), 0.0
     for _ in range(7):
-        milliseconds, *numbers = run_gp(program)
+        milliseconds, *numbers = run_gp(lines)
         best, spent = min(best, int(milliseconds) / 1000), spent + int(milliseconds) / 1000
-        if spent >= 3:
+        if spent >= enough:
             break
     integers = [fmpz(entry) for entry in numbers]
     return best, list(zip(integers[::2], integers[1::2], strict=True))
