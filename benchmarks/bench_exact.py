@@ -297,15 +297,21 @@ def _by_gp(work: Work, steps: int, orbit: str) -> tuple[float, Pairs]:
 
 def gp_orbit(program: list[str], orbit: str, enough: float = 3.0) -> tuple[float, Pairs]:
     """The best time of some runs, until so many seconds are spent, and the point that an expression gives."""
-    lines = [
-        *program,
-        f"gettime(); last = {orbit}; seconds = gettime()",
-        "concat([seconds], concat([[numerator(x), denominator(x)] | x <- Vec(last)]))",
-    ]
-    best, spent = float("inf"), 0.0
+    best, spent, repeat = float("inf"), 0.0, 1
     for _ in range(7):
-        milliseconds, *numbers = run_gp(lines)
-        best, spent = min(best, int(milliseconds) / 1000), spent + int(milliseconds) / 1000
+        milliseconds, *numbers = run_gp(
+            [
+                *program,
+                f"gettime(); for(k = 1, {repeat}, last = {orbit}); seconds = gettime()",
+                "concat([seconds], concat([[numerator(x), denominator(x)] | x <- Vec(last)]))",
+            ]
+        )
+        seconds = int(milliseconds) / 1000
+        spent += seconds
+        if seconds < 0.03:  # GP counts in milliseconds
+            repeat *= 30
+            continue
+        best = min(best, seconds / repeat)
         if spent >= enough:
             break
     integers = [fmpz(entry) for entry in numbers]

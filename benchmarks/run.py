@@ -245,8 +245,10 @@ GROUPS = {
         "The exponent e in time ~ N^e. The N-th iterate has about N^2 digits, so that the orbit as a whole has N^3."
     ),
     bench_catalogue.GROUP: (
-        "Time relative to kahanmaps, which keeps integers over one common denominator and reduces the coordinates of\n"
-        "the last iterate: more is slower. The peer has the same map, eps = 3/11 and start, and rationals throughout.\n"
+        "Time relative to kahanmaps, which keeps integers over one common denominator, or fractions, and reduces the\n"
+        "coordinates of the last iterate: more is slower. The peers have the same map, eps = 3/11 and start. FLINT has\n"
+        "rationals throughout; PARI the quickest of three or four formulations by hand, which the line names: matsolve\n"
+        "or the formulas of an explicit map on rationals, otherwise integers over one denominator in lowest terms.\n"
         "Orbits go to 100,000 bits or 400 steps. Systems with numbers that stay short are left out: there calls of\n"
         "Python are all that is measured."
     ),

@@ -3,25 +3,27 @@
 Specified here: the steps are those of fractions solved entry by entry, whichever way the linear systems are solved (the
 thresholds between the ways are put to 0 and to infinity); long numbers of members are found by elimination
 (test_elimination.py); rows of the equation that do not depend on x are taken out, explicit maps are solved by
-substitution, and the steps stay the same.
+substitution on fractions, and the steps stay the same.
 """
 
 from math import prod
 
 import pytest
-from flint import fmpq, fmpq_poly, fmpz
+from flint import fmpq, fmpq_poly, fmpz, fmpz_mat
 from helpers import NAMED_SYSTEMS, rationals, systems_with_points
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det
+from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.substitution import _row, substitution
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
@@ -180,8 +182,68 @@ def test_a_step_of_a_map_is_that_of_fractions_and_so_is_its_determinant(name, da
         assert one.determinant(point) == det(one.denominator_matrix(point))
 
 
+def equations(uses: list[list[bool]]):
+    n = len(uses)
+    return substitution([(0,) * n + (1,)], fmpz_mat([[entry] for row in uses for entry in [*map(int, row), 1]]), n)
+
+
 def test_rows_and_unknowns_are_put_in_order():
-    order = integer_steps._substitution_order
-    assert order([[False, True], [True, True]]) == [(0, 1), (1, 0)]
-    assert order([[True, True], [True, True]]) == []
-    assert order([[True, False], [True, False]]) == []
+    rows = equations([[False, True], [True, True]])._rows
+    assert [(row.unknown, row.known) for row in rows] == [(1, ()), (0, (1,))]
+    assert equations([[True, True], [True, True]]) is None
+    assert equations([[True, False], [True, False]]) is None
+
+
+def test_where_a_coordinate_that_divides_a_whole_row_is_0_there_is_no_value():
+    twice = integer_steps.IntegerSteps([(1, 0)], [[((0, fmpq(1)),), ((0, fmpq(-2)),)]])  # x x~ = 2 x
+    assert twice.step(IntegerPoint.from_rationals((fmpq(3, 7),))) == IntegerPoint.from_rationals((fmpq(2),))
+    assert twice.step(IntegerPoint.from_rationals((fmpq(0),))) is None
+
+
+# a side, a coefficient of the unknown; the resultant of what they are in the one variable that is left, and factors
+ALONE = [
+    ("y", "1", 1, {1: 1}),
+    ("-2*y", "2", 2, {1: 1}),
+    ("-2*y + 1", "2", 4, {}),
+    ("2*y + 1", "3*y - 5", 13, {}),
+    ("y^2 + 1", "y^2 - 3", 16, {}),
+    ("y^3*x^2", "y + 2", 8, {0: 2}),  # p^3 and (p + 2 q) q^2
+    ("x*y + x", "x^3*z", 1, {0: -2, 2: -1}),
+    ("y + 1", "y^2 - 1", 0, {}),  # a common factor: a gcd is needed
+    ("x + y", "x - 2*y", 0, {}),
+    ("1 + y + x", "z", 0, {}),
+    ("0", "y", 0, {}),
+    ("3", "6*x", 3, {0: -1}),
+]
+
+
+@pytest.mark.parametrize(("side", "below", "resultant", "factors"), ALONE)
+@given(point=st.tuples(small, small, small))
+def test_a_fraction_of_monomials_but_in_one_variable_is_in_lowest_terms_without_a_long_gcd(
+    side, below, resultant, factors, point
+):
+    numerator, denominator = (parse_polynomial(text, ["x", "y", "z"]) for text in (side, below))
+    row = one_row(numerator, denominator)
+    assert (row.resultant, dict(row.factors)) == (resultant, factors)
+    value = row.solved([(entry.p, entry.q) for entry in point], [])
+    if denominator(*point) == 0:
+        assert value is None
+    else:
+        expected = numerator(*point) / denominator(*point)
+        assert value == (expected.p, expected.q)
+
+
+def one_row(numerator, denominator):
+    """The row for the unknown x of denominator x~ = numerator."""
+    exponents = sorted({*numerator.monoms(), *denominator.monoms()})
+    entries = [[fmpz(0)] * len(exponents) for _ in range(4)]
+    for entry, polynomial in ((entries[0], denominator), (entries[3], numerator)):
+        for exponent, coefficient in polynomial.terms():
+            entry[exponents.index(exponent)] = fmpq(coefficient).p
+    return _row(entries, 0, (), exponents)
+
+
+def test_in_dimension_1_a_side_that_is_0_gives_0():
+    nothing = integer_steps.IntegerSteps([(1, 0)], [[((0, fmpq(1)),), ()]])  # x x~ = 0
+    assert nothing.step(IntegerPoint.from_rationals((fmpq(3, 7),))) == IntegerPoint.from_rationals((fmpq(0),))
+    assert nothing.step(IntegerPoint.from_rationals((fmpq(0),))) is None

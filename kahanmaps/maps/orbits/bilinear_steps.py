@@ -112,7 +112,7 @@ class BilinearForms:
         self.lag, self.products, self.coefficients, self.bound = lag, products, coefficients, bound
         self._steps, self._relations, self._pairs = steps, relations, pairs
         self.holds_everywhere = False
-        # Without a bound not all B_ij are known, and f_n may have a denominator, which divides this as soon as it is seen.
+        # Without a bound not all B_ij are known: f_n may have a denominator, which divides this once it is seen.
         self._multiple = fmpz(1)
 
     def step(self, last: Sequence[IntegerPoint]) -> IntegerPoint | None:

@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 from kahanmaps.maps.orbits.constant_rows import ConstantRows
 from kahanmaps.maps.orbits.elimination import eliminated, is_the_solution
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.substitution import substitution
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
@@ -45,15 +46,15 @@ class IntegerSteps:
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
-        self._order = _substitution_order([[bool(entry) for entry in row[:n]] for row in terms])
-        self._constant = None if self._order else self._constant_rows()
+        self._substitution = substitution(exponents, self._forms, n)
+        self._constant = None if self._substitution else self._constant_rows()
         self._rows = None if self._degree == 1 or self._constant else [self._without_powers(i) for i in range(n)]
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
+        if self._substitution:
+            return self._substitution.step(point)
         matrix, right = self._equation(point)
-        if self._order:
-            return _substituted(matrix, right, self._order)
         if self._constant is None:
             return self._by_elimination(matrix, right, point.denominator) or _solved(matrix, right)
         scale = point.denominator**self._degree
@@ -152,32 +153,6 @@ _CRAMER_DIMENSION = 3
 _ELIMINATION_BITS = 4000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 _TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
-
-
-def _substitution_order(is_used: Sequence[Sequence[bool]]) -> list[tuple[int, int]]:
-    """Rows and unknowns in an order in which each row has only one that is new; empty where there is none."""
-    order: list[tuple[int, int]] = []
-    left = list(range(len(is_used)))
-    while left:
-        known = {j for _, j in order}
-        new = {i: [j for j, used in enumerate(is_used[i]) if used and j not in known] for i in left}
-        i = next((i for i in left if len(new[i]) == 1), None)
-        if i is None:
-            return []
-        order.append((i, new[i][0]))
-        left.remove(i)
-    return order
-
-
-def _substituted(matrix: fmpz_mat, right: fmpz_mat, order: Sequence[tuple[int, int]]) -> IntegerPoint | None:
-    """The solution, unknown by unknown: gcds of a few entries each are shorter than those with the determinant."""
-    found: dict[int, fmpq] = {}
-    for i, j in order:
-        if matrix[i, j] == 0:
-            return None
-        side = sum((-matrix[i, k] * x for k, x in found.items() if matrix[i, k] != 0), right[i, 0])
-        found[j] = fmpq(side) / matrix[i, j] if isinstance(side, fmpq) else fmpq(side, matrix[i, j])
-    return IntegerPoint.from_rationals([found[j] for j in range(len(order))])
 
 
 def _solved(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
