@@ -1,9 +1,9 @@
-"""Exact orbits of the systems and maps of the catalogue: kahanmaps without normal form against FLINT's plain solve.
+"""Exact orbits of the systems and maps of the catalogue: kahanmaps without normal form against FLINT and PARI.
 
     python benchmarks/bench_catalogue.py [--quick]
 
-Both take the same steps at eps = 3/11 from one start, as many as give numbers long enough to be measured. kahanmaps has
-integers over one denominator, on many orbits bilinear forms, and reduces the coordinates of the last iterate.
+All take the same steps at eps = 3/11 from one start, as many as give numbers long enough to be measured. kahanmaps has
+integers over one denominator or fractions, on many orbits bilinear forms, and reduces the last iterate.
 """
 
 from __future__ import annotations
