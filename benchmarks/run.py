@@ -246,9 +246,10 @@ GROUPS = {
     ),
     bench_catalogue.GROUP: (
         "Time relative to kahanmaps, which keeps integers over one common denominator, or fractions, and reduces the\n"
-        "coordinates of the last iterate: more is slower. The peers have the same map, eps = 3/11 and start. FLINT has\n"
-        "rationals throughout; PARI the quickest of three or four formulations by hand, which the line names: matsolve\n"
-        "or the formulas of an explicit map on rationals, otherwise integers over one denominator in lowest terms.\n"
+        "coordinates of the last iterate: more is slower. The peers have the same map, eps = 3/11 and start. FLINT\n"
+        "has rationals throughout; PARI the quickest of three or four formulations by hand, which the line names:\n"
+        "matsolve or the formulas of an explicit map on rationals, otherwise integers over one denominator in lowest\n"
+        "terms.\n"
         "Orbits go to 100,000 bits or 400 steps. Systems with numbers that stay short are left out: there calls of\n"
         "Python are all that is measured."
     ),
