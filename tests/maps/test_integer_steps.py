@@ -23,7 +23,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.substitution import _row, substitution
+from kahanmaps.maps.orbits.substitution import _product, _row, _sum, substitution
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
@@ -247,3 +247,11 @@ def test_in_dimension_1_a_side_that_is_0_gives_0():
     nothing = integer_steps.IntegerSteps([(1, 0)], [[((0, fmpq(1)),), ()]])  # x x~ = 0
     assert nothing.step(IntegerPoint.from_rationals((fmpq(3, 7),))) == IntegerPoint.from_rationals((fmpq(0),))
     assert nothing.step(IntegerPoint.from_rationals((fmpq(0),))) is None
+
+
+@given(a=small, b=small)
+def test_sums_and_products_of_fractions_are_in_lowest_terms(a, b):
+    pairs = (a.p, a.q), (b.p, b.q)
+    assert _sum(*pairs) == ((a + b).p, (a + b).q)
+    assert _product(*pairs) == ((a * b).p, (a * b).q)
+    assert _sum((fmpz(1), fmpz(6)), (fmpz(1), fmpz(3))) == (1, 2)
