@@ -210,6 +210,7 @@ ALONE = [
     ("y^3*x^2", "y + 2", 8, {0: 2}),  # p^3 and (p + 2 q) q^2
     ("x*y + x", "x^3*z", 1, {0: -2, 2: -1}),
     ("y + 1", "y^2 - 1", 0, {}),  # a common factor: a gcd is needed
+    ("x*y^13", "y + 1", 0, {0: 1}),  # of too high a degree
     ("x + y", "x - 2*y", 0, {}),
     ("1 + y + x", "z", 0, {}),
     ("0", "y", 0, {}),

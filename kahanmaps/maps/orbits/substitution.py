@@ -20,6 +20,8 @@ from kahanmaps.maps.orbits.integer_point import Fraction, FractionsPoint, Intege
 
 Exponents = Sequence[tuple[int, ...]]
 
+_MOST_DEGREE = 12  # a resultant of forms of higher degree is long itself, and takes long to find
+
 
 @dataclass(frozen=True, eq=False)
 class _Row:
@@ -131,8 +133,10 @@ def _factors(
 
 
 def _resultant(*forms: dict[int, fmpz]) -> fmpz:
-    """Of two forms in (p, q), made of one degree; the coefficients stand at the exponents of p."""
+    """Of two forms in (p, q), made of one degree; the coefficients stand at the exponents of p. 0 if it is high."""
     degree = max(max(form) for form in forms)
+    if degree > _MOST_DEGREE:
+        return fmpz(0)
     rows = [
         [form.get(degree - (k - shift), fmpz(0)) for k in range(2 * degree)]
         for form in forms
