@@ -110,8 +110,7 @@ def measure(quick: bool = False) -> list[Row]:
         if point.value.bits < LEAST_BITS:
             say(f"  {name}: left out, its orbit ends or has short numbers")
             continue
-        since = orbit.bilinear_since
-        note = "" if since is None else f"dimension {map_over.dim}, {FORMS} from step {since} on"
+        note = "" if orbit.relations is None else f"dimension {map_over.dim}, {orbit.relations}"
         best, found = timed(partial(ours, map_over, steps), 1.0)
         seconds, expected = timed(partial(plain, map_over, steps), 1.0)
         require_equal(PLAIN, expected, found)

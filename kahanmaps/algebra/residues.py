@@ -7,7 +7,7 @@ return the simplest. Whoever calls them has to check the answer, for instance mo
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from flint import fmpq, fmpz, fmpz_mat
 
@@ -102,3 +102,28 @@ def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) ->
     """
     inverse = pow(modulus, -1, prime)
     return [x + modulus * ((y - x) * inverse % prime) for x, y in zip(old, new, strict=True)]
+
+
+def from_residues(modulo: Callable[[int], Sequence[int] | None], most_primes: int) -> tuple[fmpq, ...] | None:
+    """The simplest fractions that have the residues `modulo(prime)` for several primes, and for one more.
+
+    None where `modulo` is None, or the primes are not enough. The same primes are taken each time: of unlucky ones only
+    the work is wasted.
+
+    >>> numbers = (fmpq(355, 113), fmpq(-7, 3**40))
+    >>> from_residues(lambda p: [int(x.p % p) * pow(int(x.q), -1, p) % p for x in numbers], 5) == numbers
+    True
+    """
+    rng = random.Random(0)
+    residues, modulus, guess = list[int](), 1, None
+    for _ in range(most_primes):
+        prime = random_prime(rng)
+        new = modulo(prime)
+        if new is None:
+            return None
+        if guess is not None and all((x.p - r * x.q) % prime == 0 for x, r in zip(guess, new, strict=True)):
+            return guess
+        residues = chinese(residues, modulus, new, prime) if residues else list(new)
+        modulus *= prime
+        guess = rational_vector(residues, modulus)
+    return None

@@ -11,7 +11,7 @@ from flint import fmpq, fmpz
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import kahanmaps.maps.orbits.bilinear_steps as bilinear
+import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 from kahanmaps import GF, Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map

@@ -12,12 +12,12 @@ from flint import fmpq, fmpz, fmpz_mat
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-import kahanmaps.maps.orbits.bilinear_steps as bilinear
+import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 from kahanmaps import load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.symmetric_qrt import POINTS, symmetric_qrt
+from kahanmaps.maps.orbits.relations.symmetric_qrt import POINTS, symmetric_qrt
 
 NAMES = ["somos_4", "somos_5", "lyness", "mcmillan", "qrt_symmetric", "discrete_painleve_1"]
 OTHERS = ["fibonacci", "hietarinta_viallet", "weierstrass", "lotka_volterra_symplectic_euler", "riccati"]

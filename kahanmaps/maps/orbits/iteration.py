@@ -21,8 +21,8 @@ from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
-from kahanmaps.maps.orbits.bilinear_steps import RationalOrbit
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.relations.rational_orbit import RationalOrbit
 
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
 if TYPE_CHECKING:
@@ -145,9 +145,10 @@ class Orbit(Displayed):
         self._walk: RationalOrbit | None = None
 
     @property
-    def bilinear_since(self) -> int | None:
-        """From which step on bilinear forms that hold along the orbit are in use; None where they are not."""
-        return None if self._walk is None else self._walk.since
+    def relations(self) -> str | None:
+        """The relations along the orbit that are in use, and from which step on; None where there are none."""
+        walk = self._walk
+        return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""

@@ -199,8 +199,8 @@ class Trajectory:
     @property
     def why(self) -> str:
         """The method and the reason for it, of long orbits over Q also what came to be known on the way."""
-        since = getattr(self.orbit, "bilinear_since", None)
-        return self._why if since is None else f"{self._why}; bilinear forms along the orbit from step {since} on"
+        relations = getattr(self.orbit, "relations", None)
+        return self._why if relations is None else f"{self._why}; {relations}"
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""

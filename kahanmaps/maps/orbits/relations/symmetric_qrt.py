@@ -23,15 +23,17 @@ from collections.abc import Sequence
 from flint import fmpq, fmpq_mpoly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
-from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 
-POINTS = 8  # that the six coefficients of F are found from
+_POINTS = 8  # that the six coefficients of F are found from
 _PRIME = 2**61 - 1
 
 
 class SymmetricQRT:
     """The forms along one orbit: `coefficients` has a row for each of A, -B, C, columns for p^2, p q and q^2."""
+
+    name = "the biquadratic curve of the orbit"
 
     def __init__(self, coefficients: fmpz_mat, denominator: fmpq_mpoly) -> None:
         self.coefficients = coefficients
@@ -40,8 +42,8 @@ class SymmetricQRT:
             (int(c.p % _PRIME) * pow(int(c.q), -1, _PRIME), int(i), int(j)) for (i, j, _), c in denominator.terms()
         ]
 
-    def step(self, last: Sequence[IntegerPoint]) -> IntegerPoint | None:
-        """The point after the last one; None where the forms do not give it."""
+    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+        """The point with this number, after the last one; None where the forms do not give it."""
         (before, below), (p, q) = last[-1].lowest_terms()
         if self._may_be_pole(before, below, p, q):
             return None
@@ -62,18 +64,25 @@ class SymmetricQRT:
         return not sum(c * pow(x, i, _PRIME) * pow(y, j, _PRIME) for c, i, j in self._denominator) % _PRIME
 
 
-def symmetric_qrt(equation: Equation, points: Sequence[IntegerPoint]) -> SymmetricQRT | None:
-    """The forms along the orbit with these points, one after the other; None where there are none.
+def symmetric_qrt(map_over: MapOver, start: IntegerPoint) -> SymmetricQRT | None:
+    """The forms along the orbit of a start; None where there are none.
 
-    F vanishes at them. That it has to do so at the image of each of its zeros is shown by a division.
+    F vanishes at its first points. That it has to do so at the image of each of its zeros is shown by a division.
     """
-    if equation.dim != 2:
+    if map_over.dim != 2 or len(map_over.factors) > 1:
         return None
+    equation = map_over.factors[0].equation
     rows = [[entry.subs({"z": 1}) for entry in row] for row in equation.polynomials()]
     (one, zero, side), (other, Q, rest) = rows
     x, y, _ = side.context().gens()
     if not (zero.is_zero() and other.is_zero() and one.is_constant() and side == -one * y):
         return None
+    points = list[IntegerPoint]()
+    while len(points) < _POINTS:
+        point = map_over.integer_step(points[-1]) if points else start
+        if point is None:
+            return None
+        points.append(point)
     table = [_symmetric(*here, *ahead) for here, ahead in (point.lowest_terms() for point in points)]
     kernel, nullity = fmpz_mat(table).nullspace()
     if nullity != 1:

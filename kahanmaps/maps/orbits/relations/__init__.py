@@ -1,0 +1,1 @@
+"""Relations between the points of one orbit, and steps by them."""

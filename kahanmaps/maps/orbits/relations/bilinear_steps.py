@@ -1,0 +1,158 @@
+"""Steps by bilinear forms that hold along one orbit: few products, and no gcds of long integers.
+
+By Cramer's rule the integers of the next point come out as determinants, several times as long as in lowest terms. But
+where an orbit lies on an abelian variety, such as an elliptic curve, and the map is a translation there, homogeneous
+coordinates X are sections of a line bundle. By the theorem of the square (mumford-1970), products of a coordinate at
+step n + 1 and one at step n - lag are sections of the same bundle as products of one at step n and one at step
+n + 1 - lag. Where the latter span what they have to,
+
+    f_n X_i(n + 1) X_j(n - lag) = B_ij(X(n), X(n + 1 - lag)),      lag = 1 or 2,
+
+with bilinear forms B_ij that have integer coefficients and are the same for all n. The factors f_n are short. A step is
+some products, and exact divisions by the last coordinate at step n - lag. Kahan's discretizations of integrable systems
+are called after Hirota, whose method makes bilinear equations of them.
+
+The forms are found modulo primes. Nothing has to be proved of them: what they give is put into the equation of the
+step, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flint import fmpq, fmpz, fmpz_mat, nmod_mat
+
+from kahanmaps.algebra.matrices import primitive_integers
+from kahanmaps.algebra.residues import from_residues
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.orbits.elimination import ExactDivisor
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
+
+Rows = list[list[int]]
+Pairs = Sequence[tuple[int, int]]  # i and j of products of coordinates
+
+_MOST_PRIMES = 50  # for the coefficients
+_MOST_DIMENSION = 12  # where to look for forms of 169 products takes some seconds
+_SPARE = 8  # points beyond the unknowns: each lets wrong forms pass with a chance of 2^-60
+
+
+class BilinearForms:
+    """The forms B_ij for the last j: a row of coefficients for each i, a column for each of the products."""
+
+    name = "bilinear forms along the orbit"
+
+    def __init__(self, steps: IntegerSteps, lag: int, products: Pairs, coefficients: fmpz_mat) -> None:
+        self.lag, self.products, self.coefficients = lag, products, coefficients
+        self._steps = steps
+        # f_n may have a denominator, as only the last B_ij are known: it divides this once it is seen.
+        self._multiple = fmpz(1)
+
+    def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
+        """The point after the last ones; None where the forms do not give it."""
+        X, Y, behind = ([*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag))
+        column = fmpz_mat(len(self.products), 1, [X[i] * Y[j] for i, j in self.products])
+        values: list[fmpz] = (self.coefficients * column).entries()
+        divided = ExactDivisor(behind[-1]).into([self._multiple * value for value in values])
+        image = lowest(divided[:-1], divided[-1])
+        if image is not None and self._steps.is_image(last[-1], image):
+            return image
+        image = lowest(values[:-1], values[-1])
+        if image is None or not self._steps.is_image(last[-1], image):
+            return None
+        self._multiple = self._multiple.lcm(fmpq(values[-1], image.denominator * behind[-1]).q)
+        return image
+
+
+def bilinear_forms(map_over: MapOver, point: IntegerPoint) -> BilinearForms | None:
+    """The forms along the orbit of a point, with lag 1 if there are such; None where none are found."""
+    if len(map_over.factors) > 1 or map_over.dim > _MOST_DIMENSION:
+        return None
+    found = (_Search(map_over.factors[0].integer_steps, point, lag).found() for lag in (1, 2))
+    return next((forms for forms in found if forms is not None), None)
+
+
+class _Search:
+    """The forms along the orbit of a point: modulo primes, then over Q."""
+
+    def __init__(self, steps: IntegerSteps, point: IntegerPoint, lag: int) -> None:
+        self._steps, self._point, self._lag = steps, point, lag
+        size = steps.dim + 1
+        self._products = [(i, j) for i in range(size) for j in range(size) if lag > 1 or i <= j]
+        self._used: list[int] | None = None  # which unknowns for f_n are not 0; fewer are sought after the first prime
+
+    def found(self) -> BilinearForms | None:
+        """The forms; None where there are none, or their coefficients are too long."""
+        guess = from_residues(self._modulo, _MOST_PRIMES)
+        if guess is None:
+            return None
+        rows = fmpz_mat(self._steps.dim + 1, len(self._products), primitive_integers(guess))
+        return BilinearForms(self._steps, self._lag, self._products, rows)
+
+    def _modulo(self, prime: int) -> list[int] | None:
+        """The coefficients of the forms modulo a prime."""
+        lag, unknowns = self._lag, len(self._products)
+        length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _SPARE
+        points = self._steps.residues(self._point, prime, length + 1 + lag)
+        if points is None:
+            return None
+        ahead, here, before, behind = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
+        values = _table(self._products, here, before, prime)
+        if self._used is None:
+            pivots = _pivots(values, prime)
+            self._products = [self._products[k] for k in pivots]
+            values = [[row[k] for k in pivots] for row in values]
+        found = _factors(values, ahead, behind, self._used, prime)
+        if found is None:
+            return None
+        factors, self._used = found
+        sides = [[f * x % prime for x in one] for f, one in zip(factors, ahead, strict=True)]
+        columns = _solved(values, sides, prime)
+        return None if columns is None else [entry for column in columns for entry in column]
+
+
+def _table(pairs: Pairs, first: Rows, second: Rows, prime: int) -> Rows:
+    """The products of coordinates i of the first and j of the second point, a row for each pair of points."""
+    return [[x[i] * y[j] % prime for i, j in pairs] for x, y in zip(first, second, strict=True)]
+
+
+def _pivots(rows: Rows, prime: int) -> list[int]:
+    """The columns that those before them do not span."""
+    reduced, rank = nmod_mat(rows, prime).rref()
+    return [next(k for k in range(len(rows[0])) if int(reduced[i, k])) for i in range(rank)]
+
+
+def _factors(
+    values: Rows, ahead: Rows, behind: Rows, used: list[int] | None, prime: int
+) -> tuple[list[int], list[int]] | None:
+    """f_n for points with last coordinate 1, and which unknowns are not 0; None where there are none, or several.
+
+    f and g(X(n + 1)) f and g(X(n - lag)) f are in the span of the columns, where g is a combination of coordinates that
+    has no zeros in common with the last one along a whole divisor.
+    """
+    unknowns = len(values[0])
+    zeros = [0] * unknowns
+    rows = []
+    for row, *points in zip(values, ahead, behind, strict=True):
+        g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in points)
+        rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
+        rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
+    used = list(range(3 * unknowns)) if used is None else used
+    kernel, nullity = nmod_mat([[row[k] for k in used] for row in rows], prime).nullspace()
+    if nullity != 1:
+        return None
+    weights = {k: int(kernel[i, 0]) for i, k in enumerate(used)}
+    factors = [sum(weights.get(2 * unknowns + k, 0) * entry for k, entry in enumerate(row)) % prime for row in values]
+    return factors, [k for k, weight in weights.items() if weight]
+
+
+def _solved(values: Rows, sides: Rows, prime: int) -> Rows | None:
+    """The combinations of the columns of the first that are the columns of the second; None if one of them is not."""
+    unknowns = len(values[0])
+    try:
+        found = nmod_mat(values[:unknowns], prime).solve(nmod_mat(sides[:unknowns], prime))
+    except ZeroDivisionError:
+        return None
+    if nmod_mat(values, prime) * found != nmod_mat(sides, prime):
+        return None
+    return [[int(entry) for entry in column] for column in found.transpose().tolist()]
