@@ -3,7 +3,7 @@
     python benchmarks/bench_catalogue.py [--quick]
 
 All take the same steps at eps = 3/11 from one start, as many as give numbers long enough to be measured. kahanmaps has
-integers over one denominator or fractions, on many orbits bilinear forms, and reduces the last iterate.
+integers over one denominator or fractions, on many orbits relations between points, and reduces the last iterate.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ GROUP = "Exact orbits of the catalogue"
 OURS = "kahanmaps without normal form"
 PLAIN = "FLINT: fmpq_mat.solve, rationals"
 PARI = "PARI/GP by hand"
-FORMS = "bilinear forms"
+SOMOS, FORMS = "Somos sequences", "bilinear forms"
 EPS = fmpq(3, 11)
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
 BITS, QUICK_BITS, LEAST_BITS, MOST_STEPS = 100_000, 6_000, 6_000, 400

@@ -104,26 +104,36 @@ def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) ->
     return [x + modulus * ((y - x) * inverse % prime) for x, y in zip(old, new, strict=True)]
 
 
-def from_residues(modulo: Callable[[int], Sequence[int] | None], most_primes: int) -> tuple[fmpq, ...] | None:
+def from_residues(
+    modulo: Callable[[int], Sequence[Sequence[int]] | None], most_primes: int
+) -> list[tuple[fmpq, ...]] | None:
     """The simplest fractions that have the residues `modulo(prime)` for several primes, and for one more.
 
-    None where `modulo` is None, or the primes are not enough. The same primes are taken each time: of unlucky ones only
-    the work is wasted.
+    They come in groups of numbers that are likely to have a denominator in common. None where `modulo` is None, or the
+    primes are not enough. The same primes are taken each time: of unlucky ones only the work is wasted.
 
     >>> numbers = (fmpq(355, 113), fmpq(-7, 3**40))
-    >>> from_residues(lambda p: [int(x.p % p) * pow(int(x.q), -1, p) % p for x in numbers], 5) == numbers
-    True
+    >>> from_residues(lambda p: [[int(x.p % p) * pow(int(x.q), -1, p) % p] for x in numbers], 5)
+    [(355/113,), (-7/12157665459056928801,)]
     """
     rng = random.Random(0)
-    residues, modulus, guess = list[int](), 1, None
-    for _ in range(most_primes):
+    residues, modulus, guesses, next_guess = list[list[int]](), 1, list[tuple[fmpq, ...]](), 2
+    for count in range(1, most_primes + 1):
         prime = random_prime(rng)
         new = modulo(prime)
         if new is None:
             return None
-        if guess is not None and all((x.p - r * x.q) % prime == 0 for x, r in zip(guess, new, strict=True)):
-            return guess
-        residues = chinese(residues, modulus, new, prime) if residues else list(new)
+        if guesses and all(
+            (x.p - r * x.q) % prime == 0
+            for guess, group in zip(guesses, new, strict=True)
+            for x, r in zip(guess, group, strict=True)
+        ):
+            return guesses
+        residues = [chinese(old, modulus, group, prime) for old, group in zip(residues or new, new, strict=True)]
         modulus *= prime
-        guess = rational_vector(residues, modulus)
+        guesses = []
+        if count >= next_guess:  # a guess takes longer than a prime
+            found = [rational_vector(group, modulus) for group in residues]
+            guesses = [guess for guess in found if guess is not None] if all(found) else []
+            next_guess = count + 1 + count // 4
     return None

@@ -62,6 +62,11 @@ class IntegerSteps:
         found = _solved(rest, side) if rest.nrows() else IntegerPoint((), fmpz(1))
         return found and lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
 
+    @property
+    def is_one_by_one(self) -> bool:
+        """Whether the equation gives one coordinate after the other, so that points are fractions."""
+        return self._substitution is not None
+
     def _by_elimination(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
         is_medium = _CRAMER_DIMENSION < self.dim <= _ELIMINATION_DIMENSION
         if not (self._trials and is_medium and below.bit_length() >= _ELIMINATION_BITS):

@@ -1,6 +1,6 @@
 """Which way an orbit is computed: generic, in normal form, or by doublings; chosen from the wish, with the reason.
 
-* generic: linear solves, and over Q bilinear forms where they hold along the orbit; for every map.
+* generic: linear solves, and over Q relations where they hold along the orbit; for every map.
 * normal-form: plane by plane, for members of the family with distinct roots.
 * doubling: each point wanted directly, by doublings; the same members, any chi.
 """

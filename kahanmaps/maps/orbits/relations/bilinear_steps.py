@@ -83,13 +83,13 @@ class _Search:
 
     def found(self) -> BilinearForms | None:
         """The forms; None where there are none, or their coefficients are too long."""
-        guess = from_residues(self._modulo, _MOST_PRIMES)
-        if guess is None:
+        numbers = from_residues(self._modulo, _MOST_PRIMES)
+        if numbers is None:
             return None
-        rows = fmpz_mat(self._steps.dim + 1, len(self._products), primitive_integers(guess))
+        rows = fmpz_mat(self._steps.dim + 1, len(self._products), primitive_integers(numbers[0]))
         return BilinearForms(self._steps, self._lag, self._products, rows)
 
-    def _modulo(self, prime: int) -> list[int] | None:
+    def _modulo(self, prime: int) -> list[list[int]] | None:
         """The coefficients of the forms modulo a prime."""
         lag, unknowns = self._lag, len(self._products)
         length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _SPARE
@@ -108,7 +108,7 @@ class _Search:
         factors, self._used = found
         sides = [[f * x % prime for x in one] for f, one in zip(factors, ahead, strict=True)]
         columns = _solved(values, sides, prime)
-        return None if columns is None else [entry for column in columns for entry in column]
+        return None if columns is None else [[entry for column in columns for entry in column]]
 
 
 def _table(pairs: Pairs, first: Rows, second: Rows, prime: int) -> Rows:

@@ -17,7 +17,7 @@ where W(2) = H and W(3) = H^3; other four points give y(u) at the u in between, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -25,7 +25,7 @@ from typing import Any
 
 from flint import nmod, nmod_mat
 
-from kahanmaps.maps.orbits.relations.somos import divisibility, extended
+from kahanmaps.maps.orbits.relations.somos import around, first_terms
 
 Rows = list[list[int]]
 
@@ -33,50 +33,49 @@ _MOST_PRODUCTS = 64
 _MOST_DEGREE = 8
 _SPARE = 8  # rows beyond the unknowns: each lets what is no relation pass with a chance of 2^-60
 _VALUES = 14  # of z, from which the sequences are found: nine are enough
-LAGS = (1, 2)
+_POINTS, _LAGS = (2, 3), (1, 2)  # of which products are made
 
 
 @dataclass(frozen=True)
 class Sections:
-    """How all sections are made of the coordinates at so many points, each `lag` before the next."""
+    """How all sections are made: of products of independent coordinates at so many points, each `lag` before the next.
+
+    There are no products where coordinates are all there is.
+    """
 
     degree: int
+    coordinates: tuple[int, ...]
     points: int
     lag: int
+    products: tuple[int, ...]
 
-    def points_used(self, dim: int) -> int:
-        """How many points of the orbit it takes to make them at all that are used."""
-        first = (self.points - 1) * self.lag
-        unknowns, forms = self.points * self.degree, dim + 2 * self.points - 3
-        rows = 0 if self.degree == dim + 1 else (unknowns * (forms + 1) + _SPARE) // forms + 1
-        return first + max(rows, self.degree - 2 + _VALUES, 2 * self.degree + _SPARE)
+    def points_used(self, size: int) -> int:
+        """How many points of the orbit it takes to make them at all that are used, for so many coordinates."""
+        unknowns, others = len(self.products), (1 << (self.points - 1)) - 1
+        rows = (unknowns * (others + 1) + _SPARE) // others + 1
+        return (self.points - 1) * self.lag + max(rows, self.degree - 2 + _VALUES, 2 * self.degree + _SPARE)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Modulo a prime: `sections`, then H, y(2), y(3) and the rows of coefficients of the coordinates, as residues."""
+    """Modulo a prime: `sections`; H, y(2), y(3) and all coefficients of the coordinates, row by row, as residues."""
 
     sections: Sections
-    numbers: list[int]
+    numbers: list[list[int]]
 
 
-def points_needed(dim: int) -> int:
-    """How many points `curve` has to be given."""
-    coordinates = dim + 1
-    return (coordinates**3 if coordinates**3 <= _MOST_PRODUCTS else coordinates**2) + 2 * _SPARE + 2 * max(LAGS)
+def points_needed(size: int) -> list[int]:
+    """How many points `curve` is to be given for so many coordinates, and how many if it finds nothing with these."""
+    products: list[int] = [(size + 1) ** count for count in _POINTS]
+    return [number + 2 * _SPARE + 2 * max(_LAGS) for number in products if number <= _MOST_PRODUCTS]
 
 
 def curve(points: Rows, prime: int, known: Sections | None = None) -> Curve | None:
     """The curve of an orbit whose points have last coordinate 1; None where there is none."""
-    coordinates = len(points[0])
-    tries = [(count, lag) for count in (2, 3) for lag in LAGS if coordinates**count <= _MOST_PRODUCTS]
-    for count, lag in [(known.points, known.lag)] if known else tries:
-        found = _all_sections(points, count, lag, prime)
-        if found is None:
-            continue
-        sections, values = found
+    for sections in [known] if known else _tries(points, prime):
+        values = _all_sections(points, sections, prime)
         try:
-            numbers = _numbers(points, sections, values, prime)
+            numbers = _numbers(points, sections, values, prime) if values else None
         except ZeroDivisionError:  # of an unlucky prime, or a start that is special
             numbers = None
         if numbers is not None:
@@ -84,37 +83,51 @@ def curve(points: Rows, prime: int, known: Sections | None = None) -> Curve | No
     return None
 
 
-def _all_sections(points: Rows, count: int, lag: int, prime: int) -> tuple[Sections, Rows] | None:
-    """A basis of all sections at the points from number (count - 1) lag on; None where there seems to be none."""
-    coordinates, first = len(points[0]), (count - 1) * lag
-    table = [[prod(x) % prime for x in product(*rows)] for rows in _together(points, count, lag)]
-    size = coordinates**count
-    pivots = _pivots(table[: size + _SPARE], prime)
-    degree, rest = divmod(len(pivots), count)
-    if rest or not 3 <= degree <= _MOST_DEGREE or len(pivots) == size:
-        return None
-    sections = Sections(degree, count, lag)
-    if degree == coordinates:
-        return sections, points[first:]
+def _tries(points: Rows, prime: int) -> Iterator[Sections]:
+    """How sections may be made: where products are too independent for a curve, or points too few, there is no way."""
+    coordinates = tuple(independent(points[: len(points[0]) + _SPARE], prime))
+    for count, lag in product(_POINTS, _LAGS):
+        size = len(coordinates) ** count
+        table = _table(points, coordinates, count, lag, prime)[: size + _SPARE]
+        if len(table) < size + _SPARE:
+            continue
+        products = independent(table, prime)
+        degree, rest = divmod(len(products), count)
+        if not rest and 2 <= degree <= _MOST_DEGREE and len(products) < size:
+            yield Sections(degree, coordinates, count, lag, () if degree == len(coordinates) else tuple(products))
+
+
+def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
+    """A basis of all sections at the points that have enough behind them; None where there seems to be none."""
+    count, lag, coordinates = sections.points, sections.lag, sections.coordinates
+    if not sections.products:
+        return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
     # Sections t are such that t g is a sum of products for products g of coordinates of the points before: of the last
-    # coordinates, which are 1, and of combinations that have no zeros in common.
-    values = [[row[k] for k in pivots] for row in table]
-    unknowns, forms = len(pivots), coordinates + 2 * count - 4
+    # ones, which are 1, and of combinations that have no zeros in common with these.
+    values = [[row[k] for k in sections.products] for row in _table(points, coordinates, count, lag, prime)]
+    unknowns, others = len(sections.products), (1 << (count - 1)) - 1
     rows = []
     for value, (_, *before) in zip(values, _together(points, count, lag), strict=True):
-        for k in range(forms):
-            g = prod(sum((k + 2 + i) ** (j + 1) * x for j, x in enumerate(one)) for i, one in enumerate(before)) % prime
-            row = [0] * (unknowns * (forms + 1))
+        factors = [(1, sum((j + 2) ** 3 * x for j, x in enumerate(one))) for one in before]
+        for k, chosen in enumerate([*product(*factors)][1:], start=1):
+            g = prod(chosen) % prime
+            row = [0] * (unknowns * (others + 1))
             row[:unknowns] = [entry * g % prime for entry in value]
-            row[unknowns * (k + 1) : unknowns * (k + 2)] = [-entry % prime for entry in value]
+            row[unknowns * k : unknowns * (k + 1)] = [prime - entry for entry in value]
             rows.append(row)
-        if len(rows) >= unknowns * (forms + 1) + _SPARE:
+        if len(rows) >= unknowns * (others + 1) + _SPARE:
             break
-    kernel = _kernel(rows, prime)
-    if len(kernel) != degree:
+    kernel, nullity = nmod_mat(rows, prime).nullspace()
+    if nullity != sections.degree:
         return None
-    basis = nmod_mat([vector[:unknowns] for vector in kernel], prime).transpose()
-    return sections, _integers(nmod_mat(values, prime) * basis)
+    basis = nmod_mat([[int(kernel[i, k]) for k in range(nullity)] for i in range(unknowns)], prime)
+    return _integers(nmod_mat(values, prime) * basis)
+
+
+def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime: int) -> Rows:
+    """The products of these coordinates of so many points."""
+    chosen = [[point[i] for i in coordinates] for point in points]
+    return [[prod(x) % prime for x in product(*rows)] for rows in _together(chosen, count, lag)]
 
 
 def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]:
@@ -123,9 +136,9 @@ def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]
     return [tuple(points[n - k * lag] for k in range(count)) for n in range(first, len(points))]
 
 
-def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list[int] | None:
+def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list[list[int]] | None:
     degree, first = sections.degree, (sections.points - 1) * sections.lag
-    pencil = _kernel(values[: degree - 2], prime) if degree > 2 else []
+    pencil = _kernel(values[: degree - 2], prime) if degree > 2 else [[1, 0], [0, 1]]
     if len(pencil) != 2:
         return None
     quotients = nmod_mat(values[degree - 2 : degree - 2 + _VALUES], prime) * nmod_mat(pencil, prime).transpose()
@@ -139,9 +152,10 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
     for u in range(min(y), 2, -1):
         y[u - 1] = H / (y[u + 1] * y[u] * (1 - y[u]))
     length = (sections.degree * len(points[0])) // (len(points[0]) - 1) + _SPARE
-    W, U = sequences(H, y[2], y[3], length + 3)
+    multiples, others = first_terms(H, y[2], y[3])
+    W, U = around(multiples, length + 2), around(others, length + 2, multiples)
     coefficients = _coefficients(points, [forms(degree, W, U, n) for n in range(2, length)], prime)
-    return None if coefficients is None else [int(H), int(y[2]), int(y[3]), *coefficients]
+    return None if coefficients is None else [[int(H)], [int(y[2])], [int(y[3])], coefficients]
 
 
 def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | None:
@@ -172,20 +186,8 @@ def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | N
     return H, {m: y[m] for m in run}
 
 
-def sequences(H: Any, y: Any, z: Any, length: int) -> tuple[list[Any], list[Any]]:
-    """W and U from n = 0 on, where U(0) is no term, from H, y(2) and y(3), with U(1) = U(2) = 1.
-
-    Over any field. Raises ZeroDivisionError.
-    """
-    one = H / H
-    alpha, beta = H**2, -(H**3)
-    U = extended([one, one, H / y, (H / y) ** 2 * H / z], alpha, beta, max(length - 1, 6))
-    W = extended(divisibility(U[:6], H), alpha, beta, length - 1)
-    return [0 * one, *W], [0 * one, *U]
-
-
-def forms(degree: int, W: Sequence[Any], U: Sequence[Any], n: int) -> list[Any]:
-    """A basis of the sections at n >= 2, see `exponents`."""
+def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
+    """A basis of the sections at n, see `exponents`."""
     square, outer = W[n] * W[n], W[n + 1] * W[n - 1]
     first, second = U[n], U[n + 1] * W[n - 1]
     first, second = (first, second * W[n]) if degree % 2 else (first * W[n], second)
@@ -216,8 +218,8 @@ def _coefficients(points: Rows, values: list[list[nmod]], prime: int) -> list[in
     return kernel[0] if len(kernel) == 1 else None
 
 
-def _pivots(rows: Rows, prime: int) -> list[int]:
-    """The columns that those before them do not span."""
+def independent(rows: Rows, prime: int) -> list[int]:
+    """The columns that those before them do not span, modulo a prime."""
     reduced, rank = nmod_mat(rows, prime).rref()
     return [next(k for k in range(len(rows[0])) if int(reduced[i, k])) for i in range(rank)]
 

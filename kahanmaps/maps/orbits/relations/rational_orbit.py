@@ -11,7 +11,6 @@ from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_steps import elliptic_steps
-from kahanmaps.maps.orbits.relations.symmetric_qrt import symmetric_qrt
 
 # Relations are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers
 # grow by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay. As their
@@ -66,4 +65,4 @@ class RationalOrbit:
 
 def relations(map_over: MapOver, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
     """The relations that make steps shortest along the orbit of a start, on which another point lies."""
-    return symmetric_qrt(map_over, start) or elliptic_steps(map_over, start) or bilinear_forms(map_over, point)
+    return elliptic_steps(map_over, start) or bilinear_forms(map_over, point)

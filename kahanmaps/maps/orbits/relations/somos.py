@@ -12,62 +12,134 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-
-def extended(first: Sequence[Any], alpha: Any, beta: Any, length: int) -> list[Any]:
-    """So many terms of the sequence with these first four, over any field. Raises ZeroDivisionError."""
-    terms = list(first)
-    while len(terms) < length:
-        before, a, b, c = terms[-4:]
-        terms.append((alpha * c * a + beta * b * b) / before)
-    return terms
+_DIRECT = 8  # up to here quotients of s(n) are found from s(n) itself, then from those at n/2
 
 
-def divisibility(others: Sequence[Any], H: Any) -> list[Any]:
-    """W(1) to W(4) from six terms in a row of another sequence, in the scale where W(2) = H and W(3) = H^3.
+def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
+    """W(1) to W(4) and U(1) to U(4) over any field, in the scales where W(2) = H, W(3) = H^3 and U(1) = U(2) = 1.
 
-    Then alpha = W(2)^2 and beta = -W(1) W(3). The fourth is found from t(m + 3) t(m - 2) W(2) W(1) = W(3) W(2) t(m + 2)
-    t(m - 1) - W(4) W(1) t(m + 1) t(m). Raises ZeroDivisionError.
+    y and z are H U(n)^2/(U(n + 1) U(n - 1)) for n = 2 and 3. Raises ZeroDivisionError.
     """
-    a, b, c, d, e, f = others
-    return [H / H, H, H**3, H * (H**3 * e * b - f * a) / (d * c)]
+    one = H / H
+    a = H / y
+    U = [one, one, a, a * a * H / z]
+    while len(U) < 6:
+        U.append(_next(U[-4:], H))
+    # U(n + 3) U(n - 2) W(2) W(1) = W(3) W(2) U(n + 2) U(n - 1) - W(4) W(1) U(n + 1) U(n), for n = 3
+    return [one, H, H**3, H * (H**3 * U[4] * U[1] - U[5] * U[0]) / (U[3] * U[2])], U[:4]
 
 
-class Somos:
-    """A sequence over Q without the primes that divide `primes`: t(n) = s(n) w(n) with integers w(n) prime to that.
+def around(first: Sequence[Any], most: int, multiples: Sequence[Any] = ()) -> dict[int, Any]:
+    """The terms -most to most of W or, with the first terms of W, of another sequence. Raises ZeroDivisionError."""
+    terms = list(first)
+    while len(terms) < most:
+        terms.append(_next(terms[-4:], (multiples or first)[1]))
+    found = dict(enumerate(terms, start=1))
+    if not multiples:
+        return found | {-n: -term for n, term in found.items()} | {0: 0 * first[0]}
+    before = list(first)[::-1]  # the recurrence is the same backwards
+    while len(before) < most + 5:
+        before.append(_next(before[-4:], multiples[1]))
+    return found | {4 - k: term for k, term in enumerate(before)}
+
+
+def _next(terms: Sequence[Any], H: Any) -> Any:
+    """The term after four."""
+    before, a, b, c = terms
+    return (H**2 * c * a - H**3 * b * b) / before
+
+
+class Terms:
+    """W or another sequence U over Q, without the primes of a set: t(n) = s(n) w(n), w(n) integers prime to `primes`.
 
     Outside a finite set of primes terms have no factors but those that the theory gives them: w(n) is as short as it
-    can be. Of s(n), which would make terms longer, what changes slowly is kept: q(n) = s(n + 1) s(n - 1)/s(n)^2.
+    can be. The terms near n are found from those near n/2, of both sequences, with products and no division:
 
-    `window` has w(n - 1) to w(n + 2), `parts` has q(n) and q(n + 1); `square` and `outer` are w(n)^2 and
-    w(n + 1) w(n - 1).
+        t(i + j) t(i - j) = t(i + 1) t(i - 1) W(j)^2 - t(i)^2 W(j + 1) W(j - 1),      i - j = 1 or 2.
+
+    Of s(n), which would make terms longer, quotients are known that stay short: `part(n)` is s(n + 1) s(n - 1)/s(n)^2,
+    and with the s of W, denoted by S, `ratio(n)` is S(n - 1) s(n + 1)/(S(n) s(n)).
     """
 
-    def __init__(self, first: Sequence[fmpq], alpha: fmpq, beta: fmpq, primes: fmpz) -> None:
-        """From t(n - 1) to t(n + 2), none of them 0."""
-        self._alpha, self._beta, self._primes = alpha, beta, primes
-        split = [(*without(term.p, primes), *without(term.q, primes)) for term in first]
-        if any(below != 1 for _, _, below, _ in split):
-            raise ArithmeticError("the first terms have denominators outside the set of primes")
-        self.window = [above for above, *_ in split]
-        self.scales = s = [fmpq(part, below) for _, part, _, below in split]  # s(n - 1) to s(n + 2), at the beginning
-        self.parts = [s[k + 1] * s[k - 1] / (s[k] * s[k]) for k in (1, 2)]
-        before, here, ahead, _ = self.window
-        self.square, self.outer = here * here, ahead * before
+    def __init__(self, first: Sequence[fmpq], primes: fmpz, multiples: Terms | None = None) -> None:
+        """From t(1) = 1 to t(4), products of powers of the primes, and W, for all sequences but itself."""
+        self._W = self if multiples is None else multiples
+        self._primes, self._second = primes, first[1]
+        self._integers: dict[int, fmpz] = {}
+        self._scales: dict[int, fmpq] = {}  # s(n)/(s(i) S(j))^2 for n above 4
+        self._first: dict[int, fmpq] = {}  # s(n), as long as it is short
+        self._pairs: dict[int, tuple[fmpz, fmpz]] = {}
+        self._parts: dict[int, fmpq] = {}
+        self._ratios: dict[int, fmpq] = {}
+        for n, term in enumerate(first, start=1):
+            if term == 0 or without(term.q, primes)[0] != 1:
+                raise ArithmeticError("the first terms are to have inverses outside the set of primes")
+            self._integers[n], part = without(term.p, primes)
+            self._first[n] = fmpq(part, term.q)
 
-    def advance(self) -> None:
-        """n + 1 for n. Raises ArithmeticError where a term is 0, or has a denominator that it should not have."""
-        before, here, ahead, last = self.window
-        q, r = self.parts
-        self.square, self.outer = ahead * ahead, last * here
-        a, b = self._alpha * r, self._beta
-        below = a.q.lcm(b.q)
-        total = a.p * (below // a.q) * self.outer + b.p * (below // b.q) * self.square
-        value, rest = divmod(total, before)
-        if rest != 0 or value == 0:
-            raise ArithmeticError("a Somos sequence ends, or has a prime that it should not have")
-        new, part = without(value, self._primes)
-        self.window = [here, ahead, last, new]
-        self.parts = [r, fmpq(part, below) / (r * r * q)]
+    def integer(self, n: int) -> fmpz:
+        """w(n), for n >= 1. Raises ArithmeticError where it is 0."""
+        if n not in self._integers:
+            if n < 5:
+                raise ArithmeticError("a term before the first")
+            low = 2 - n % 2
+            i, j = (n + low) // 2, (n - low) // 2
+            a, b = self.part(i), self._W.part(j)
+            below = a.q.lcm(b.q)
+            (square, outer), (W_square, W_outer) = self.pair(i), self._W.pair(j)
+            total = a.p * (below // a.q) * outer * W_square - b.p * (below // b.q) * square * W_outer
+            if total == 0:
+                raise ArithmeticError("a term is 0")
+            self._integers[n], part = without(total, self._primes)
+            self._scales[n] = fmpq(part, below) if low == 1 else fmpq(part, below) / self._second
+            if n <= _DIRECT + 1:
+                self._first[n] = self._scales[n] * (self._first[i] * self._W._first[j]) ** 2
+        return self._integers[n]
+
+    def pair(self, n: int) -> tuple[fmpz, fmpz]:
+        """w(n)^2 and w(n + 1) w(n - 1), for n >= 2."""
+        if n not in self._pairs:
+            here = self.integer(n)
+            self._pairs[n] = here * here, self.integer(n + 1) * self.integer(n - 1)
+        return self._pairs[n]
+
+    def part(self, n: int) -> fmpq:
+        """s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
+        if n not in self._parts:
+            before, here, ahead = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
+            found = ahead * before / here**2
+            if n > _DIRECT:
+                k = n // 2
+                found *= (self.ratio(k + 1) * self._W.part(k) if n % 2 else 1 / self.ratio(k)) ** 2
+            self._parts[n] = found
+        return self._parts[n]
+
+    def ratio(self, n: int) -> fmpq:
+        """S(n - 1) s(n + 1)/(S(n) s(n)), for n >= 2."""
+        if self is self._W:
+            return self.part(n)
+        if n not in self._ratios:
+            W = self._W
+            is_first = n <= _DIRECT
+            found = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
+            found /= W._scale(n, is_first) * self._scale(n, is_first)
+            if n > _DIRECT:
+                k = n // 2
+                found *= (self.ratio(k + 1) * W.part(k) if n % 2 else 1 / W.part(k)) ** 2
+            self._ratios[n] = found
+        return self._ratios[n]
+
+    def forget(self, n: int) -> None:
+        """Keep nothing long of this number: one by one from m on, what is needed is from m/2 - 2 on, and the first."""
+        if n > _DIRECT + 1:
+            self._integers.pop(n, None)
+            self._pairs.pop(n, None)
+
+    def _scale(self, n: int, is_first: bool) -> fmpq:
+        table = self._first if is_first else self._scales
+        if n not in table:
+            self.integer(n)
+        return table[n]
 
 
 def without(value: fmpz, primes: fmpz) -> tuple[fmpz, fmpz]:

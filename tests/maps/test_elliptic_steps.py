@@ -1,0 +1,271 @@
+"""Steps by Somos sequences along an orbit on elliptic curves, against single steps by linear systems.
+
+Specified here: every point is the one that single steps give, in lowest terms as well; sequences are found wherever
+orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted.
+"""
+
+import pytest
+from flint import fmpq, fmpq_mat, fmpz
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic
+import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
+from kahanmaps import Orbit, load
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
+from kahanmaps.maps.orbits.integer_steps import lowest
+
+START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
+small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
+
+
+@pytest.fixture(autouse=True)
+def early(monkeypatch):
+    """Sequences are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
+    monkeypatch.setattr(rational_orbit, "_LONG", 20)
+    monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
+    monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: None)
+
+
+def over(name, eps="3/11"):
+    return load(name).map.at(eps)
+
+
+def begin(map_over):
+    return IntegerPoint.from_rationals(START[: map_over.dim])
+
+
+def single_steps(map_over, start, steps):
+    points = [start]
+    for _ in range(steps):
+        image = map_over.integer_step(points[-1])
+        if image is None:
+            break
+        points.append(image)
+    return points
+
+
+def walked(map_over, start, steps):
+    orbit = rational_orbit.RationalOrbit(map_over, start)
+    return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit.relations
+
+
+# Origin of the degrees: orbits of Kahan's discretization in the plane lie on cubics, those of the Euler top on
+# intersections of two quadrics, those of QRT maps on curves of degree (2, 2), in each coordinate a double cover.
+@pytest.mark.parametrize(
+    ("name", "stride", "degrees"),
+    [
+        ("weierstrass", 1, [3]),
+        ("nahm_tetrahedral", 1, [3]),
+        ("zander_111", 1, [3]),
+        ("planar_cubic_hamiltonian", 1, [3]),
+        ("euler_top", 1, [4]),
+        ("zhukovski_volterra_1", 1, [4]),
+        ("dressing_chain_3", 1, [3]),  # a Casimir function: in a plane
+        ("volterra_periodic_4", 1, [4]),  # likewise
+        ("repaired_octahedral", 1, [4]),  # one section is no coordinate
+        ("mcmillan", 1, [2]),
+        ("lyness", 1, [2]),
+        ("discrete_painleve_1", 1, [2]),
+        ("todd", 2, [2, 2]),  # on two curves in turn
+        ("qrt_asymmetric", 2, [2, 2]),  # two factors, each with one new coordinate
+        ("hky", 4, [2, 2, 2, 2]),
+        ("repaired_icosahedral", 1, [6]),  # three are none
+    ],
+)
+def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees):
+    map_over = over(name)
+    expected = single_steps(map_over, begin(map_over), 60)
+    points, relations = walked(map_over, expected[0], 60)
+    assert points == expected
+    assert relations is not None
+    search = elliptic._Search(map_over, expected[0], stride)
+    assert search.found() is not None
+    assert [search.sections[place].degree for place in search.new] == degrees
+
+
+@pytest.mark.parametrize(
+    "name", ["euler_top", "dressing_chain_3", "planar_cubic_hamiltonian", "qrt_asymmetric", "todd", "mcmillan"]
+)
+@settings(max_examples=6)
+@given(data=st.data())
+def test_any_start_and_eps(name, data):
+    map_over = over(name, data.draw(small.filter(bool), label="eps"))
+    start = IntegerPoint.from_rationals(data.draw(st.tuples(*[small] * map_over.dim), label="start"))
+    assert walked(map_over, start, 30)[0] == single_steps(map_over, start, 30)
+
+
+@pytest.mark.parametrize(
+    "name", ["lorenz", "lotka_volterra", "hietarinta_viallet", "clebsch_first_flow", "duffing_polarised", "fibonacci"]
+)
+def test_there_are_none_where_there_is_no_curve(name):
+    map_over = over(name)
+    assert elliptic.elliptic_steps(map_over, begin(map_over)) is None
+
+
+def test_compositions_and_inverses_move_points_of_a_curve_as_well():
+    map_over = over("weierstrass")
+    for changed in (map_over**2, map_over.inverse, over("lyness").inverse):
+        expected = single_steps(changed, begin(changed), 30)
+        points, relations = walked(changed, expected[0], 30)
+        assert points == expected
+        assert relations is not None
+
+
+def test_a_start_that_an_involution_keeps_is_special():
+    map_over = over("euler_top")
+    start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(2, 7)))  # (x, y, z) -> (x, -y, z) reverses the flow
+    assert elliptic._Search(map_over, start, 1).found() is None
+    points, relations = walked(map_over, start, 40)
+    assert points == single_steps(map_over, start, 40)
+    assert relations is not None
+
+
+def found(name):
+    map_over = over(name)
+    search = elliptic._Search(map_over, begin(map_over), len(map_over.factors))
+    return map_over, search, search.found()
+
+
+@pytest.mark.parametrize("name", ["weierstrass", "qrt_asymmetric"])
+def test_a_wrong_number_is_refuted(name):
+    map_over, search, numbers = found(name)
+    start = begin(map_over)
+    assert elliptic._is_proved(map_over, start, search, elliptic._Exact(search, numbers).steps())
+    for place, one in numbers.items():
+        coefficients = list(one.coefficients)
+        coefficients[0] += 1
+        for changed in (
+            one._replace(H=one.H + 1),
+            one._replace(y=one.y + 1),
+            one._replace(z=-one.z),
+            one._replace(coefficients=tuple(coefficients)),
+        ):
+            wrong = {**numbers, place: changed}
+            try:
+                steps = elliptic._Exact(search, wrong).steps()
+            except ArithmeticError:  # for instance that two curves differ
+                continue
+            assert not elliptic._is_proved(map_over, start, search, steps)
+
+
+def test_forms_that_agree_for_some_steps_only_are_refuted():
+    map_over, search, numbers = found("weierstrass")
+    other = over("weierstrass", "1/5")
+    steps = elliptic._Exact(search, numbers).steps()
+    assert not elliptic._is_proved(other, begin(map_over), search, steps)
+
+    class Later(elliptic.EllipticSteps):
+        def at(self, number):
+            point = super().at(number)
+            return point if number < 10 else IntegerPoint(point.numerators, point.denominator + 1)
+
+    later = Later(map_over, steps._places)
+    assert not elliptic._is_proved(map_over, begin(map_over), search, later)  # cubics: the degree is 6, 2 points more
+
+
+def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
+    # Of coordinates (Y x - X y, q y) a prime q divides all where it divides the denominator W of the point (X, Y)/W.
+    map_over, search, numbers = found("weierstrass")
+    points = single_steps(map_over, begin(map_over), 30)
+    bad = elliptic._Exact(search, numbers).steps()._places[0][0]._primes
+    at, q = next((n, q) for n in range(8, 31) for q in range(50, 500) if points[n].denominator % q == 0 != bad % q)
+    X, Y = points[at].numerators
+    rows = fmpq_mat(3, 3, numbers[0, 0].coefficients)
+    changed = fmpq_mat([[Y, -X, 0], [0, q, 0], [0, 0, 1]]) * rows
+    changed = {(0, 0): numbers[0, 0]._replace(coefficients=tuple(changed.entries()))}
+    expected = [lowest([Y * x - X * y, q * y], z) for (x, y), z in ((p.numerators, p.denominator) for p in points)]
+    steps = elliptic._Exact(search, changed).steps()
+    assert [steps.at(n) for n in range(2, 31)] == expected[2:]
+    monkeypatch.setattr(elliptic, "_bound", lambda *_: fmpq(1))
+    steps = elliptic._Exact(search, changed).steps()
+    assert steps.at(at) != expected[at]
+    assert steps.at(at).rationals() == expected[at].rationals()
+
+
+def test_after_a_pole_there_is_no_point():
+    map_over = over("euler_top")
+    pole = IntegerPoint.from_rationals((fmpq(11), fmpq(9), fmpq(-5, 3)))  # where det(I - eps f') = 0
+    assert map_over.integer_step(pole) is None
+    steps = [elliptic.elliptic_steps(map_over, begin(map_over)) for _ in range(2)]
+    *_, last, image = single_steps(map_over, begin(map_over), 9)
+    assert steps[0].step([last], 9) == image
+    assert steps[1].step([pole], 9) is None
+
+
+def test_a_start_on_a_curve_of_genus_0_or_of_finite_order_has_no_sequences():
+    map_over = over("euler_top")
+    assert elliptic.elliptic_steps(map_over, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(0)))) is None
+    field = ring(["x", "y", "eps"])
+    x, y, _ = field.gens()
+    images = [RationalFunction(y, field.constant(1)), RationalFunction(1 + y, x)]
+    pentagon = explicit_map(["x", "y"], images).at(1)  # of Gauss: period 5
+    assert elliptic.elliptic_steps(pentagon, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(2)))) is None
+
+
+def test_coordinates_that_a_step_only_moves_are_seen():
+    field = ring(["x", "y", "z", "eps"])
+    x, y, z, _ = field.gens()
+    one = field.constant(1)
+    moved = [RationalFunction(y, one), RationalFunction(x + 1, z), RationalFunction(x, one)]
+    assert elliptic._copies(explicit_map(["x", "y", "z"], moved).at(1).equation) == [1, None, 0]
+    doubled = [RationalFunction(2 * y, one), RationalFunction(x * x, one), RationalFunction(z, one)]
+    assert elliptic._copies(explicit_map(["x", "y", "z"], doubled).at(1).equation) == [None, None, 2]
+
+
+def test_fractions_are_fractions_and_points_are_points():
+    for name, kind in (("mcmillan", FractionsPoint), ("weierstrass", IntegerPoint)):
+        map_over = over(name)
+        steps = elliptic.elliptic_steps(map_over, begin(map_over))
+        assert type(steps.at(9)) is kind
+        assert steps.at(0) is None
+        assert steps.at(50) == single_steps(map_over, begin(map_over), 50)[-1]  # directly
+
+
+def test_a_map_without_a_value_modulo_the_prime_is_left_to_single_steps(monkeypatch):
+    map_over = over("weierstrass")
+    expected = single_steps(map_over, begin(map_over), 40)
+    monkeypatch.setattr(elliptic, "_PRIME", 7)
+    assert walked(map_over, expected[0], 40)[0] == expected
+
+
+def test_an_orbit_ends_after_a_point_with_too_many_bits():
+    map_over = over("euler_top")
+    *within, beyond = rational_orbit.RationalOrbit(map_over, begin(map_over), max_bits=4000)
+    assert max(point.bits for point in within) <= 4000 < beyond.bits
+    # Of several factors only the first was taken.
+    assert len(list(rational_orbit.RationalOrbit(map_over**2, begin(map_over), max_bits=400))) < len(within) + 1
+
+
+def test_orbits_tell_from_which_step_on(monkeypatch):
+    asked = []
+    real = rational_orbit.elliptic_steps
+    monkeypatch.setattr(rational_orbit, "elliptic_steps", lambda *given: asked.append(given) or real(*given))
+    orbit = Orbit(over("euler_top"), START[:3], 40)
+    assert orbit.relations is None
+    points = [point.value for point in orbit]
+    since = int(orbit.relations.removeprefix("Somos sequences along the orbit from step ").removesuffix(" on"))
+    assert asked == [(orbit.map, points[0])]  # once
+    assert points[since - 1].bits >= 20 * 16 > points[since - 2].bits
+
+
+def test_memory_does_not_grow_with_what_is_behind():
+    map_over = over("nahm_tetrahedral")
+    steps = elliptic.elliptic_steps(map_over, begin(map_over))
+    last = [begin(map_over)]
+    for number in range(1, 121):
+        last.append(steps.step(last[-3:], number) or map_over.integer_step(last[-1]))
+    ((coordinates,),) = steps._places
+    kept = [n for n in coordinates._U._integers if n > 12]
+    assert len(kept) < 75
+    assert len(steps._known) < 9
+    assert last[-1] == single_steps(map_over, begin(map_over), 120)[-1]
+
+
+def test_common_factors_are_small_primes_of_the_curve():
+    map_over = over("euler_top")
+    steps = elliptic.elliptic_steps(map_over, begin(map_over))
+    ((coordinates,),) = steps._places
+    assert all(coordinates._primes % p == 0 for p in (fmpz(2), fmpz(3), fmpz(11)))  # eps = 3/11
