@@ -133,7 +133,11 @@ def from_residues(
         modulus *= prime
         guesses = []
         if count >= next_guess:  # a guess takes longer than a prime
-            found = [rational_vector(group, modulus) for group in residues]
-            guesses = [guess for guess in found if guess is not None] if all(found) else []
+            for group in residues:
+                guess = rational_vector(group, modulus)
+                if guess is None:
+                    guesses = []
+                    break
+                guesses.append(guess)
             next_guess = count + 1 + count // 4
     return None

@@ -18,6 +18,7 @@ where W(2) = H and W(3) = H^3; other four points give y(u) at the u in between, 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -51,9 +52,13 @@ class Sections:
 
     def points_used(self, size: int) -> int:
         """How many points of the orbit it takes to make them at all that are used, for so many coordinates."""
+        return (self.points - 1) * self.lag + max(self.rows, self.degree - 2 + _VALUES, 2 * self.degree + _SPARE)
+
+    @property
+    def rows(self) -> int:
+        """How many points sections are found from."""
         unknowns, others = len(self.products), (1 << (self.points - 1)) - 1
-        rows = (unknowns * (others + 1) + _SPARE) // others + 1
-        return (self.points - 1) * self.lag + max(rows, self.degree - 2 + _VALUES, 2 * self.degree + _SPARE)
+        return unknowns + (unknowns + _SPARE) // others + 1
 
 
 @dataclass(frozen=True)
@@ -71,15 +76,19 @@ def points_needed(size: int) -> list[int]:
 
 
 def curve(points: Rows, prime: int, known: Sections | None = None) -> Curve | None:
-    """The curve of an orbit whose points have last coordinate 1; None where there is none."""
-    for sections in [known] if known else _tries(points, prime):
+    """The curve of an orbit whose points have last coordinate 1; None where there is none.
+
+    Raises ArithmeticError where there seems to be one: then the prime is unlucky, or the start is special.
+    """
+    tries = [known] if known else list(_tries(points, prime))
+    for sections in tries:
         values = _all_sections(points, sections, prime)
-        try:
+        with suppress(ZeroDivisionError):
             numbers = _numbers(points, sections, values, prime) if values else None
-        except ZeroDivisionError:  # of an unlucky prime, or a start that is special
-            numbers = None
-        if numbers is not None:
-            return Curve(sections, numbers)
+            if numbers is not None:
+                return Curve(sections, numbers)
+    if tries:
+        raise ArithmeticError("sections are not as on an elliptic curve")
     return None
 
 
@@ -88,10 +97,12 @@ def _tries(points: Rows, prime: int) -> Iterator[Sections]:
     coordinates = tuple(independent(points[: len(points[0]) + _SPARE], prime))
     for count, lag in product(_POINTS, _LAGS):
         size = len(coordinates) ** count
-        table = _table(points, coordinates, count, lag, prime)[: size + _SPARE]
-        if len(table) < size + _SPARE:
+        used = size + _SPARE + (count - 1) * lag
+        if len(points) < used:
             continue
-        products = independent(table, prime)
+        products = independent(_table(points[:used], coordinates, count, lag, prime), prime)
+        if len(products) > count * _MOST_DEGREE:
+            return
         degree, rest = divmod(len(products), count)
         if not rest and 2 <= degree <= _MOST_DEGREE and len(products) < size:
             yield Sections(degree, coordinates, count, lag, () if degree == len(coordinates) else tuple(products))
@@ -103,25 +114,23 @@ def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
     # Sections t are such that t g is a sum of products for products g of coordinates of the points before: of the last
-    # ones, which are 1, and of combinations that have no zeros in common with these.
+    # ones, which are 1, and of combinations that have no zeros in common with these. Sums are what `checks` annihilate.
     values = [[row[k] for k in sections.products] for row in _table(points, coordinates, count, lag, prime)]
-    unknowns, others = len(sections.products), (1 << (count - 1)) - 1
-    rows = []
-    for value, (_, *before) in zip(values, _together(points, count, lag), strict=True):
-        factors = [(1, sum((j + 2) ** 3 * x for j, x in enumerate(one))) for one in before]
-        for k, chosen in enumerate([*product(*factors)][1:], start=1):
-            g = prod(chosen) % prime
-            row = [0] * (unknowns * (others + 1))
-            row[:unknowns] = [entry * g % prime for entry in value]
-            row[unknowns * k : unknowns * (k + 1)] = [prime - entry for entry in value]
-            rows.append(row)
-        if len(rows) >= unknowns * (others + 1) + _SPARE:
-            break
-    kernel, nullity = nmod_mat(rows, prime).nullspace()
+    sums = nmod_mat(values[: sections.rows], prime)
+    checks, number = sums.transpose().nullspace()
+    factors = [
+        [(1, sum((j + 2) ** 3 * x for j, x in enumerate(one))) for one in before]
+        for _, *before in _together(points, count, lag)[: sections.rows]
+    ]
+    weighed = []
+    for chosen in list(product((0, 1), repeat=count - 1))[1:]:
+        g = [prod(one[i] for one, i in zip(before, chosen, strict=True)) % prime for before in factors]
+        weighed += [[int(checks[n, k]) * x % prime for n, x in enumerate(g)] for k in range(number)]
+    kernel, nullity = (nmod_mat(weighed, prime) * sums).nullspace()
     if nullity != sections.degree:
         return None
-    basis = nmod_mat([[int(kernel[i, k]) for k in range(nullity)] for i in range(unknowns)], prime)
-    return _integers(nmod_mat(values, prime) * basis)
+    found = nmod_mat(values, prime) * kernel
+    return [[int(found[n, k]) for k in range(nullity)] for n in range(len(values))]
 
 
 def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime: int) -> Rows:

@@ -16,7 +16,6 @@ and multiples of T are different as long as W(n) is not 0.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import reduce
 from typing import NamedTuple
 
@@ -28,6 +27,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import (
+    Curve,
     Rows,
     Sections,
     curve,
@@ -145,15 +145,19 @@ def elliptic_steps(map_over: MapOver, start: IntegerPoint) -> EllipticSteps | No
             first = first and map_over.integer_step(first)
         if first is None:
             break
+        is_special = False
         for stride in (len(map_over.factors), 2 * len(map_over.factors)):
             search = _Search(map_over, first, stride)
-            numbers = search.found()
-            if numbers is None:
+            try:
+                numbers = search.found()
+                exact = None if numbers is None else _Exact(search, numbers)
+            except ArithmeticError:
+                is_special = True
                 continue
-            with suppress(ArithmeticError):  # ZeroDivisionError is one
-                exact = _Exact(search, numbers)
-                if _is_proved(map_over, first, search, exact.steps()):
-                    return exact.steps(left_out)
+            if exact is not None and _is_proved(map_over, first, search, exact.steps()):
+                return exact.steps(left_out)
+        if not is_special:
+            break
     return None
 
 
@@ -202,17 +206,26 @@ class _Search:
             points = self._residues(prime, self.stride * needed)
             if points is None:
                 return None
-            curves = {}
-            for k, g in self.new:
-                chosen = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
-                one = curve(chosen, prime, known.get((k, g)))
-                if one is None:
-                    break
-                curves[k, g] = one
-            else:
+            try:
+                curves = self._curves(points, prime)
+            except ArithmeticError:
+                if known or needed == points_needed(size)[-1]:
+                    raise
+                continue
+            if curves is not None:
                 self.sections = {place: one.sections for place, one in curves.items()}
                 return [group for one in curves.values() for group in one.numbers]
         return None
+
+    def _curves(self, points: Rows, prime: int) -> dict[tuple[int, int], Curve] | None:
+        found = {}
+        for k, g in self.new:
+            chosen = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
+            one = curve(chosen, prime, self.sections.get((k, g)))
+            if one is None:
+                return None
+            found[k, g] = one
+        return found
 
     def _residues(self, prime: int, length: int) -> Rows | None:
         """So many points from the start on modulo a prime, one for each step of a factor."""
