@@ -13,13 +13,14 @@ from itertools import islice
 from typing import Any
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.laboratory.modular_points import ModularMap, rank
+from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
-from flint import nmod_mat, nmod_poly
+from flint import nmod_poly
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
@@ -191,38 +192,6 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
     return row
 
 
-def integers(matrix: nmod_mat) -> list[list[int]]:
-    """The rows of a matrix modulo a prime as residues."""
-    return [[int(entry) for entry in row] for row in matrix.tolist()]
-
-
-def null_space(rows: Sequence[Sequence[int]], columns: int, prime: int) -> list[list[int]]:
-    """The canonical basis (reduced echelon form) of the vectors that all rows annihilate, modulo a prime."""
-    if not rows:
-        return [[int(i == j) for j in range(columns)] for i in range(columns)]
-    basis, nullity = nmod_mat(rows, prime).nullspace()
-    return kernel_vectors(basis, nullity, prime)
-
-
-def kernel_vectors(kernel: nmod_mat, nullity: int, prime: int) -> list[list[int]]:
-    """The canonical basis of the span of the first columns of what `nmod_mat.nullspace` gives."""
-    # The matrix is a square one, nearly all of it zeros that need not become integers of Python.
-    return echelon([[int(kernel[i, k]) for i in range(kernel.nrows())] for k in range(nullity)], prime)
-
-
-def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
-    """The reduced echelon basis of the span of vectors modulo a prime."""
-    if not vectors:
-        return []
-    matrix, rank = nmod_mat(vectors, prime).rref()
-    return integers(matrix)[:rank]
-
-
-def combine(weights: Sequence[Sequence[int]], vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
-    """The combinations sum_k w_k v_k of vectors modulo a prime, one for each row w of weights."""
-    return integers(nmod_mat(weights, prime) * nmod_mat(vectors, prime)) if weights and vectors else []
-
-
 def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
     """The polynomial modulo a prime that has these values at different nodes, of a degree below their number."""
     table = list(values)
@@ -234,11 +203,6 @@ def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmo
     for node, c in zip(reversed(nodes), reversed(table), strict=True):
         P = P * nmod_poly([-node % prime, 1], prime) + nmod_poly([c], prime)
     return P
-
-
-def rank(vectors: Sequence[Sequence[int]], prime: int) -> int:
-    """The rank of vectors modulo a prime."""
-    return int(nmod_mat(vectors, prime).rank()) if vectors else 0
 
 
 def slopes(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:

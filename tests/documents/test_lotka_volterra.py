@@ -10,6 +10,7 @@ from flint import fmpq
 from helpers import quick
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import evaluate, gradient, monomials
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.theorems import product_density_invariant
@@ -19,7 +20,6 @@ from kahanmaps.documents.lotka_volterra import degree
 from kahanmaps.experiments.results.recipes import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import null_space
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 EPS = fmpq(3, 17)

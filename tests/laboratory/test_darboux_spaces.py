@@ -5,9 +5,10 @@ from math import comb
 
 import pytest
 
+from kahanmaps.algebra.modular_matrices import combine
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import combine, exponents_up_to, monomial_values
+from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
 from kahanmaps.laboratory.preserve.darboux import darboux_spaces as module
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,

@@ -8,20 +8,11 @@ from hypothesis import strategies as st
 from search_helpers import PRIME, system
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.modular_matrices import combine, echelon, null_space, rank
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.laboratory.modular_points import (
-    ModularMap,
-    NoPoint,
-    combine,
-    echelon,
-    exponents_up_to,
-    gradient_values,
-    monomial_values,
-    null_space,
-    rank,
-)
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, gradient_values, monomial_values
 
 SMALL = 101
 residues = st.integers(0, SMALL - 1)

@@ -9,7 +9,8 @@ from flint import fmpq, fmpq_mat, fmpz
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic
+import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
+import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps import Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
@@ -158,7 +159,7 @@ def test_forms_that_agree_for_some_steps_only_are_refuted():
     steps = elliptic._Exact(search, numbers).steps()
     assert not elliptic._is_proved(other, begin(map_over), search, steps)
 
-    class Later(elliptic.EllipticSteps):
+    class Later(elliptic_steps.EllipticSteps):
         def at(self, number):
             point = super().at(number)
             return point if number < 10 else IntegerPoint(point.numerators, point.denominator + 1)
@@ -180,7 +181,7 @@ def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     expected = [lowest([Y * x - X * y, q * y], z) for (x, y), z in ((p.numerators, p.denominator) for p in points)]
     steps = elliptic._Exact(search, changed).steps()
     assert [steps.at(n) for n in range(2, 31)] == expected[2:]
-    monkeypatch.setattr(elliptic, "_bound", lambda *_: fmpq(1))
+    monkeypatch.setattr(elliptic, "common_primes", lambda *_: fmpq(1))
     steps = elliptic._Exact(search, changed).steps()
     assert steps.at(at) != expected[at]
     assert steps.at(at).rationals() == expected[at].rationals()
@@ -228,7 +229,7 @@ def test_fractions_are_fractions_and_points_are_points():
 def test_a_map_without_a_value_modulo_the_prime_is_left_to_single_steps(monkeypatch):
     map_over = over("weierstrass")
     expected = single_steps(map_over, begin(map_over), 40)
-    monkeypatch.setattr(elliptic, "_PRIME", 7)
+    monkeypatch.setattr(elliptic_steps, "_PRIME", 7)
     assert walked(map_over, expected[0], 40)[0] == expected
 
 

@@ -21,20 +21,10 @@ from typing import Any
 from flint import fmpq_mpoly, nmod_mat
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.modular_matrices import echelon, integers, kernel_vectors, null_space, rank
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.laboratory.modular_points import (
-    ModularMap,
-    Point,
-    echelon,
-    exponents_up_to,
-    integers,
-    kernel_vectors,
-    monomial_tables,
-    null_space,
-    rank,
-    slope_values,
-)
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, monomial_tables, slope_values
 
 Exponent = tuple[int, ...]
 

@@ -18,9 +18,10 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.errors import counted
 from kahanmaps.invariants.integrals import modified
-from kahanmaps.laboratory.modular_points import ModularMap, Point, rank
+from kahanmaps.laboratory.modular_points import ModularMap, Point
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     MAX_DIMENSION,

@@ -19,10 +19,11 @@ from types import MappingProxyType
 
 from flint import fmpq_mpoly
 
+from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.residues import rational_reconstruction
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, null_space
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.branches import Branches, Pattern, pattern, tell_apart
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,

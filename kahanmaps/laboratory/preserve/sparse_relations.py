@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 from flint import fmpq
 
+from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.residues import rational_reconstruction
 from kahanmaps.algebra.written.text import format_number, format_polynomial
-from kahanmaps.laboratory.modular_points import ModularMap, echelon, exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 
 _SIMPLE = 10**6  # a number that both maps share and that is no simpler is taken for an accident

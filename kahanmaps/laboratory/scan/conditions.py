@@ -8,10 +8,11 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
+from kahanmaps.algebra.modular_matrices import pivots
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.laboratory.scan.conjugates import lifted_conjugates
 from kahanmaps.laboratory.scan.lift import flat_equations, lifted_flats, lifted_forms, residues
-from kahanmaps.laboratory.scan.pieces import Pieces, Rows, pieces, pivots
+from kahanmaps.laboratory.scan.pieces import Pieces, Rows, pieces
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep, TimeOver
 

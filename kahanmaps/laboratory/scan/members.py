@@ -12,11 +12,12 @@ from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.curves import Line, Stopped
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, rank
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to
 from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import BirationalMap
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from flint import Ordering, nmod_mpoly_ctx
 
-from kahanmaps.laboratory.modular_points import Point, echelon, exponents_up_to, monomial_tables, null_space
+from kahanmaps.algebra.modular_matrices import echelon, null_space, pivots
+from kahanmaps.laboratory.modular_points import Point, exponents_up_to, monomial_tables
 
 Rows = tuple[tuple[int, ...], ...]
 
@@ -170,11 +171,6 @@ def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[t
         scale = pow(next(c for c in row if c), -1, prime)
         found.append((tuple(c * scale % prime for c in row), power))
     return found
-
-
-def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
-    """The variables that reduced equations say by the others."""
-    return [next(k for k, c in enumerate(row) if c) for row in rows]
 
 
 def _equations(x: Sequence[int]) -> list[list[int]]:

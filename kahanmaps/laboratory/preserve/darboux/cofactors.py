@@ -21,10 +21,11 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
+from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.invariants.measures import jacobian_determinant_sides
-from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, null_space
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge

@@ -15,6 +15,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_polynomial
@@ -23,7 +24,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, product_of
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,

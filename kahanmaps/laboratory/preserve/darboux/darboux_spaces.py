@@ -26,17 +26,8 @@ from dataclasses import dataclass
 from flint import nmod_mat
 
 from kahanmaps.algebra.matrices import combination_of
-from kahanmaps.laboratory.modular_points import (
-    ModularMap,
-    combine,
-    echelon,
-    exponents_up_to,
-    gradient_values,
-    integers,
-    null_space,
-    product_of,
-    rank,
-)
+from kahanmaps.algebra.modular_matrices import combine, echelon, integers, null_space, pivots, rank
+from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to, gradient_values, product_of
 from kahanmaps.laboratory.preserve.hirota_kimura import span_of_relations
 
 _SPARE = 8
@@ -130,13 +121,7 @@ def _complement(inner: Vectors, outer: Vectors, prime: int) -> Vectors:
     if not outer:
         return []
     stacked = [*inner, *outer]
-    pivots = _pivots(echelon(list(zip(*stacked, strict=True)), prime))
-    return [stacked[k] for k in pivots if k >= len(inner)]
-
-
-def _pivots(basis: Vectors) -> list[int]:
-    """Where the vectors of an echelon basis have their first entries."""
-    return [next(k for k, entry in enumerate(row) if entry) for row in basis]
+    return [stacked[k] for k in pivots(echelon(list(zip(*stacked, strict=True)), prime)) if k >= len(inner)]
 
 
 def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
@@ -193,8 +178,8 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, pri
 
 def _restricted(solutions: list[nmod_mat], basis: Vectors, prime: int) -> list[nmod_mat]:
     """The fresh-fresh parts A = sum A'_ij b_i b_j^T as matrices A' in terms of a basis in echelon form."""
-    pivots = _pivots(basis)
-    return [nmod_mat([[int(A[i, j]) for j in pivots] for i in pivots], prime) for A in solutions]
+    places = pivots(basis)
+    return [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
 
 
 def _some_combinations(forms: list[nmod_mat], prime: int) -> list[nmod_mat]:
@@ -292,15 +277,15 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     if size == k:
         return block
     # Combinations of the A whose fresh-fresh part lives on the block: their columns are combinations of it.
-    pivots = _pivots(block)
-    others = [i for i in range(k) if i not in pivots]
+    first = pivots(block)
+    others = [i for i in range(k) if i not in first]
     conditions = []
     for b in range(k):
         for i in others:
             # entry (i, b) must be what the block makes of the entries (pivot, b)
             conditions.append(
                 [
-                    (int(A[i, b]) - sum(int(A[p, b]) * row[i] for p, row in zip(pivots, block, strict=True))) % prime
+                    (int(A[i, b]) - sum(int(A[p, b]) * row[i] for p, row in zip(first, block, strict=True))) % prime
                     for A in solutions
                 ]
             )
@@ -309,9 +294,9 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     system = []
     for weights in combinations:
         A = combination_of(weights, solutions)
-        for p in pivots:
+        for p in first:
             # A = sum a_pq (p + w_p)(q + w_q)^T: the part of row p outside the fresh ones is sum_q a_pq w_q
-            system.append([int(A[p, q]) for q in pivots] + [int(A[p, t]) for t in range(k, size)])
+            system.append([int(A[p, q]) for q in first] + [int(A[p, t]) for t in range(k, size)])
     reduced = echelon(system, prime)
     if len(reduced) < n or any(reduced[i][j] != (i == j) for i in range(n) for j in range(n)):
         return None

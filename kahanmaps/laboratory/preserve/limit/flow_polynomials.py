@@ -23,10 +23,11 @@ from flint import fmpq_mpoly, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.modular_matrices import combine, null_space, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import random_prime, rational_vector
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.modular_points import Point, combine, exponents_up_to, interpolated, null_space, rank
+from kahanmaps.laboratory.modular_points import Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 from kahanmaps.systems.polynomial import PolynomialField

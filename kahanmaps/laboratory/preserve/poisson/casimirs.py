@@ -14,12 +14,13 @@ from flint import fmpq_mpoly_ctx
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
+from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, ring
 from kahanmaps.algebra.residues import rational_vector
 from kahanmaps.algebra.written.text import format_rational_function
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, null_space, slopes
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, slopes
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral
 

@@ -22,6 +22,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_factored, format_rational_function
@@ -40,9 +41,7 @@ from kahanmaps.laboratory.modular_points import (
     NoPoint,
     exponents_up_to,
     monomial_values,
-    null_space,
     product_of,
-    rank,
     slopes,
 )
 from kahanmaps.laboratory.preserve.darboux.cofactors import CofactorProduct, Sample, cofactor_space, points_needed

@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from flint import fmpq, fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
+from kahanmaps.algebra.modular_matrices import echelon, pivots
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.elimination import ExactDivisor
@@ -99,9 +100,9 @@ class _Search:
         ahead, here, before, behind = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
         values = _table(self._products, here, before, prime)
         if self._used is None:
-            pivots = _pivots(values, prime)
-            self._products = [self._products[k] for k in pivots]
-            values = [[row[k] for k in pivots] for row in values]
+            chosen = pivots(echelon(values, prime))
+            self._products = [self._products[k] for k in chosen]
+            values = [[row[k] for k in chosen] for row in values]
         found = _factors(values, ahead, behind, self._used, prime)
         if found is None:
             return None
@@ -114,12 +115,6 @@ class _Search:
 def _table(pairs: Pairs, first: Rows, second: Rows, prime: int) -> Rows:
     """The products of coordinates i of the first and j of the second point, a row for each pair of points."""
     return [[x[i] * y[j] % prime for i, j in pairs] for x, y in zip(first, second, strict=True)]
-
-
-def _pivots(rows: Rows, prime: int) -> list[int]:
-    """The columns that those before them do not span."""
-    reduced, rank = nmod_mat(rows, prime).rref()
-    return [next(k for k in range(len(rows[0])) if int(reduced[i, k])) for i in range(rank)]
 
 
 def _factors(

@@ -17,15 +17,16 @@ where W(2) = H and W(3) = H^3; other four points give y(u) at the u in between, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Any
 
 from flint import nmod, nmod_mat
 
+from kahanmaps.algebra.modular_matrices import echelon, null_space, pivots
+from kahanmaps.maps.orbits.relations.forms import forms
 from kahanmaps.maps.orbits.relations.somos import around, first_terms
 
 Rows = list[list[int]]
@@ -94,13 +95,13 @@ def curve(points: Rows, prime: int, known: Sections | None = None) -> Curve | No
 
 def _tries(points: Rows, prime: int) -> Iterator[Sections]:
     """How sections may be made: where products are too independent for a curve, or points too few, there is no way."""
-    coordinates = tuple(independent(points[: len(points[0]) + _SPARE], prime))
+    coordinates = tuple(pivots(echelon(points[: len(points[0]) + _SPARE], prime)))
     for count, lag in product(_POINTS, _LAGS):
         size = len(coordinates) ** count
         used = size + _SPARE + (count - 1) * lag
         if len(points) < used:
             continue
-        products = independent(_table(points[:used], coordinates, count, lag, prime), prime)
+        products = pivots(echelon(_table(points[:used], coordinates, count, lag, prime), prime))
         if len(products) > count * _MOST_DEGREE:
             return
         degree, rest = divmod(len(products), count)
@@ -147,7 +148,7 @@ def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]
 
 def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list[list[int]] | None:
     degree, first = sections.degree, (sections.points - 1) * sections.lag
-    pencil = _kernel(values[: degree - 2], prime) if degree > 2 else [[1, 0], [0, 1]]
+    pencil = null_space(values[: degree - 2], degree, prime)
     if len(pencil) != 2:
         return None
     quotients = nmod_mat(values[degree - 2 : degree - 2 + _VALUES], prime) * nmod_mat(pencil, prime).transpose()
@@ -182,7 +183,7 @@ def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | N
         if m - 1 in even and m + 1 in even:
             f, a, b = odd[m] * (1 - odd[m]), even[m - 1], even[m + 1]
             rows.append([int(f), int(-f * (a + b)), int(f * a * b), prime - 1])
-    kernel = _kernel(rows, prime)
+    kernel = null_space(rows, 4, prime)
     if len(kernel) != 1 or not kernel[0][0]:
         return None
     K, again, H = (nmod(entry, prime) / kernel[0][0] for entry in kernel[0][1:])
@@ -193,23 +194,6 @@ def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | N
     if any(y[m - 1] * y[m] * (1 - y[m]) * y[m + 1] != H for m in run[1:-1]):
         return None
     return H, {m: y[m] for m in run}
-
-
-def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
-    """A basis of the sections at n, see `exponents`."""
-    square, outer = W[n] * W[n], W[n + 1] * W[n - 1]
-    first, second = U[n], U[n + 1] * W[n - 1]
-    first, second = (first, second * W[n]) if degree % 2 else (first * W[n], second)
-    return [(second if k else first) * square**i * outer**j for k, i, j in exponents(degree)]
-
-
-def exponents(degree: int) -> list[tuple[int, int, int]]:
-    """0 for U(n) or 1 for U(n + 1) W(n - 1), and powers of W(n)^2 and W(n + 1) W(n - 1), in a basis of the sections.
-
-    One of the first two is to be multiplied by W(n), the second for odd degree.
-    """
-    tops = ((degree - 1) // 2, (degree - 2) // 2)
-    return [(k, top - j, j) for k, top in enumerate(tops) for j in range(top + 1)]
 
 
 def _coefficients(points: Rows, values: list[list[nmod]], prime: int) -> list[int] | None:
@@ -223,31 +207,5 @@ def _coefficients(points: Rows, values: list[list[nmod]], prime: int) -> list[in
             row[i * degree : (i + 1) * degree] = value
             row[last * degree :] = [-point[i] * entry % prime for entry in value]
             rows.append(row)
-    kernel = _kernel(rows, prime)
+    kernel = null_space(rows, (last + 1) * degree, prime)
     return kernel[0] if len(kernel) == 1 else None
-
-
-def independent(rows: Rows, prime: int) -> list[int]:
-    """The columns that those before them do not span, modulo a prime."""
-    reduced, rank = nmod_mat(rows, prime).rref()
-    return [next(k for k in range(len(rows[0])) if int(reduced[i, k])) for i in range(rank)]
-
-
-def _kernel(rows: Rows, prime: int) -> Rows:
-    """A basis of the vectors that all rows annihilate, each with a 1, and the same for all primes but a few."""
-    reduced, rank = nmod_mat(rows, prime).rref()
-    width = len(rows[0])
-    table = _integers(reduced)[:rank]
-    pivots = [next(k for k, entry in enumerate(row) if entry) for row in table]
-    basis = []
-    for k in sorted(set(range(width)) - set(pivots)):
-        vector = [0] * width
-        vector[k] = 1
-        for pivot, row in zip(pivots, table, strict=True):
-            vector[pivot] = -row[k] % prime
-        basis.append(vector)
-    return basis
-
-
-def _integers(matrix: nmod_mat) -> Rows:
-    return [[int(entry) for entry in row] for row in matrix.tolist()]

@@ -10,7 +10,7 @@ from typing import Protocol
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
-from kahanmaps.maps.orbits.relations.elliptic_steps import elliptic_steps
+from kahanmaps.maps.orbits.relations.elliptic_orbit import elliptic_steps
 
 # Relations are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers
 # grow by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay. As their

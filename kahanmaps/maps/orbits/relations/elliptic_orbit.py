@@ -1,0 +1,220 @@
+"""Orbits on elliptic curves: their coordinates are forms in the terms of two Somos sequences, and this is proved.
+
+Where a map moves the points of an elliptic curve by T, coordinates at step n are sections of a line bundle of degree d
+at P + n T. They are forms with rational coefficients, the same for all n, in terms near n of the sequences W and U (see
+`elliptic_search`), which have 1/d of the length: a step is some short products, and no gcd of long integers. The points
+may lie on several curves in turn, as those of maps with several factors do: every `stride` steps of factors come back
+to a curve, and T is what so many steps do. Maps that give one coordinate after the other have a sequence U for each
+that is new, of lower degree than for all together.
+
+Nothing is believed. The equation of a step, put into such forms, is a section as well, of a degree that is known. The
+forms are the points of the orbit at more steps than that, exactly, hence for all n: a section of degree D that is not 0
+has at most D zeros. That terms of Somos sequences are values of sigma functions on one curve is a theorem (hone-2005),
+and multiples of T are different as long as W(n) is not 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from flint import fmpq, fmpz, fmpz_mat
+
+from kahanmaps.algebra.matrices import primitive_integers
+from kahanmaps.algebra.residues import from_residues
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
+from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps, image_modulo, residue
+from kahanmaps.maps.orbits.relations.forms import common_primes
+from kahanmaps.maps.orbits.relations.somos import Terms, around, first_terms
+
+_MOST_PRIMES = 100
+_LEFT_OUT = 3  # steps, where the start is special: as for W(0), terms of U near the beginning may be 0
+_FIRST = 2  # the n that forms start with: W(0) is 0
+
+Groups = Sequence[tuple[int, ...]]  # of coordinates that have a denominator in common
+
+
+def elliptic_steps(map_over: MapOver, start: IntegerPoint) -> EllipticSteps | None:
+    """The steps of the orbit from a start; None where it is not known to lie on elliptic curves."""
+    first: IntegerPoint | None = start
+    for left_out in (0, _LEFT_OUT):
+        for _ in range(left_out):
+            first = first and map_over.integer_step(first)
+        if first is None:
+            break
+        is_special = False
+        for stride in (len(map_over.factors), 2 * len(map_over.factors)):
+            search = _Search(map_over, first, stride)
+            try:
+                numbers = search.found()
+                exact = None if numbers is None else _Exact(search, numbers)
+            except ArithmeticError:
+                is_special = True
+                continue
+            if exact is not None and _is_proved(map_over, first, search, exact.steps()):
+                return exact.steps(left_out)
+        if not is_special:
+            break
+    return None
+
+
+class Numbers(NamedTuple):
+    """What determines the forms of a group: H, y(2), y(3), and the rows of coefficients, one after the other."""
+
+    H: fmpq
+    y: fmpq
+    z: fmpq
+    coefficients: tuple[fmpq, ...]
+
+
+class _Search:
+    """For each curve and each group that is new on it how sections are made, and the numbers of the forms.
+
+    `earlier` has, for the curves in turn, what each group was one step before, None where it is new.
+    """
+
+    def __init__(self, map_over: MapOver, start: IntegerPoint, stride: int) -> None:
+        self.map, self._start, self.stride = map_over, start, stride
+        n, factors = map_over.dim, map_over.factors
+        is_one_by_one = all(one.integer_steps.is_one_by_one for one in factors)
+        self.groups: Groups = [(i,) for i in range(n)] if is_one_by_one else [tuple(range(n))]
+        self.earlier = [
+            _copies(factors[(k - 1) % len(factors)].equation) if is_one_by_one else [None] for k in range(stride)
+        ]
+        self.new = [(k, g) for k, row in enumerate(self.earlier) for g, copied in enumerate(row) if copied is None]
+        self.sections: dict[tuple[int, int], Sections] = {}
+
+    def found(self) -> dict[tuple[int, int], Numbers] | None:
+        """The numbers; None where there are none, or they are too long."""
+        found = from_residues(self._modulo, _MOST_PRIMES) if self.new else None
+        if found is None:
+            return None
+        rows = [Numbers(found[k][0], found[k + 1][0], found[k + 2][0], found[k + 3]) for k in range(0, len(found), 4)]
+        return dict(zip(self.new, rows, strict=True))
+
+    def degree(self, k: int, group: int) -> int:
+        """That of a group on a curve."""
+        copied = self.earlier[k][group]
+        return self.sections[k, group].degree if copied is None else self.degree((k - 1) % self.stride, copied)
+
+    def _modulo(self, prime: int) -> list[list[int]] | None:
+        size, known = len(self.groups[0]), self.sections
+        for needed in [max(one.points_used(size) for one in known.values())] if known else points_needed(size):
+            points = self._residues(prime, self.stride * needed)
+            if points is None:
+                return None
+            try:
+                curves = self._curves(points, prime)
+            except ArithmeticError:
+                if known or needed == points_needed(size)[-1]:
+                    raise
+                continue
+            if curves is not None:
+                self.sections = {place: one.sections for place, one in curves.items()}
+                return [group for one in curves.values() for group in one.numbers]
+        return None
+
+    def _curves(self, points: Rows, prime: int) -> dict[tuple[int, int], Curve] | None:
+        found = {}
+        for k, g in self.new:
+            chosen = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
+            one = curve(chosen, prime, self.sections.get((k, g)))
+            if one is None:
+                return None
+            found[k, g] = one
+        return found
+
+    def _residues(self, prime: int, length: int) -> Rows | None:
+        """So many points from the start on modulo a prime, one for each step of a factor."""
+        factors = self.map.factors
+        point = residue(self._start, prime)
+        points: Rows = []
+        while point is not None and len(points) < length:
+            points.append(point)
+            point = image_modulo(factors[(len(points) - 1) % len(factors)], point, prime)
+        return points if len(points) == length else None
+
+
+def _copies(equation: Equation) -> list[int | None]:
+    """Of each coordinate of the image which coordinate of the point it is; None for one that is new."""
+    n = equation.dim
+    found: list[int | None] = [None] * n
+    for row in equation.terms:
+        unknowns = [j for j in range(n) if row[j]]
+        if len(unknowns) == 1 and len(row[unknowns[0]]) == len(row[n]) == 1:
+            ((k, a),), ((m, b),) = row[unknowns[0]], row[n]
+            change = [y - x for x, y in zip(equation.exponents[k], equation.exponents[m], strict=True)]
+            if a == -b and sorted(change) == [-1] + [0] * (n - 1) + [1] and change[n] == -1:
+                found[unknowns[0]] = change.index(1)
+    return found
+
+
+def _is_proved(map_over: MapOver, start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
+    """Whether the forms are the points of the orbit at so many steps that they are at all of them."""
+    factors, stride = map_over.factors, search.stride
+    most = 0
+    for k in range(stride):
+        degrees = factors[k % len(factors)].equation.exponents
+        most = max(
+            most,
+            sum(
+                max(sum(exponent[i] for i in group) for exponent in degrees) * search.degree(k, g)
+                + search.degree((k + 1) % stride, g)
+                for g, group in enumerate(search.groups)
+            ),
+        )
+    point = start
+    for number in range((_FIRST + map_over.dim + most + 2) * stride):
+        if number >= (_FIRST + map_over.dim) * stride and steps.at(number) != point:
+            return False
+        image = factors[number % len(factors)].integer_steps.step(point)
+        if image is None:
+            return False
+        point = image
+    return True
+
+
+class _Exact:
+    """Sequences and forms over Q from the numbers of each group."""
+
+    def __init__(self, search: _Search, numbers: dict[tuple[int, int], Numbers]) -> None:
+        self._search = search
+        size = len(search.groups[0]) + 1
+        self._tables = {
+            place: fmpz_mat(size, search.sections[place].degree, primitive_integers(one.coefficients))
+            for place, one in numbers.items()
+        }
+        found = {place: first_terms(one.H, one.y, one.z) for place, one in numbers.items()}
+        self._W, *others = (W for W, _ in found.values())
+        if any(other != self._W for other in others):
+            raise ArithmeticError("the curves differ")
+        self._U = {place: U for place, (_, U) in found.items()}
+        at_0 = [around(U, 0, self._W)[0] for U in self._U.values()]
+        if 0 in at_0:
+            raise ArithmeticError("the start is special")
+        self._primes = fmpz(1)
+        for number in (*self._W, *(term for U in self._U.values() for term in U), *at_0):
+            self._primes = self._primes.lcm(number.p).lcm(number.q)
+        self._all_primes = {}
+        for place, U in self._U.items():
+            bound = common_primes(search.sections[place].degree, self._tables[place], self._W, U)
+            self._all_primes[place] = self._primes.lcm(bound.p).lcm(bound.q)
+
+    def steps(self, left_out: int = 0) -> EllipticSteps:
+        """The steps; the numbers are those of the orbit without its first points, so many."""
+        primes, sections = self._primes, self._search.sections
+        W = Terms(self._W, primes)
+        new = {
+            place: Coordinates(
+                sections[place].degree, self._tables[place], W, Terms(U, primes, W), self._all_primes[place]
+            )
+            for place, U in self._U.items()
+        }
+        places = [
+            [new[k, g] if copied is None else copied for g, copied in enumerate(row)]
+            for k, row in enumerate(self._search.earlier)
+        ]
+        return EllipticSteps(self._search.map, places, left_out)

@@ -1,0 +1,72 @@
+"""Sections of a line bundle on an elliptic curve at n T, as forms in the terms of the sequences W and U.
+
+Of degree d are products of d - 1 terms of W near n and one of U, whose zeros have a given sum. A basis is made of the
+even functions A = W(n)^2 and B = W(n + 1) W(n - 1), and two products that are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpz_mat
+
+from kahanmaps.algebra.modular_matrices import echelon, pivots
+from kahanmaps.maps.orbits.relations.somos import around
+
+_PRIME = 2**61 - 1
+
+
+def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
+    """A basis of the sections at n, see `exponents`."""
+    square, outer = W[n] * W[n], W[n + 1] * W[n - 1]
+    first, second = U[n], U[n + 1] * W[n - 1]
+    first, second = (first, second * W[n]) if degree % 2 else (first * W[n], second)
+    return [(second if k else first) * square**i * outer**j for k, i, j in exponents(degree)]
+
+
+def exponents(degree: int) -> list[tuple[int, int, int]]:
+    """0 for U(n) or 1 for U(n + 1) W(n - 1), and powers of W(n)^2 and W(n + 1) W(n - 1), in a basis of the sections.
+
+    One of the first two is to be multiplied by W(n), the second for odd degree.
+    """
+    tops = ((degree - 1) // 2, (degree - 2) // 2)
+    return [(k, top - j, j) for k, top in enumerate(tops) for j in range(top + 1)]
+
+
+def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[fmpq]) -> fmpq:
+    """A number in which all primes stand that all coordinates may have in common at one n. Raises ArithmeticError.
+
+    A common prime of all coordinates is one of all products of a coordinate and a section psi(n) that depends on n T
+    alone. Where these products span the forms of their degree, the index of what they span has all such primes, as
+    those forms have none in common beyond the primes of the first terms.
+    """
+    for more in (0, *range(2, degree + 1)):
+        length = degree + more
+        if table.nrows() * max(more, 1) < length:
+            continue
+        basis, products = [], []
+        terms = around(W, length // 2 + 3), around(U, length // 2 + 3, W)
+        for n in range(-(length // 2), length - length // 2):
+            values = (fmpq_mat(table) * fmpq_mat(degree, 1, forms(degree, *terms, n))).entries()
+            basis.append(forms(length, *terms, n))
+            products.append([value * psi for value in values for psi in _of_multiples(more, terms[0], n)])
+        residues = [[int(x.p % _PRIME) * pow(int(x.q), -1, _PRIME) % _PRIME for x in row] for row in products]
+        columns = pivots(echelon(residues, _PRIME))
+        if len(columns) == length:
+            chosen = fmpq_mat([[row[k] for k in columns] for row in products])
+            return chosen.det() / fmpq_mat(basis).det()
+    raise ArithmeticError("coordinates have zeros in common")
+
+
+def _of_multiples(degree: int, W: Mapping[int, fmpq], n: int) -> list[fmpq]:
+    """A basis of the sections of a degree other than 1 whose zeros have the sum 0."""
+    square, outer, third = W[n] * W[n], W[n + 1] * W[n - 1], W[n - 1] ** 2 * W[n + 2]
+
+    def even(top: int) -> list[fmpq]:
+        return [square ** (top - j) * outer**j for j in range(top + 1)]
+
+    half, odd = divmod(degree, 2)
+    if odd:
+        return [W[n] * value for value in even(half)] + [third * value for value in even(half - 1)]
+    return even(half) + [third * W[n] * value for value in even(half - 2)]
