@@ -7,7 +7,7 @@ with every step, so the budget is never absent by accident.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import count
@@ -107,8 +107,9 @@ class Orbit(Displayed):
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
     back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
     denominator (over Q). With a `normal_form` (family.system_normal_form) the orbit is walked in normal form: over
-    Q plane by plane; over balls every point directly, so that balls do not widen from step to
-    step. `first` and `last` are the first points and the last one that were delivered so far.
+    Q plane by plane; over balls every point directly, so that balls do not widen from step to step. Points that are not
+    `wanted` are left out where that saves time. `first` and `last` are the first points and the last one that were
+    delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -128,6 +129,7 @@ class Orbit(Displayed):
         backward: bool = False,
         max_digits: int | None = DEFAULT_MAX_DIGITS,
         normal_form: SystemNormalForm | None = None,
+        wanted: Callable[[int], bool] | None = None,
     ) -> None:
         require_steps(steps)
         if max_digits is not None and max_digits < 1:
@@ -138,6 +140,7 @@ class Orbit(Displayed):
         self.backward = backward
         self.max_digits = max_digits
         self.normal_form = normal_form
+        self._wanted = wanted
         self.end: OrbitEnd | None = None
         self.first: list[OrbitPoint] = []  # up to FIRST_POINTS of them
         self.last: OrbitPoint | None = None
@@ -184,6 +187,9 @@ class Orbit(Displayed):
             except PrecisionLost as error:
                 self.end = OrbitEnd("precision", step, f"step {step + 1} cannot be decided: {error}")
                 return
+            if value is None:  # left out
+                step += 1
+                continue
             if bits := self._excess(value):
                 self.end = OrbitEnd("budget", step, _budget_text(step + 1, bits, self.max_digits))
                 return
@@ -216,7 +222,8 @@ class Orbit(Displayed):
                     value = self.map.step(value)
                 yield value
         elif field is QQ:
-            walk = self._walk = RationalOrbit(self.map, IntegerPoint.from_rationals(self.start), _bits(self.max_digits))
+            start = IntegerPoint.from_rationals(self.start)
+            walk = self._walk = RationalOrbit(self.map, start, _bits(self.max_digits), self._wanted)
             yield from walk
         else:
             value = self.start

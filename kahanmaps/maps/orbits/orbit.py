@@ -170,7 +170,8 @@ class _Asked(NamedTuple):
         if method == "doubling" and normal_form is not None:
             return Iterates(over, self.start, self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
-        return Orbit(over, self.start, self.steps, normal_form=normal, **limits)
+        wanted = None if self.at is None else self.at.__contains__
+        return Orbit(over, self.start, self.steps, normal_form=normal, wanted=wanted, **limits)
 
 
 class Trajectory:

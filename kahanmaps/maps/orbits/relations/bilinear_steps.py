@@ -49,6 +49,13 @@ class BilinearForms:
         # f_n may have a denominator, as only the last B_ij are known: it divides this once it is seen.
         self._multiple = fmpz(1)
 
+    def skip(self, number: int) -> bool:
+        """No point can be left out: the next ones are made of it."""
+        return False
+
+    def point(self, number: int) -> IntegerPoint | None:
+        """None: there is no way to it but by those before."""
+
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """The point after the last ones; None where the forms do not give it."""
         X, Y, behind = ([*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag))

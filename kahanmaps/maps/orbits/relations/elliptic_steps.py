@@ -35,9 +35,20 @@ class EllipticSteps:
         self._known: dict[tuple[int, int], list[fmpz]] = {}
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """The point with this number, which comes after the last one; None where the forms do not give it."""
-        if not self._has_value(last[-1]):
-            return None
+        """The point with this number, that before being done or skipped; None where the forms do not give it."""
+        return self.point(number) if self.skip(number) else None
+
+    def skip(self, number: int) -> bool:
+        """Whether the point before is sure to have an image: modulo a prime, by an orbit that goes along."""
+        if self._residue is None:
+            before = self.point(number - 1)
+            self._residue = None if before is None else residue(before, _PRIME)
+        if self._residue is not None:
+            self._residue = image_modulo(self._map, self._residue, _PRIME)
+        return self._residue is not None
+
+    def point(self, number: int) -> IntegerPoint | None:
+        """The point with this number, None where the forms do not give it. What is far behind is forgotten."""
         done = (number - self._left_out) * len(self._map.factors)
         n = done // len(self._places)
         for key in [key for key in self._known if key[0] < done - len(self._map.factors) * len(self._places[0])]:
@@ -66,13 +77,6 @@ class EllipticSteps:
             place = self._places[k][group]
             self._known[key] = self._value(number - 1, place) if isinstance(place, int) else place.at(n)
         return self._known[key]
-
-    def _has_value(self, point: IntegerPoint) -> bool:
-        """Whether the map is sure to have a value there: modulo a prime, by an orbit that goes along."""
-        if self._residue is None:
-            self._residue = residue(point, _PRIME)
-        self._residue = self._residue and image_modulo(self._map, self._residue, _PRIME)
-        return self._residue is not None
 
 
 class Coordinates:
@@ -106,7 +110,7 @@ class Coordinates:
         return [-value for value in values] if values[-1] < 0 else values
 
     def forget(self, n: int) -> None:
-        """Keep no terms of this number."""
+        """Keep no long terms of numbers below n."""
         self._W.forget(n)
         self._U.forget(n)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import count
 from typing import Protocol
 
@@ -29,27 +29,48 @@ class Relations(Protocol):
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """The point with this number, after the last ones; None where the relations do not give it."""
 
+    def skip(self, number: int) -> bool:
+        """Whether the orbit has a point with this number, and those after it can do without it."""
+
+    def point(self, number: int) -> IntegerPoint | None:
+        """The point with this number, where it can be reached directly; otherwise None."""
+
 
 class RationalOrbit:
     """The points of an orbit over Q: iterate once; ends where the map has no value, or after one with too many bits.
 
-    `since` is the number of the step from which on `relations` are in use; both are None before.
+    Points that are not `wanted` are None where that makes them quicker. `since` is the number of the step from which on
+    `relations` are in use; both are None before.
     """
 
-    def __init__(self, map_over: MapOver, start: IntegerPoint, max_bits: int | None = None) -> None:
-        self.map, self.start, self.max_bits = map_over, start, max_bits
+    def __init__(
+        self,
+        map_over: MapOver,
+        start: IntegerPoint,
+        max_bits: int | None = None,
+        wanted: Callable[[int], bool] | None = None,
+    ) -> None:
+        self.map, self.start, self.max_bits, self._wanted = map_over, start, max_bits, wanted
         self.relations: Relations | None = None
         self.since: int | None = None
 
-    def __iter__(self) -> Iterator[IntegerPoint]:
-        last = deque([self.start], maxlen=3)
+    def __iter__(self) -> Iterator[IntegerPoint | None]:
+        last, reached = deque([self.start], maxlen=3), 0
         is_tried = False
         long = max(_LONG * (self.map.dim + 1) ** 2, _LONGER_THAN_START * self.start.bits)
         yield self.start
         for number in count(1):
+            if self._skips(number, reached, last[-1]):
+                yield None
+                continue
             image = None if self.relations is None else self.relations.step(last, number)
             if image is None:
-                image = self.map.integer_step(last[-1], self.max_bits)
+                if self.relations is not None and reached < number - 1:
+                    before = self.relations.point(number - 1)
+                    if before is not None:
+                        last.append(before)
+                        reached = number - 1
+                image = self._stepped(last[-1], number - reached)
             if image is None:
                 return
             yield image
@@ -57,10 +78,27 @@ class RationalOrbit:
                 return
             before = last[-1]
             last.append(image)
+            reached = number
             if not is_tried and number > 1 and image.bits >= long and image.bits < _SLOW_GROWTH * before.bits:
                 is_tried = True
                 self.relations = relations(self.map, self.start, image)
                 self.since = None if self.relations is None else number + 1
+
+    def _skips(self, number: int, reached: int, last: IntegerPoint) -> bool:
+        """Whether a point is left out, which it is not where it may have too many bits."""
+        if self.relations is None or self._wanted is None or self._wanted(number):
+            return False
+        is_short = self.max_bits is None or 2 * last.bits * number**2 < self.max_bits * reached**2
+        return is_short and self.relations.skip(number)
+
+    def _stepped(self, point: IntegerPoint, steps: int) -> IntegerPoint | None:
+        """The point so many single steps later, or the first one with too many bits."""
+        image: IntegerPoint | None = point
+        for _ in range(steps):
+            if image is None or (self.max_bits is not None and image.exceeding(self.max_bits)):
+                break
+            image = self.map.integer_step(image, self.max_bits)
+        return image
 
 
 def relations(map_over: MapOver, start: IntegerPoint, point: IntegerPoint) -> Relations | None:

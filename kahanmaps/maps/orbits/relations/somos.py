@@ -7,6 +7,7 @@ that is moved by T are forms in their terms.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -69,6 +70,7 @@ class Terms:
         self._scales: dict[int, fmpq] = {}  # s(n)/(s(i) S(j))^2 for n above 4
         self._first: dict[int, fmpq] = {}  # s(n), as long as it is short
         self._pairs: dict[int, tuple[fmpz, fmpz]] = {}
+        self._order = deque[int]()  # in which terms were found, but for the first ones
         self._parts: dict[int, fmpq] = {}
         self._ratios: dict[int, fmpq] = {}
         for n, term in enumerate(first, start=1):
@@ -92,7 +94,9 @@ class Terms:
                 raise ArithmeticError("a term is 0")
             self._integers[n], part = without(total, self._primes)
             self._scales[n] = fmpq(part, below) if low == 1 else fmpq(part, below) / self._second
-            if n <= _DIRECT + 1:
+            if n > _DIRECT + 1:
+                self._order.append(n)
+            else:
                 self._first[n] = self._scales[n] * (self._first[i] * self._W._first[j]) ** 2
         return self._integers[n]
 
@@ -130,10 +134,11 @@ class Terms:
         return self._ratios[n]
 
     def forget(self, n: int) -> None:
-        """Keep nothing long of this number: one by one from m on, what is needed is from m/2 - 2 on, and the first."""
-        if n > _DIRECT + 1:
-            self._integers.pop(n, None)
-            self._pairs.pop(n, None)
+        """Keep nothing long of numbers below n: what is needed from m on is from m/2 - 2 on, and the first."""
+        while self._order and self._order[0] < n:
+            k = self._order.popleft()
+            self._integers.pop(k, None)
+            self._pairs.pop(k, None)
 
     def _scale(self, n: int, is_first: bool) -> fmpq:
         table = self._first if is_first else self._scales
