@@ -9,12 +9,13 @@ from math import prod
 import pytest
 from flint import fmpq, fmpz
 
+import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps import GF, Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
+from kahanmaps.maps.orbits.integer_steps import lowest
 
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
 
@@ -70,7 +71,7 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, steps, lag, no_c
     assert points == expected
     assert since is not None
     assert since < steps
-    forms = bilinear_forms(map_over, points[-1])
+    forms = bilinear.bilinear_forms(map_over, points[-1])
     assert forms is not None
     assert forms.lag == lag
     assert [forms.step(expected[k - 3 : k], k) for k in range(3, steps + 1)] == expected[3:]  # of the whole orbit
@@ -80,15 +81,15 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, steps, lag, no_c
 def test_there_are_no_forms_where_there_is_no_abelian_variety(name):
     map_over = over(name)
     start = IntegerPoint.from_rationals(START[: map_over.dim])
-    assert bilinear_forms(map_over, start) is None
+    assert bilinear.bilinear_forms(map_over, start) is None
 
 
 def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch, no_curves):
     map_over = over("euler_top")
     expected = single_steps(map_over, START[:3], 25)
-    right = bilinear_forms(map_over, expected[0])
+    right = bilinear.bilinear_forms(map_over, expected[0])
     for k in range(4):
-        changed = bilinear_forms(map_over, expected[0])
+        changed = bilinear.bilinear_forms(map_over, expected[0])
         changed.coefficients[k, 0] += 1
         assert changed.step(expected[10:13], 13) is None
         assert right.step(expected[10:13], 13) == expected[13]
@@ -109,6 +110,50 @@ def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_s
     assert points == single_steps(map_over, start, last + 3)
     assert since < last - 1
     assert any(point.numerators[1] for point in points)
+
+
+def test_there_are_none_for_several_factors_and_in_high_dimension(monkeypatch):
+    map_over = over("euler_top")
+    start = IntegerPoint.from_rationals(START[:3])
+    assert bilinear.bilinear_forms(map_over**2, start) is None
+    monkeypatch.setattr(bilinear, "_MOST_DIMENSION", 2)
+    assert bilinear.bilinear_forms(map_over, start) is None
+
+
+def test_a_denominator_of_the_factors_is_learnt(monkeypatch):
+    map_over = over("three_wave")
+    points = single_steps(map_over, START[:6], 24)
+    forms = bilinear.bilinear_forms(map_over, points[0])
+    for k in range(3, 20):
+        assert forms.step(points[k - 3 : k], k) == points[k]
+    calls = []
+    monkeypatch.setattr(bilinear, "lowest", lambda *given: calls.append(given) or lowest(*given))
+    for k in range(20, 25):
+        assert forms.step(points[k - 3 : k], k) == points[k]
+    assert len(calls) == 5
+
+
+def test_combinations_that_do_not_exist():
+    assert bilinear._solved([[1], [1]], [[1], [2]], 101) is None
+    assert bilinear._solved([[0], [1]], [[1], [2]], 101) is None
+    assert bilinear._solved([[2], [1]], [[4], [2]], 101) == [[2]]
+
+
+def test_relations_are_looked_for_where_they_may_pay(monkeypatch):
+    asked = []
+    monkeypatch.setattr(rational_orbit, "relations", lambda *given: asked.append(given))
+    walked(over("lorenz"), START[:3], 8)  # numbers double
+    assert not asked
+    for least in (100, 140, 200, 300):
+        monkeypatch.setattr(rational_orbit, "_LONG", least)
+        points, _ = walked(over("euler_top"), START[:3], 30)
+        at = points.index(asked.pop()[2])
+        assert points[at].bits >= 16 * least > points[at - 1].bits
+    monkeypatch.setattr(rational_orbit, "_LONG", 0)
+    monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 8)
+    points, _ = walked(over("weierstrass"), (fmpq(3**60 + 2, 2**100), fmpq(-(7**40), 2**100)), 14)
+    assert asked.pop()[2].bits >= 8 * points[0].bits
+    assert not asked
 
 
 def test_an_image_is_told_from_other_points_and_from_a_choice_of_many():

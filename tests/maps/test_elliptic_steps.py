@@ -4,21 +4,26 @@ Specified here: every point is the one that single steps give, in lowest terms a
 orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted.
 """
 
+from types import SimpleNamespace
+
 import pytest
-from flint import fmpq, fmpq_mat, fmpz
+from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
+import kahanmaps.maps.orbits.relations.somos as somos
 from kahanmaps import Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
 
+BITS = 10_000
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
+POLE = IntegerPoint.from_rationals((fmpq(11), fmpq(9), fmpq(-5, 3)))  # of the Euler top: det(I - eps f') = 0
 small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
 
 
@@ -28,6 +33,7 @@ def early(monkeypatch):
     monkeypatch.setattr(rational_orbit, "_LONG", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
     monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: None)
+    monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 1)
 
 
 def over(name, eps="3/11"):
@@ -82,7 +88,7 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees)
     points, relations = walked(map_over, expected[0], 60)
     assert points == expected
     assert relations is not None
-    search = elliptic._Search(map_over, expected[0], stride)
+    search = elliptic._Search(map_over.factors, expected[0], stride)
     assert search.found() is not None
     assert [search.sections[place].degree for place in search.new] == degrees
 
@@ -103,7 +109,7 @@ def test_any_start_and_eps(name, data):
 )
 def test_there_are_none_where_there_is_no_curve(name):
     map_over = over(name)
-    assert elliptic.elliptic_steps(map_over, begin(map_over)) is None
+    assert elliptic.elliptic_steps(map_over, begin(map_over), BITS) is None
 
 
 def test_compositions_and_inverses_move_points_of_a_curve_as_well():
@@ -119,15 +125,15 @@ def test_a_start_that_an_involution_keeps_is_special():
     map_over = over("euler_top")
     start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(2, 7)))  # (x, y, z) -> (x, -y, z) reverses the flow
     with pytest.raises(ArithmeticError):
-        elliptic._Search(map_over, start, 1).found()
+        elliptic._Search(map_over.factors, start, 1).found()
     points, relations = walked(map_over, start, 40)
     assert points == single_steps(map_over, start, 40)
     assert relations is not None
 
 
-def found(name):
+def found(name, stride=None):
     map_over = over(name)
-    search = elliptic._Search(map_over, begin(map_over), len(map_over.factors))
+    search = elliptic._Search(map_over.factors, begin(map_over), stride or len(map_over.factors))
     return map_over, search, search.found()
 
 
@@ -135,7 +141,7 @@ def found(name):
 def test_a_wrong_number_is_refuted(name):
     map_over, search, numbers = found(name)
     start = begin(map_over)
-    assert elliptic._is_proved(map_over, start, search, elliptic._Exact(search, numbers).steps())
+    assert elliptic._is_proved(start, search, elliptic._Exact(search, numbers).steps(map_over))
     for place, one in numbers.items():
         coefficients = list(one.coefficients)
         coefficients[0] += 1
@@ -147,65 +153,93 @@ def test_a_wrong_number_is_refuted(name):
         ):
             wrong = {**numbers, place: changed}
             try:
-                steps = elliptic._Exact(search, wrong).steps()
+                steps = elliptic._Exact(search, wrong).steps(map_over)
             except ArithmeticError:  # for instance that two curves differ
                 continue
-            assert not elliptic._is_proved(map_over, start, search, steps)
+            assert not elliptic._is_proved(start, search, steps)
 
 
-def test_forms_that_agree_for_some_steps_only_are_refuted():
-    map_over, search, numbers = found("weierstrass")
-    other = over("weierstrass", "1/5")
-    steps = elliptic._Exact(search, numbers).steps()
-    assert not elliptic._is_proved(other, begin(map_over), search, steps)
+@pytest.mark.parametrize(
+    ("name", "stride", "last"),
+    [("weierstrass", 1, 11), ("mcmillan", 1, 15), ("qrt_asymmetric", 2, 38), ("todd", 2, 36)],
+)
+def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
+    # The equation is of degree 3 + 3 for cubics; 2 * 2 + 2, for the new coordinate in the old ones, and 2 for a double
+    # cover: one step more has to agree, after the first ones that are compared.
+    map_over, search, numbers = found(name, stride)
+    steps = elliptic._Exact(search, numbers).steps(map_over)
 
-    class Later(elliptic_steps.EllipticSteps):
+    class Wrong(elliptic_steps.EllipticSteps):
         def at(self, number):
-            point = super().at(number)
-            return point if number < 10 else IntegerPoint(point.numerators, point.denominator + 1)
+            return begin(map_over) if number == last else super().at(number)
 
-    later = Later(map_over, steps._places)
-    assert not elliptic._is_proved(map_over, begin(map_over), search, later)  # cubics: the degree is 6, 2 points more
+    assert not elliptic._is_proved(begin(map_over), search, Wrong(map_over, steps._places, steps._first))
+    assert steps.at(search.first - 1) is None  # nothing is given that has not been compared
+    assert steps.at(search.first) is not None
+
+
+def test_the_degree_is_that_of_the_equation_between_two_curves():
+    asked = []
+    factors = [
+        SimpleNamespace(equation=SimpleNamespace(exponents=[(d, 0)]), integer_steps=SimpleNamespace(step=lambda p: p))
+        for d in (3, 1)
+    ]
+    search = SimpleNamespace(stride=2, groups=[(0,)], degree=lambda k, g: (2, 5)[k], factors=factors, first=6)
+    assert elliptic._is_proved("x", search, SimpleNamespace(at=lambda n: asked.append(n) or "x"))
+    assert asked[0] == 6
+    assert asked[-1] - 6 >= 2 * (3 * 2 + 5 + 1)
+
+
+def test_an_orbit_that_ends_proves_nothing():
+    map_over, search, numbers = found("euler_top")
+    assert not elliptic._is_proved(POLE, search, elliptic._Exact(search, numbers).steps(map_over))
+    assert elliptic._Search(map_over.factors, POLE, 1)._residues(2**61 - 1, 5) is None
+
+
+def test_curves_have_to_be_the_same():
+    _, search, numbers = found("qrt_asymmetric")
+    place = list(numbers)[1]
+    with pytest.raises(ArithmeticError, match="differ"):
+        elliptic._Exact(search, {**numbers, place: numbers[place]._replace(H=numbers[place].H + 1)})
 
 
 def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     # Of coordinates (Y x - X y, q y) a prime q divides all where it divides the denominator W of the point (X, Y)/W.
     map_over, search, numbers = found("weierstrass")
     points = single_steps(map_over, begin(map_over), 30)
-    bad = elliptic._Exact(search, numbers).steps()._places[0][0]._primes
+    bad = elliptic._Exact(search, numbers).steps(map_over)._places[0][0]._primes
     at, q = next((n, q) for n in range(8, 31) for q in range(50, 500) if points[n].denominator % q == 0 != bad % q)
     X, Y = points[at].numerators
     rows = fmpq_mat(3, 3, numbers[0, 0].coefficients)
     changed = fmpq_mat([[Y, -X, 0], [0, q, 0], [0, 0, 1]]) * rows
     changed = {(0, 0): numbers[0, 0]._replace(coefficients=tuple(changed.entries()))}
     expected = [lowest([Y * x - X * y, q * y], z) for (x, y), z in ((p.numerators, p.denominator) for p in points)]
-    steps = elliptic._Exact(search, changed).steps()
-    assert [steps.at(n) for n in range(2, 31)] == expected[2:]
+    steps = elliptic._Exact(search, changed).steps(map_over)
+    assert [steps.at(n) for n in range(4, 31)] == expected[4:]
     monkeypatch.setattr(elliptic, "common_primes", lambda *_: fmpq(1))
-    steps = elliptic._Exact(search, changed).steps()
+    steps = elliptic._Exact(search, changed).steps(map_over)
     assert steps.at(at) != expected[at]
     assert steps.at(at).rationals() == expected[at].rationals()
 
 
 def test_after_a_pole_there_is_no_point():
     map_over = over("euler_top")
-    pole = IntegerPoint.from_rationals((fmpq(11), fmpq(9), fmpq(-5, 3)))  # where det(I - eps f') = 0
-    assert map_over.integer_step(pole) is None
+    assert map_over.integer_step(POLE) is None
     points = single_steps(map_over, begin(map_over), 9)
-    steps = elliptic.elliptic_steps(map_over, points[0])
+    steps = elliptic.elliptic_steps(map_over, points[0], BITS)
     assert steps.step([], 9) == points[9]
-    steps._residue = elliptic_steps.residue(pole, elliptic_steps._PRIME)
+    steps._residue = elliptic_steps.residue(POLE, elliptic_steps._PRIME)
     assert steps.step([], 10) is None
 
 
 def test_a_start_on_a_curve_of_genus_0_or_of_finite_order_has_no_sequences():
     map_over = over("euler_top")
-    assert elliptic.elliptic_steps(map_over, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(0)))) is None
+    assert elliptic.elliptic_steps(map_over, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(0))), BITS) is None
     field = ring(["x", "y", "eps"])
     x, y, _ = field.gens()
     images = [RationalFunction(y, field.constant(1)), RationalFunction(1 + y, x)]
     pentagon = explicit_map(["x", "y"], images).at(1)  # of Gauss: period 5
-    assert elliptic.elliptic_steps(pentagon, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(2)))) is None
+    assert elliptic.elliptic_steps(pentagon, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(2))), BITS) is None
 
 
 def test_coordinates_that_a_step_only_moves_are_seen():
@@ -214,6 +248,8 @@ def test_coordinates_that_a_step_only_moves_are_seen():
     one = field.constant(1)
     moved = [RationalFunction(y, one), RationalFunction(x + 1, z), RationalFunction(x, one)]
     assert elliptic._copies(explicit_map(["x", "y", "z"], moved).at(1).equation) == [1, None, 0]
+    divided = [RationalFunction(y, x), RationalFunction(z, one), RationalFunction(x, y)]
+    assert elliptic._copies(explicit_map(["x", "y", "z"], divided).at(1).equation) == [None, 2, None]
     doubled = [RationalFunction(2 * y, one), RationalFunction(x * x, one), RationalFunction(z, one)]
     assert elliptic._copies(explicit_map(["x", "y", "z"], doubled).at(1).equation) == [None, None, 2]
 
@@ -221,7 +257,7 @@ def test_coordinates_that_a_step_only_moves_are_seen():
 def test_fractions_are_fractions_and_points_are_points():
     for name, kind in (("mcmillan", FractionsPoint), ("weierstrass", IntegerPoint)):
         map_over = over(name)
-        steps = elliptic.elliptic_steps(map_over, begin(map_over))
+        steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
         assert type(steps.at(9)) is kind
         assert steps.at(0) is None
         assert steps.at(50) == single_steps(map_over, begin(map_over), 50)[-1]  # directly
@@ -256,7 +292,7 @@ def test_orbits_tell_from_which_step_on(monkeypatch):
 
 def test_memory_does_not_grow_with_what_is_behind():
     map_over = over("nahm_tetrahedral")
-    steps = elliptic.elliptic_steps(map_over, begin(map_over))
+    steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
     last = [begin(map_over)]
     for number in range(1, 121):
         last.append(steps.step(last[-3:], number) or map_over.integer_step(last[-1]))
@@ -269,9 +305,101 @@ def test_memory_does_not_grow_with_what_is_behind():
 
 def test_common_factors_are_small_primes_of_the_curve():
     map_over = over("euler_top")
-    steps = elliptic.elliptic_steps(map_over, begin(map_over))
+    steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
     ((coordinates,),) = steps._places
     assert all(coordinates._primes % p == 0 for p in (fmpz(2), fmpz(3), fmpz(11)))  # eps = 3/11
+
+
+def test_a_parameter_that_is_carried_along_is_no_coordinate_of_its_own():
+    field = ring(["x", "y", "a", "b", "eps"])
+    x, y, a, b, _ = field.gens()
+    one = field.constant(1)
+    images = [RationalFunction(y, one), RationalFunction(y + a, x), RationalFunction(b, one), RationalFunction(a, one)]
+    map_over = explicit_map(["x", "y", "a", "b"], images).at(1)
+    start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(-1, 3), fmpq(2, 5), fmpq(2, 5)))
+    points, relations = walked(map_over, start, 60)
+    assert points == single_steps(map_over, start, 60)
+    assert relations is not None
+
+
+@pytest.mark.parametrize("name", ["euler_top", "mcmillan"])
+def test_a_prime_of_the_start_that_is_the_one_in_use(name):
+    map_over = over(name)
+    start = IntegerPoint.from_rationals((fmpq(1, 2**61 - 1), *START[1 : map_over.dim]))
+    assert walked(map_over, start, 25)[0] == single_steps(map_over, start, 25)
+
+
+def test_powers_step_by_the_sequences_of_the_map_itself():
+    map_over = over("mcmillan")
+    for power in (2, 12):
+        expected = single_steps(map_over**power, begin(map_over), 120 // power)
+        points, relations = walked(map_over**power, expected[0], 120 // power)
+        assert points == expected
+        assert relations is not None
+    both = over("weierstrass") @ over("weierstrass", "1/5")
+    assert len(elliptic._unit((both**3).factors)) == 2
+    assert elliptic.elliptic_steps(both, begin(both), BITS) is None
+
+
+def test_of_several_factors_all_points_have_to_be_within_the_budget():
+    map_over = over("euler_top")
+    there_and_back = (map_over**-2) @ (map_over**3)
+    for max_bits in range(1000, 9000, 1000):
+        expected = [begin(map_over)]
+        while (image := there_and_back.integer_step(expected[-1], max_bits)) is not None:
+            expected.append(image)
+            if image.exceeding(max_bits):
+                break
+        assert list(rational_orbit.RationalOrbit(there_and_back, begin(map_over), max_bits)) == expected
+
+
+def test_numbers_that_are_as_long_as_points_are_not_looked_for(monkeypatch):
+    map_over = over("repaired_icosahedral")
+    asked = []
+    monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 100)
+    monkeypatch.setattr(elliptic, "image_modulo", lambda *given: asked.append(given) or image_modulo(*given))
+    image_modulo = elliptic_steps.image_modulo
+    assert elliptic.elliptic_steps(map_over, begin(map_over), 600) is None
+    assert len(asked) < 600
+
+
+def test_curves_are_looked_for_once_more_only_where_the_start_may_be_special(monkeypatch):
+    seen = []
+    real = elliptic._Search
+    monkeypatch.setattr(elliptic, "_Search", lambda *given: seen.append(given) or real(*given))
+    map_over = over("lorenz")
+    assert elliptic.elliptic_steps(map_over, begin(map_over), BITS) is None
+    assert len(seen) == 2
+
+
+def test_no_term_is_found_twice(monkeypatch):
+    map_over = over("euler_top")
+    steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
+    calls = []
+    real = somos.without
+    monkeypatch.setattr(somos, "without", lambda *given: calls.append(given) or real(*given))
+    for number in range(5, 101):
+        assert steps.step([], number) is not None
+    assert len(calls) <= 2 * 101
+    ((coordinates,),) = steps._places
+    assert all(len(terms._pairs) < 75 for terms in (coordinates._U, coordinates._W))
+
+
+def coordinates(degree, rows, primes):
+    W, U = somos.first_terms(fmpq(2), fmpq(3), fmpq(5))
+    base = fmpz(1)
+    for term in (*W, *U):
+        base = base.lcm(term.p).lcm(term.q)
+    multiples = somos.Terms(W, base)
+    return elliptic_steps.Coordinates(degree, fmpz_mat(rows), multiples, somos.Terms(U, base, multiples), primes)
+
+
+def test_high_powers_of_common_primes_are_taken_out_and_a_denominator_0_is_told():
+    rows = [[1, 2, 3], [0, 1, 4], [5, 0, 1]]
+    some, more = (coordinates(3, [[k * entry for entry in row] for row in rows], fmpz(7)) for k in (1, 7**9))
+    assert [some.at(n) for n in range(2, 20)] == [more.at(n) for n in range(2, 20)]
+    with pytest.raises(ZeroDivisionError):
+        coordinates(3, [[1, 0, 0], [0, 1, 0], [0, 0, 0]], fmpz(6)).at(5)
 
 
 @pytest.mark.parametrize("name", ["euler_top", "todd", "hky", "mcmillan", "clebsch_first_flow"])

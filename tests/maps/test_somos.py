@@ -27,6 +27,8 @@ def test_the_elliptic_divisibility_sequence_of_ward():
     terms = Terms([fmpq(x) for x in expected[:4]], fmpz(1))
     with pytest.raises(ArithmeticError):
         Terms([fmpq(x) for x in (1, 0, -1, 1)], fmpz(1))
+    with pytest.raises(ArithmeticError):
+        Terms([fmpq(1), fmpq(1, 3), fmpq(1), fmpq(1)], fmpz(2))
     assert [terms.integer(n) for n in range(1, 16)] == expected
     assert terms.pair(9) == (expected[8] ** 2, expected[7] * expected[9])
 

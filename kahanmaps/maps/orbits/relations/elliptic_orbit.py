@@ -23,7 +23,7 @@ from flint import fmpq, fmpz, fmpz_mat
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import MapOver, StepOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
 from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps, image_modulo, residue
@@ -31,34 +31,53 @@ from kahanmaps.maps.orbits.relations.forms import common_primes
 from kahanmaps.maps.orbits.relations.somos import Terms, around, first_terms
 
 _MOST_PRIMES = 100
+_BITS_FOR_A_PRIME = 100  # of points: numbers are to be shorter
+_MOST_FACTORS = 8
 _LEFT_OUT = 3  # steps, where the start is special: as for W(0), terms of U near the beginning may be 0
-_FIRST = 2  # the n that forms start with: W(0) is 0
+_FIRST = 2  # the least n of forms
 
 Groups = Sequence[tuple[int, ...]]  # of coordinates that have a denominator in common
 
 
-def elliptic_steps(map_over: MapOver, start: IntegerPoint) -> EllipticSteps | None:
-    """The steps of the orbit from a start; None where it is not known to lie on elliptic curves."""
+def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> EllipticSteps | None:
+    """The steps of the orbit from a start; None where it is not known to lie on elliptic curves.
+
+    No numbers are looked for that are not much shorter than points with so many bits.
+    """
+    unit = _unit(map_over.factors)
+    most_primes = min(_MOST_PRIMES, bits // _BITS_FOR_A_PRIME)
     first: IntegerPoint | None = start
-    for left_out in (0, _LEFT_OUT):
+    for left_out in (0, _LEFT_OUT) if len(unit) <= _MOST_FACTORS else ():
         for _ in range(left_out):
             first = first and map_over.integer_step(first)
         if first is None:
             break
         is_special = False
-        for stride in (len(map_over.factors), 2 * len(map_over.factors)):
-            search = _Search(map_over, first, stride)
+        for stride in (len(unit), 2 * len(unit)):
+            search = _Search(unit, first, stride)
             try:
-                numbers = search.found()
+                numbers = search.found(most_primes)
                 exact = None if numbers is None else _Exact(search, numbers)
             except ArithmeticError:
                 is_special = True
                 continue
-            if exact is not None and _is_proved(map_over, first, search, exact.steps()):
-                return exact.steps(left_out)
+            if exact is not None and _is_proved(first, search, exact.steps(map_over)):
+                return exact.steps(map_over, left_out)
+            if search.sections:  # there are numbers, but they are too long
+                return None
         if not is_special:
             break
     return None
+
+
+def _unit(factors: Sequence[StepOver]) -> Sequence[StepOver]:
+    """The first ones, of which the others are repetitions."""
+    count = len(factors)
+    return next(
+        factors[:k]
+        for k in range(1, count + 1)
+        if count % k == 0 and all(one is factors[i % k] for i, one in enumerate(factors))
+    )
 
 
 class Numbers(NamedTuple):
@@ -76,24 +95,30 @@ class _Search:
     `earlier` has, for the curves in turn, what each group was one step before, None where it is new.
     """
 
-    def __init__(self, map_over: MapOver, start: IntegerPoint, stride: int) -> None:
-        self.map, self._start, self.stride = map_over, start, stride
-        n, factors = map_over.dim, map_over.factors
-        is_one_by_one = all(one.integer_steps.is_one_by_one for one in factors)
-        self.groups: Groups = [(i,) for i in range(n)] if is_one_by_one else [tuple(range(n))]
-        self.earlier = [
-            _copies(factors[(k - 1) % len(factors)].equation) if is_one_by_one else [None] for k in range(stride)
-        ]
+    def __init__(self, factors: Sequence[StepOver], start: IntegerPoint, stride: int) -> None:
+        self.factors, self._start, self.stride = factors, start, stride
+        n = factors[0].dim
+        self.groups: Groups = [tuple(range(n))]
+        self.earlier: list[list[int | None]] = [[None]] * stride
+        if all(one.integer_steps.is_one_by_one for one in factors):
+            earlier = [_copies(factors[(k - 1) % len(factors)].equation) for k in range(stride)]
+            if _are_new_at_last(earlier):
+                self.groups, self.earlier = [(i,) for i in range(n)], earlier
         self.new = [(k, g) for k, row in enumerate(self.earlier) for g, copied in enumerate(row) if copied is None]
         self.sections: dict[tuple[int, int], Sections] = {}
 
-    def found(self) -> dict[tuple[int, int], Numbers] | None:
+    def found(self, most_primes: int = _MOST_PRIMES) -> dict[tuple[int, int], Numbers] | None:
         """The numbers; None where there are none, or they are too long."""
-        found = from_residues(self._modulo, _MOST_PRIMES) if self.new else None
+        found = from_residues(self._modulo, most_primes)
         if found is None:
             return None
         rows = [Numbers(found[k][0], found[k + 1][0], found[k + 2][0], found[k + 3]) for k in range(0, len(found), 4)]
         return dict(zip(self.new, rows, strict=True))
+
+    @property
+    def first(self) -> int:
+        """The steps of factors from which on there are forms, W(0) being 0, and what they were some steps before."""
+        return (_FIRST + self.factors[0].dim) * self.stride
 
     def degree(self, k: int, group: int) -> int:
         """That of a group on a curve."""
@@ -129,12 +154,11 @@ class _Search:
 
     def _residues(self, prime: int, length: int) -> Rows | None:
         """So many points from the start on modulo a prime, one for each step of a factor."""
-        factors = self.map.factors
         point = residue(self._start, prime)
         points: Rows = []
         while point is not None and len(points) < length:
             points.append(point)
-            point = image_modulo(factors[(len(points) - 1) % len(factors)], point, prime)
+            point = image_modulo(self.factors[(len(points) - 1) % len(self.factors)], point, prime)
         return points if len(points) == length else None
 
 
@@ -152,9 +176,24 @@ def _copies(equation: Equation) -> list[int | None]:
     return found
 
 
-def _is_proved(map_over: MapOver, start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
+def _are_new_at_last(earlier: Sequence[Sequence[int | None]]) -> bool:
+    """Whether each coordinate was new some steps ago, and is not one that is moved around for ever."""
+    places = [(k, g) for k, row in enumerate(earlier) for g in range(len(row))]
+
+    def was_new(k: int, group: int) -> bool:
+        for _ in places:
+            copied = earlier[k][group]
+            if copied is None:
+                return True
+            k, group = (k - 1) % len(earlier), copied
+        return False
+
+    return all(was_new(*place) for place in places)
+
+
+def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
     """Whether the forms are the points of the orbit at so many steps that they are at all of them."""
-    factors, stride = map_over.factors, search.stride
+    factors, stride = search.factors, search.stride
     most = 0
     for k in range(stride):
         degrees = factors[k % len(factors)].equation.exponents
@@ -167,8 +206,8 @@ def _is_proved(map_over: MapOver, start: IntegerPoint, search: _Search, steps: E
             ),
         )
     point = start
-    for number in range((_FIRST + map_over.dim + most + 2) * stride):
-        if number >= (_FIRST + map_over.dim) * stride and steps.at(number) != point:
+    for number in range(search.first + (most + 2) * stride):
+        if number >= search.first and steps.at(number) != point:
             return False
         image = factors[number % len(factors)].integer_steps.step(point)
         if image is None:
@@ -203,7 +242,7 @@ class _Exact:
             bound = common_primes(search.sections[place].degree, self._tables[place], self._W, U)
             self._all_primes[place] = self._primes.lcm(bound.p).lcm(bound.q)
 
-    def steps(self, left_out: int = 0) -> EllipticSteps:
+    def steps(self, map_over: MapOver, left_out: int = 0) -> EllipticSteps:
         """The steps; the numbers are those of the orbit without its first points, so many."""
         primes, sections = self._primes, self._search.sections
         W = Terms(self._W, primes)
@@ -217,4 +256,4 @@ class _Exact:
             [new[k, g] if copied is None else copied for g, copied in enumerate(row)]
             for k, row in enumerate(self._search.earlier)
         ]
-        return EllipticSteps(self._search.map, places, left_out)
+        return EllipticSteps(map_over, places, self._search.first, left_out)

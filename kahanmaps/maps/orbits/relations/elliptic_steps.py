@@ -24,13 +24,15 @@ class EllipticSteps:
     """The steps of an orbit, of which the sequences leave out some at the beginning.
 
     `places` has, for the curves in turn, a row with the Coordinates of each group, or the number of the group that it
-    was one step before.
+    was one step before. Nothing is given before `first` steps of factors.
     """
 
     name = "Somos sequences along the orbit"
 
-    def __init__(self, map_over: MapOver, places: Sequence[Sequence[Coordinates | int]], left_out: int = 0) -> None:
-        self._map, self._places, self._left_out = map_over, places, left_out
+    def __init__(
+        self, map_over: MapOver, places: Sequence[Sequence[Coordinates | int]], first: int, left_out: int = 0
+    ) -> None:
+        self._map, self._places, self._first, self._left_out = map_over, places, first, left_out
         self._residue: list[int] | None = None
         self._known: dict[tuple[int, int], list[fmpz]] = {}
 
@@ -61,6 +63,8 @@ class EllipticSteps:
 
     def at(self, number: int) -> IntegerPoint | None:
         """The point after so many steps of factors from the first that is not left out; None where it is not given."""
+        if number < self._first:
+            return None
         try:
             values = [self._value(number, g) for g in range(len(self._places[0]))]
         except ArithmeticError:

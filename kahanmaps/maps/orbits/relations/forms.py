@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpz_mat, nmod
 
 from kahanmaps.algebra.modular_matrices import echelon, pivots
 from kahanmaps.maps.orbits.relations.somos import around
@@ -51,7 +51,7 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
             values = (fmpq_mat(table) * fmpq_mat(degree, 1, forms(degree, *terms, n))).entries()
             basis.append(forms(length, *terms, n))
             products.append([value * psi for value in values for psi in _of_multiples(more, terms[0], n)])
-        residues = [[int(x.p % _PRIME) * pow(int(x.q), -1, _PRIME) % _PRIME for x in row] for row in products]
+        residues = [[int(nmod(int(x.p % _PRIME), _PRIME) / int(x.q % _PRIME)) for x in row] for row in products]
         columns = pivots(echelon(residues, _PRIME))
         if len(columns) == length:
             chosen = fmpq_mat([[row[k] for k in columns] for row in products])

@@ -64,7 +64,7 @@ class RationalOrbit:
                 yield None
                 continue
             image = None if self.relations is None else self.relations.step(last, number)
-            if image is None:
+            if image is None or self._is_near_the_end(image):
                 if self.relations is not None and reached < number - 1:
                     before = self.relations.point(number - 1)
                     if before is not None:
@@ -91,6 +91,10 @@ class RationalOrbit:
         is_short = self.max_bits is None or 2 * last.bits * number**2 < self.max_bits * reached**2
         return is_short and self.relations.skip(number)
 
+    def _is_near_the_end(self, image: IntegerPoint) -> bool:
+        """Whether a factor on the way may have too many bits, which single steps see."""
+        return self.max_bits is not None and len(self.map.factors) > 1 and 4 * image.bits > self.max_bits
+
     def _stepped(self, point: IntegerPoint, steps: int) -> IntegerPoint | None:
         """The point so many single steps later, or the first one with too many bits."""
         image: IntegerPoint | None = point
@@ -103,4 +107,4 @@ class RationalOrbit:
 
 def relations(map_over: MapOver, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
     """The relations that make steps shortest along the orbit of a start, on which another point lies."""
-    return elliptic_steps(map_over, start) or bilinear_forms(map_over, point)
+    return elliptic_steps(map_over, start, point.bits) or bilinear_forms(map_over, point)
