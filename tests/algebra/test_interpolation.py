@@ -14,7 +14,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.interpolation import Reconstruction, rational_reconstruction, rational_vector, reconstruct
 from kahanmaps.algebra.modular_fit import Quotient, Shape
 from kahanmaps.algebra.polynomials import RationalFunction, monomials, ring
-from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.residues import from_residues, random_prime
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.errors import InputError
 
@@ -234,3 +234,18 @@ def test_numerators_up_to_a_factor_are_equal_where_they_are_multiples(prime: int
     (only,) = found
     assert (only[0], only[1] * 3 % prime, only[2] * 3 % prime) == (1, 5, 2)
     assert Quotient(Shape((), ((0, 0),)), (), (1,)).numerator_up_to_factor(prime) == ()
+
+
+def test_numbers_from_residues_modulo_primes_as_many_as_it_takes():
+    def residue(x, p):
+        return int(x.p % p) * pow(int(x.q), -1, p) % p
+
+    short, long = (fmpq(3, 7), fmpq(2, 5)), (fmpq(-7, 3**40), fmpq(10**60 + 7, 3**50))
+    for groups in ([short, long], [long, short]):
+        assert from_residues(lambda p, groups=groups: [[residue(x, p) for x in one] for one in groups], 12) == groups
+        assert from_residues(lambda p, groups=groups: [[residue(x, p) for x in one] for one in groups], 4) is None
+    asked = []
+    assert from_residues(asked.append, 5) is None
+    assert len(asked) == 1
+    assert from_residues(lambda p: asked.append(p) or [[residue(short[0], p)]], 3) == [short[:1]]
+    assert len(asked) == 4
