@@ -158,7 +158,7 @@ CLAIMS: list[tuple[str, Callable[[list[Row]], float], str, float]] = [
         "the same, where coordinates are forms in Somos sequences",
         partial(_least_of_catalogue, relations=bench_catalogue.SOMOS),
         "at least",
-        5,
+        3,
     ),
     (
         "members whose chi does not split take at most so many times as long as one whose chi does (m = 3, N = 80)",

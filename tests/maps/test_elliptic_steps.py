@@ -382,7 +382,7 @@ def test_no_term_is_found_twice(monkeypatch):
         assert steps.step([], number) is not None
     assert len(calls) <= 2 * 101
     ((coordinates,),) = steps._places
-    assert all(len(terms._pairs) < 75 for terms in (coordinates._U, coordinates._W))
+    assert all(len(terms._pairs) < 20 for terms in (coordinates._U, coordinates._W))
 
 
 def coordinates(degree, rows, primes):
