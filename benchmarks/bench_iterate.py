@@ -13,18 +13,22 @@ from __future__ import annotations
 import resource
 import subprocess
 import sys
+from collections.abc import Callable
 from itertools import islice
 from typing import Any
 
+from bench_catalogue import EPS, START
 from flint import fmpz, nmod, nmod_mat
 from work import Absent, Row, Work, require_equal, row, run_gp, say, table, timed, work
 
+from kahanmaps import Orbit, load
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.steps import NormalSteps
 
 OVER_Q, MODULO, BALLS = "The n-th iterate over Q", "The n-th iterate over GF(2^61 - 1)", "The n-th iterate in balls"
+CATALOGUE = "The n-th iterate on elliptic curves of the catalogue"
 PRIME = 2**61 - 1
 JUMP, STEPPING = "kahanmaps: doublings", "kahanmaps: stepping in normal form"
 ALONE = "kahanmaps: doublings, x over one denominator"
@@ -138,6 +142,26 @@ def over_rationals(work: Work, steps: list[int]) -> list[Row]:
     return rows
 
 
+def on_elliptic_curves(n: int) -> list[Row]:
+    """Iterates of systems without normal form, the point n alone and by way of all the others."""
+    rows = []
+    for name in ("euler_top", "nahm_tetrahedral", "qrt_asymmetric", "todd", "repaired_octahedral"):
+        map_over = load(name).map.at(EPS)
+
+        def last(wanted: Callable[[int], bool] | None, map_over: Any = map_over) -> Any:
+            *_, point = Orbit(map_over, START[: map_over.dim], n, max_digits=None, wanted=wanted)
+            return point.value
+
+        seconds, point = timed(lambda last=last: last({n}.__contains__))
+        slow, stepped = timed(lambda last=last: last(None), most=3)
+        require_equal(name, stepped, point)
+        what = f"{name}, n = {n}, {point.bits * 0.30103:,.0f} digits"
+        rows.append(row(CATALOGUE, "kahanmaps: this point alone", what, seconds, 1.0))
+        rows.append(row(CATALOGUE, "kahanmaps: all points before it as well", what, slow, slow / seconds))
+        say(f"  {what}: stepping {slow / seconds:.3g}")
+    return rows
+
+
 def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
     """Iterates of three lengths; stepping up to `short`, where the results have to be equal."""
     slow, stepped = step_modulo(work, short)
@@ -206,7 +230,8 @@ def measure(quick: bool = False) -> list[Row]:
     """All rows."""
     steps = [80, 160] if quick else [80, 160, 320, 640]
     far = [] if quick else whole_process()
-    return [*over_rationals(work(), steps), *far, *modulo_a_prime(work()), *in_balls(work())]
+    curves = on_elliptic_curves(steps[-1] // 2)
+    return [*over_rationals(work(), steps), *far, *curves, *modulo_a_prime(work()), *in_balls(work())]
 
 
 if __name__ == "__main__" and "--alone" in sys.argv:

@@ -260,6 +260,10 @@ GROUPS = {
         "Time relative to kahanmaps' doublings: more is slower. `ellmul` does the heart of the task only: it\n"
         "multiplies the point T by n on each elliptic curve, and does not come back to x."
     ),
+    bench_iterate.CATALOGUE: (
+        "Time relative to the point n alone: its coordinates are forms in two sequences, whose terms near n come from "
+        "those near n/2. That there is no pole on the way is seen by an orbit modulo a prime, which is in the time."
+    ),
     bench_iterate.MODULO: (
         "As above. Here `ellmul`, compiled from C, is faster than kahanmaps, which is Python around single\n"
         "operations of FLINT, some twelve for each binary digit of n."
