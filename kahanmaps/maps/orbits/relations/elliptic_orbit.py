@@ -127,7 +127,7 @@ class _Search:
 
     def _modulo(self, prime: int) -> list[list[int]] | None:
         size, known = len(self.groups[0]), self.sections
-        for needed in [max(one.points_used(size) for one in known.values())] if known else points_needed(size):
+        for needed in [max(one.points_used for one in known.values())] if known else points_needed(size):
             points = self._residues(prime, self.stride * needed)
             if points is None:
                 return None

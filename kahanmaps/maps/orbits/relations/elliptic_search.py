@@ -51,8 +51,9 @@ class Sections:
     lag: int
     products: tuple[int, ...]
 
-    def points_used(self, size: int) -> int:
-        """How many points of the orbit it takes to make them at all that are used, for so many coordinates."""
+    @property
+    def points_used(self) -> int:
+        """How many points of the orbit it takes to make them at all that are used."""
         return (self.points - 1) * self.lag + max(self.rows, self.degree - 2 + _VALUES, 2 * self.degree + _SPARE)
 
     @property
