@@ -8,6 +8,7 @@ from math import prod
 
 import pytest
 from flint import fmpq, fmpz
+from orbit_helpers import START, begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
@@ -16,8 +17,6 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
-
-START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
 
 
 @pytest.fixture(autouse=True)
@@ -31,25 +30,6 @@ def early(monkeypatch):
 def no_curves(monkeypatch):
     """Nor are there curves."""
     monkeypatch.setattr(rational_orbit, "elliptic_steps", lambda *_: None)
-
-
-def over(name, eps="3/11"):
-    return load(name).map.at(eps)
-
-
-def single_steps(map_over, start, steps):
-    points = [IntegerPoint.from_rationals(start)]
-    for _ in range(steps):
-        image = map_over.integer_step(points[-1])
-        if image is None:
-            break
-        points.append(image)
-    return points
-
-
-def walked(map_over, start, steps):
-    orbit = rational_orbit.RationalOrbit(map_over, IntegerPoint.from_rationals(start))
-    return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit.since
 
 
 @pytest.mark.parametrize(
@@ -66,11 +46,11 @@ def walked(map_over, start, steps):
 )
 def test_points_are_those_of_single_steps_in_lowest_terms(name, steps, lag, no_curves):
     map_over = over(name)
-    expected = single_steps(map_over, START[: map_over.dim], steps)
-    points, since = walked(map_over, START[: map_over.dim], steps)
+    expected = single_steps(map_over, begin(map_over), steps)
+    points, orbit = walked(map_over, expected[0], steps)
     assert points == expected
-    assert since is not None
-    assert since < steps
+    assert orbit.since is not None
+    assert orbit.since < steps
     forms = bilinear.bilinear_forms(map_over, points[-1])
     assert forms is not None
     assert forms.lag == lag
@@ -80,13 +60,13 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, steps, lag, no_c
 @pytest.mark.parametrize("name", ["lorenz", "henon_heiles", "kirchhoff_generic", "hietarinta_viallet"])
 def test_there_are_no_forms_where_there_is_no_abelian_variety(name):
     map_over = over(name)
-    start = IntegerPoint.from_rationals(START[: map_over.dim])
+    start = begin(map_over)
     assert bilinear.bilinear_forms(map_over, start) is None
 
 
 def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch, no_curves):
     map_over = over("euler_top")
-    expected = single_steps(map_over, START[:3], 25)
+    expected = single_steps(map_over, begin(map_over), 25)
     right = bilinear.bilinear_forms(map_over, expected[0])
     for k in range(4):
         changed = bilinear.bilinear_forms(map_over, expected[0])
@@ -94,7 +74,7 @@ def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch, no_curves)
         assert changed.step(expected[10:13], 13) is None
         assert right.step(expected[10:13], 13) == expected[13]
     monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: changed)
-    assert walked(map_over, START[:3], 25)[0] == expected
+    assert walked(map_over, begin(map_over), 25)[0] == expected
 
 
 def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_step():
@@ -105,16 +85,16 @@ def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_s
     p = prod((1 - z * (Z + k) for k in range(last + 1) if k != last - 1), start=one)
     images = [RationalFunction(z, 1 + z), RationalFunction(p + u, one), RationalFunction(y * (1 - z * (Z + last)), one)]
     map_over = explicit_map(["z", "y", "u"], images).at(1)
-    start = (fmpq(1, Z), fmpq(0), fmpq(0))
-    points, since = walked(map_over, start, last + 3)
+    start = IntegerPoint.from_rationals((fmpq(1, Z), fmpq(0), fmpq(0)))
+    points, orbit = walked(map_over, start, last + 3)
     assert points == single_steps(map_over, start, last + 3)
-    assert since < last - 1
+    assert orbit.since < last - 1
     assert any(point.numerators[1] for point in points)
 
 
 def test_there_are_none_for_several_factors_and_in_high_dimension(monkeypatch):
     map_over = over("euler_top")
-    start = IntegerPoint.from_rationals(START[:3])
+    start = begin(map_over)
     assert bilinear.bilinear_forms(map_over**2, start) is None
     monkeypatch.setattr(bilinear, "_MOST_DIMENSION", 2)
     assert bilinear.bilinear_forms(map_over, start) is None
@@ -122,7 +102,7 @@ def test_there_are_none_for_several_factors_and_in_high_dimension(monkeypatch):
 
 def test_a_denominator_of_the_factors_is_learnt(monkeypatch):
     map_over = over("three_wave")
-    points = single_steps(map_over, START[:6], 24)
+    points = single_steps(map_over, begin(map_over), 24)
     forms = bilinear.bilinear_forms(map_over, points[0])
     for k in range(3, 20):
         assert forms.step(points[k - 3 : k], k) == points[k]
@@ -142,16 +122,18 @@ def test_combinations_that_do_not_exist():
 def test_relations_are_looked_for_where_they_may_pay(monkeypatch):
     asked = []
     monkeypatch.setattr(rational_orbit, "relations", lambda *given: asked.append(given))
-    walked(over("lorenz"), START[:3], 8)  # numbers double
+    walked(over("lorenz"), begin(over("lorenz")), 8)  # numbers double
     assert not asked
     for least in (100, 140, 200, 300):
         monkeypatch.setattr(rational_orbit, "_LONG", least)
-        points, _ = walked(over("euler_top"), START[:3], 30)
+        points, _ = walked(over("euler_top"), begin(over("euler_top")), 30)
         at = points.index(asked.pop()[2])
         assert points[at].bits >= 16 * least > points[at - 1].bits
     monkeypatch.setattr(rational_orbit, "_LONG", 0)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 8)
-    points, _ = walked(over("weierstrass"), (fmpq(3**60 + 2, 2**100), fmpq(-(7**40), 2**100)), 14)
+    points, _ = walked(
+        over("weierstrass"), IntegerPoint.from_rationals((fmpq(3**60 + 2, 2**100), fmpq(-(7**40), 2**100))), 14
+    )
     assert asked.pop()[2].bits >= 8 * points[0].bits
     assert not asked
 
@@ -172,7 +154,7 @@ def test_an_image_is_told_from_other_points_and_from_a_choice_of_many():
 def test_residues_are_those_of_the_map_over_the_field(name):
     p = 10_007
     map_over, modulo = over(name), load(name).map.at(fmpq(3, 11), GF(p))
-    start = IntegerPoint.from_rationals(START[: map_over.dim])
+    start = begin(map_over)
     expected = [[int(entry) for entry in point.x] for point in Orbit(modulo, START[: map_over.dim], 9)]
     assert map_over.integer_steps.residues(start, p, 10) == [[*x, 1] for x in expected]
     assert map_over.integer_steps.residues(start, 2, 3) is None  # 2 divides the denominator

@@ -4,25 +4,26 @@ Specified here: every point is the one that single steps give, in lowest terms a
 orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted.
 """
 
+from functools import reduce
 from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from orbit_helpers import START, begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 import kahanmaps.maps.orbits.relations.somos as somos
-from kahanmaps import Orbit, load
+from kahanmaps import Orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
 
 BITS = 10_000
-START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
 POLE = IntegerPoint.from_rationals((fmpq(11), fmpq(9), fmpq(-5, 3)))  # of the Euler top: det(I - eps f') = 0
 small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
 
@@ -34,29 +35,6 @@ def early(monkeypatch):
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
     monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: None)
     monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 1)
-
-
-def over(name, eps="3/11"):
-    return load(name).map.at(eps)
-
-
-def begin(map_over):
-    return IntegerPoint.from_rationals(START[: map_over.dim])
-
-
-def single_steps(map_over, start, steps):
-    points = [start]
-    for _ in range(steps):
-        image = map_over.integer_step(points[-1])
-        if image is None:
-            break
-        points.append(image)
-    return points
-
-
-def walked(map_over, start, steps):
-    orbit = rational_orbit.RationalOrbit(map_over, start)
-    return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit.relations
 
 
 # Origin of the degrees: orbits of Kahan's discretization in the plane lie on cubics, those of the Euler top on
@@ -85,9 +63,9 @@ def walked(map_over, start, steps):
 def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees):
     map_over = over(name)
     expected = single_steps(map_over, begin(map_over), 60)
-    points, relations = walked(map_over, expected[0], 60)
+    points, orbit = walked(map_over, expected[0], 60)
     assert points == expected
-    assert relations is not None
+    assert orbit.relations is not None
     search = elliptic._Search(map_over.factors, expected[0], stride)
     assert search.found() is not None
     assert [search.sections[place].degree for place in search.new] == degrees
@@ -116,9 +94,9 @@ def test_compositions_and_inverses_move_points_of_a_curve_as_well():
     map_over = over("weierstrass")
     for changed in (map_over**2, map_over.inverse, over("lyness").inverse):
         expected = single_steps(changed, begin(changed), 30)
-        points, relations = walked(changed, expected[0], 30)
+        points, orbit = walked(changed, expected[0], 30)
         assert points == expected
-        assert relations is not None
+        assert orbit.relations is not None
 
 
 def test_a_start_that_an_involution_keeps_is_special():
@@ -126,9 +104,9 @@ def test_a_start_that_an_involution_keeps_is_special():
     start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(2, 7)))  # (x, y, z) -> (x, -y, z) reverses the flow
     with pytest.raises(ArithmeticError):
         elliptic._Search(map_over.factors, start, 1).found()
-    points, relations = walked(map_over, start, 40)
+    points, orbit = walked(map_over, start, 40)
     assert points == single_steps(map_over, start, 40)
-    assert relations is not None
+    assert orbit.relations is not None
 
 
 def found(name, stride=None):
@@ -220,6 +198,18 @@ def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     steps = elliptic._Exact(search, changed).steps(map_over)
     assert steps.at(at) != expected[at]
     assert steps.at(at).rationals() == expected[at].rationals()
+
+
+def test_primes_of_the_term_at_0_are_common_ones():
+    # 13 divides U(0), and W(9): then all forms of odd degree at n = 9.
+    map_over = over("weierstrass", 1)
+    start = IntegerPoint.from_rationals((fmpq(1), fmpq(1, 2)))
+    search = elliptic._Search(map_over.factors, start, 1)
+    units = tuple(fmpq(int(i == j)) for i in range(3) for j in range(3))
+    numbers = {(0, 0): search.found()[0, 0]._replace(coefficients=units)}
+    points = [point for n in range(4, 20) if (point := elliptic._Exact(search, numbers).steps(map_over).at(n))]
+    assert len(points) > 9
+    assert all(reduce(fmpz.gcd, point.numerators, point.denominator) == 1 for point in points)
 
 
 def test_after_a_pole_there_is_no_point():
@@ -317,9 +307,9 @@ def test_a_parameter_that_is_carried_along_is_no_coordinate_of_its_own():
     images = [RationalFunction(y, one), RationalFunction(y + a, x), RationalFunction(b, one), RationalFunction(a, one)]
     map_over = explicit_map(["x", "y", "a", "b"], images).at(1)
     start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(-1, 3), fmpq(2, 5), fmpq(2, 5)))
-    points, relations = walked(map_over, start, 60)
+    points, orbit = walked(map_over, start, 60)
     assert points == single_steps(map_over, start, 60)
-    assert relations is not None
+    assert orbit.relations is not None
 
 
 @pytest.mark.parametrize("name", ["euler_top", "mcmillan"])
@@ -333,9 +323,9 @@ def test_powers_step_by_the_sequences_of_the_map_itself():
     map_over = over("mcmillan")
     for power in (2, 12):
         expected = single_steps(map_over**power, begin(map_over), 120 // power)
-        points, relations = walked(map_over**power, expected[0], 120 // power)
+        points, orbit = walked(map_over**power, expected[0], 120 // power)
         assert points == expected
-        assert relations is not None
+        assert orbit.relations is not None
     both = over("weierstrass") @ over("weierstrass", "1/5")
     assert len(elliptic._unit((both**3).factors)) == 2
     assert elliptic.elliptic_steps(both, begin(both), BITS) is None

@@ -21,6 +21,14 @@ def primes_of(*terms):
     return product
 
 
+def sequences(H, y, z, most):
+    try:
+        first, others = first_terms(H, y, z)
+        return first, others, around(first, most), around(others, most, first)
+    except ZeroDivisionError:
+        assume(False)
+
+
 def test_the_elliptic_divisibility_sequence_of_ward():
     # 0, 1, 1, -1, 1, 2, -1, -3, -5, 7, -4, -23, 29, 59, 129, ...: y^2 + y = x^3 - x with (0, 0), OEIS A006769.
     expected = [1, 1, -1, 1, 2, -1, -3, -5, 7, -4, -23, 29, 59, 129, -314]
@@ -36,11 +44,7 @@ def test_the_elliptic_divisibility_sequence_of_ward():
 @settings(max_examples=40)
 @given(rational, rational, rational)
 def test_terms_and_what_is_left_out_of_them(H, y, z):
-    try:
-        first, others = first_terms(H, y, z)
-        W, U = around(first, 40), around(others, 40, first)
-    except ZeroDivisionError:
-        assume(False)
+    first, others, W, U = sequences(H, y, z, 40)
     assume(all(W[n] and U[n] for n in range(1, 41)))
     primes = primes_of(*first, *others)
     multiples = Terms(first, primes)
@@ -60,11 +64,7 @@ def test_terms_and_what_is_left_out_of_them(H, y, z):
 @settings(max_examples=30)
 @given(rational, rational, rational)
 def test_sequences_satisfy_their_recurrence_in_both_directions_and_the_addition_formula(H, y, z):
-    try:
-        first, others = first_terms(H, y, z)
-        W, U = around(first, 12), around(others, 12, first)
-    except ZeroDivisionError:
-        assume(False)
+    _, _, W, U = sequences(H, y, z, 12)
     assert (W[0], W[1], W[2], W[3], U[1], U[2]) == (0, 1, H, H**3, 1, 1)
     assert (H * U[2] ** 2, H * U[3] ** 2) == (y * U[3] * U[1], z * U[4] * U[2])
     for terms in (W, U):
