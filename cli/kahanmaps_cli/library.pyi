@@ -160,7 +160,6 @@ from kahanmaps.maps.floats.lyapunov import lyapunov_exponents as lyapunov_expone
 from kahanmaps.maps.floats.stream import NpyFile as NpyFile
 from kahanmaps.maps.implicit import det_of as det_of
 from kahanmaps.maps.kahan import Kahan as Kahan
-from kahanmaps.maps.kernels import processors as processors
 from kahanmaps.maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from kahanmaps.maps.normal_form.division import text_in_gamma as text_in_gamma
 from kahanmaps.maps.normal_form.periods import OrbitPeriod as OrbitPeriod
@@ -242,6 +241,7 @@ from kahanmaps.plots.squares import squares as squares
 from kahanmaps.plots.style import Style as Style
 from kahanmaps.plots.terminal import Cell as Cell
 from kahanmaps.plots.terminal import draw_in_characters as draw_in_characters
+from kahanmaps.processes import processors as processors
 from kahanmaps.reports.report import report_html as report_html
 from kahanmaps.sources import source as source
 from kahanmaps.systems.quadratic import MAX_DIMENSION as MAX_DIMENSION

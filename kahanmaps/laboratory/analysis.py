@@ -16,13 +16,15 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analyses.beside import CAN_FORK, Beside, outcome
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.processes import processors
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
@@ -111,6 +113,7 @@ def analyze(
     progress: Callable[[str], None] = lambda _: None,
     reached: Callable[[Analysis], None] = lambda _: None,
     parts: Sequence[Part] = ANALYSES,
+    processes: int = 1,
 ) -> Analysis:
     """What a map preserves and how it grows, within a time budget.
 
@@ -124,6 +127,7 @@ def analyze(
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
         parts: the analyses to do, in this order; the verdict rests on these.
+        processes: with 2 a copy of this process does a part of them where there is a second processor (on Linux).
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -145,17 +149,27 @@ def analyze(
     todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
     found.pending = [part.name for part in todo]
     reached(found)
-    for part in todo:
-        if run.left <= 0:
-            found.skipped.append(f"{part.name}: the time was over")
+    apart = [part for part in todo if part.is_apart] if processes > 1 and processors() > 1 and CAN_FORK else []
+
+    def take(part: Part, result: Any, reason: str) -> None:
+        if reason:
+            found.skipped.append(f"{part.name}: {reason}")
         else:
-            progress(part.name)
-            try:
-                found[part.result] = part.look(run, **run.budget(part))
-            except KahanmapsError as error:
-                found.skipped.append(f"{part.name}: {error}")
+            found[part.result] = result
         found.pending.remove(part.name)
         reached(found)
+
+    with Beside(run, apart) as beside:
+        for part in todo:
+            if part not in apart:
+                progress(part.name)
+                take(part, *outcome(run, part))
+            while beside.has_answered:
+                take(*beside.next())
+        while beside.waiting:
+            progress(beside.waiting[0].name)
+            take(*beside.next())
+    found.skipped.sort(key=lambda line: [part.name for part in todo].index(line.partition(": ")[0]))
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")

@@ -162,7 +162,7 @@ def _analysis(system: str | None, options: dict[str, Any], progress: Progress, h
     symbols, eps = symbols_and_eps(options)
     file = opt.load_system(system, options)
     found = lib.analyze(
-        file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress
+        file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress, processes=2
     )
     progress("the page")
     return lib.report_html(found, explore=options["explore"], **how), 3 if found.conclusion.kind == "undecided" else 0

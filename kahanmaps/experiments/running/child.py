@@ -28,10 +28,10 @@ from kahanmaps.experiments.options import OTHER
 from kahanmaps.experiments.registry import task_kind, task_kinds
 from kahanmaps.experiments.results.recipes import system_from
 from kahanmaps.experiments.results.records import Outcome, Task, canonical
+from kahanmaps.processes import end_with_parent
 from kahanmaps.version import __version__
 
 _TAIL = 2000  # characters of a message or a traceback that are kept
-_PR_SET_PDEATHSIG = 1
 
 
 def main(parent: int) -> None:
@@ -119,16 +119,6 @@ def _result(task: Task, documents: Mapping[str, str]) -> dict[str, Any]:
     if not isinstance(result, dict):
         raise InputError(f"found a result of type {type(result).__name__}, expected a dict")
     return result
-
-
-def end_with_parent(parent: int) -> None:
-    """Have the kernel kill this process when its parent dies, where it can (Linux)."""
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it died before we asked
-        os._exit(1)
 
 
 def _limit_memory(memory: int | None, idle: int | None) -> None:

@@ -16,8 +16,8 @@ import sys
 from typing import IO
 
 from kahanmaps.experiments.results.records import Job, Limits, Task, canonical
-from kahanmaps.experiments.running.child import end_with_parent
 from kahanmaps.experiments.running.children import LocalChildren
+from kahanmaps.processes import end_with_parent
 
 
 def main(source: IO[str], target: IO[str]) -> None:

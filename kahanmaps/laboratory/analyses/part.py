@@ -46,6 +46,7 @@ class Part:
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
     slow_above: float = inf  # the dimension above which it comes last and gets a quarter of its share
+    is_apart: bool = False  # reads nothing of parts that are not; a second process may do it
     json: Callable[[Any], dict[str, Any]] | None = None
 
     def __post_init__(self) -> None:
@@ -69,7 +70,7 @@ class Run:
         # read.
         self.bare = file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
         self.asked: dict[str, Any] = {"symbols": symbols, "eps": found.eps, "seed": found.seed}
-        self.has_symbols, self._progress, self._began = bool(laboratory.symbols), progress, time.monotonic()
+        self.has_symbols, self.progress, self._began = bool(laboratory.symbols), progress, time.monotonic()
 
     @property
     def field(self) -> QuadraticSystem:
@@ -96,4 +97,4 @@ class Run:
         """The seconds for a part, and whom it tells what it does."""
         share = part.share / 4 if self.dim > part.slow_above else part.share
         seconds = max(0.5, min(share * self.found.seconds, self.left))
-        return {"seconds": seconds, "progress": lambda text: self._progress(f"{part.name}: {text}")}
+        return {"seconds": seconds, "progress": lambda text: self.progress(f"{part.name}: {text}")}

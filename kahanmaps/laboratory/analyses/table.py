@@ -53,9 +53,19 @@ ANALYSES = (
         Of.MAPS_OVER_Q,
         share=0.4,
         slow_above=WRITTEN_DIMENSION,
+        is_apart=True,
         json=singularities.singularities_json,
     ),
-    Part("degrees", growth.degrees, "growth", growth.statements, Of.EVERY, share=0.25, reads=("heights",)),
+    Part(
+        "degrees",
+        growth.degrees,
+        "growth",
+        growth.statements,
+        Of.EVERY,
+        share=0.25,
+        reads=("heights",),
+        is_apart=True,
+    ),
     Part(
         "integrals",
         integrals.integrals,
@@ -77,8 +87,8 @@ ANALYSES = (
         Of.MAPS_OVER_Q,
         result="poisson",
     ),
-    Part("heights", growth.heights, of=Of.EVERY, share=0.08),
-    Part("symmetries", symmetries.symmetries, "symmetry", symmetries.statements),
+    Part("heights", growth.heights, of=Of.EVERY, share=0.08, is_apart=True),
+    Part("symmetries", symmetries.symmetries, "symmetry", symmetries.statements, is_apart=True),
     Part(
         "commuting systems",
         commuting.commuting,
@@ -86,5 +96,6 @@ ANALYSES = (
         commuting.statements,
         Of.FIELDS | Of.NUMBER_FIELDS,
         result="commuting",
+        is_apart=True,
     ),
 )

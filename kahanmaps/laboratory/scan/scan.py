@@ -33,7 +33,7 @@ from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kernels import processors
+from kahanmaps.processes import processors
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8

@@ -32,8 +32,9 @@ from kahanmaps.maps.floats.steps import (
 )
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.maps.kernels import choose_kernel, processors
+from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
+from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SAMPLED = 1000  # steps between samples of the block integrals

@@ -1,0 +1,123 @@
+"""Two processes find what one finds; what goes wrong in the second is done again in the first."""
+
+import os
+import pickle
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_poly, fmpz_poly
+
+import kahanmaps.algebra.written.pickles  # noqa: F401
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.documents.catalog import load
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory import analysis
+from kahanmaps.laboratory.analyses.beside import CAN_FORK
+from kahanmaps.laboratory.analyses.part import Of, Part
+from kahanmaps.laboratory.analyses.table import ANALYSES
+from kahanmaps.laboratory.analysis import Analysis, analyze
+
+needs_fork = pytest.mark.skipif(not CAN_FORK, reason="a second process is for Linux")
+
+
+@pytest.fixture(autouse=True)
+def two_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(analysis, "processors", lambda: 2)
+
+
+def told(found: Analysis) -> dict[str, Any]:
+    return found.to_json() | {"seconds": None}
+
+
+@pytest.mark.parametrize("name", ["euler_top", "lotka_volterra", "hky", "paper_m2"])
+def test_two_processes_find_what_one_finds(name: str) -> None:
+    assert told(analyze(load(name), processes=2)) == told(analyze(load(name)))
+
+
+def apart(name: str, look: Callable[..., Any]) -> Part:
+    return Part(name, look, of=Of.EVERY, is_apart=True, json=lambda found: {name: found[name]})
+
+
+def where(*_: Any, **__: Any) -> int:
+    return os.getpid()
+
+
+def killed_elsewhere(*_: Any, **__: Any) -> int:
+    if os.getpid() != HERE:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return os.getpid()
+
+
+def failing(*_: Any, **__: Any) -> int:
+    raise ZeroDivisionError("a mistake of ours")
+
+
+def giving_up(*_: Any, **__: Any) -> int:
+    raise InputError("too hard")
+
+
+HERE = os.getpid()
+
+
+@needs_fork
+def test_parts_that_are_apart_are_done_elsewhere_and_the_others_here() -> None:
+    here = replace(apart("second", where), is_apart=False)
+    found = analyze(load("harmonic"), parts=[apart("first", where), here], processes=2)
+    assert found["first"] != os.getpid() == found["second"]
+    assert not found.pending
+
+
+@pytest.mark.parametrize(("processes", "available"), [(1, 2), (2, 1)])
+def test_with_one_process_or_processor_all_are_done_here(
+    processes: int, available: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(analysis, "processors", lambda: available)
+    assert analyze(load("harmonic"), parts=[apart("first", where)], processes=processes)["first"] == os.getpid()
+
+
+@needs_fork
+def test_what_a_killed_process_did_not_do_is_done_here() -> None:
+    parts = [apart("first", where), apart("second", killed_elsewhere), apart("third", where)]
+    found = analyze(load("harmonic"), parts=parts, processes=2)
+    assert found["first"] != os.getpid()
+    assert found["second"] == found["third"] == os.getpid()
+    assert found.skipped == []
+
+
+def test_mistakes_are_not_swallowed_and_no_process_is_left() -> None:
+    with pytest.raises(ZeroDivisionError):
+        analyze(load("harmonic"), parts=[apart("first", failing)], processes=2)
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_a_part_that_gives_up_elsewhere_is_told() -> None:
+    parts = [apart("first", giving_up), apart("second", where), replace(apart("third", giving_up), is_apart=False)]
+    found = analyze(load("harmonic"), parts=parts, processes=2)
+    assert found.skipped == ["first: too hard", "third: too hard"]
+    assert found["first"] is None
+
+
+def test_what_is_apart_reads_nothing_of_what_is_not() -> None:
+    """Its names of results are those that `look` functions of such parts take from what was found."""
+    apart_parts = [part for part in ANALYSES if part.is_apart]
+    kept = analyze(load("volterra_periodic_4"), parts=apart_parts)
+    whole = analyze(load("volterra_periodic_4"))
+    assert all(kept[part.result] == whole[part.result] for part in apart_parts)
+
+
+x, y = ring(["x", "y"]).gens()
+
+
+@pytest.mark.parametrize(
+    "value",
+    [fmpq_mat(2, 1, [fmpq(1, 2), -3]), fmpq_poly([1, fmpq(2, 3)]), fmpz_poly([0, 5]), x**2 * y - y / 7, 0 * x],
+)
+def test_pickles(value: Any) -> None:
+    again = pickle.loads(pickle.dumps(value))
+    assert type(again) is type(value)
+    assert again == value
+    assert again + value == 2 * value
