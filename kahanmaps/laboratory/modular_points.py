@@ -19,6 +19,7 @@ from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
+Exponent = tuple[int, ...]
 _TRIES = 60
 _NO_VALUE = "the map has no value at random points modulo a prime"
 
@@ -99,20 +100,22 @@ class ModularMap:
         raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
 
     def along_orbit(
-        self, degree: int, count: int, used: int | None = None
+        self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[list[list[int]], Point, int | None]:
-        """The values of all monomials up to a degree along an orbit: a row a point, the last point, the period.
+        """The values of all monomials up to a degree along an orbit: a row a point; the first point; the period.
 
-        A polynomial vanishes along the orbit if the rows annihilate its coefficients. With `used` there are rows of so
-        many of the first points only. Raises NoPoint.
+        A polynomial vanishes along the orbit if the `count` rows annihilate its coefficients. With a `support`, the
+        numbers of monomials and of all their divisors, only these have columns. Raises NoPoint.
         """
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
-        return [monomial_values(x, degree, self.prime) for x in points[:used]], points[-1], period
+        layers = _layers(self.dim, degree) if support is None else _layers_of(self.dim, degree, support)
+        return [_products(x, layers, self.prime) for x in points], points[0], period
 
-    def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
-        """The values of all monomials up to a degree at a point, and what a step makes of them."""
-        return monomial_values(x, degree, self.prime), monomial_values(image, degree, self.prime)
+    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
+        """The values of all monomials up to a degree at a point, and what a step makes of them; times two numbers."""
+        p = self.prime
+        return monomial_values(x, degree, p, by[0]), monomial_values(image, degree, p, by[1])
 
 
 @cache
@@ -132,21 +135,31 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
     ]
 
 
-@cache
-def _last_factors(dim: int, degree: int) -> list[list[tuple[int, int]]]:
-    """(variable, place of the monomial without it) for all monomials, those of each degree from 1 on together."""
+def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
+    """(variable, place of the monomial without it) for monomials with these numbers, those of each degree together."""
+    exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
+    places = {number: place for place, number in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
-    for exponent, slopes in zip(exponents_up_to(dim, degree), monomial_tables(dim, degree), strict=True):
-        if slopes:
-            variable, _, place = slopes[-1]
-            layers[sum(exponent) - 1].append((variable, place))
+    for number in support:
+        if number:
+            variable, _, without = tables[number][-1]
+            layers[sum(exponents[number]) - 1].append((variable, places[without]))
     return layers
 
 
-def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
-    """The values of all monomials of degree at most `degree` at a point modulo a prime, one product each."""
-    table = [1]
-    for layer in _last_factors(len(point), degree):
+@cache
+def _layers(dim: int, degree: int) -> list[list[tuple[int, int]]]:
+    return _layers_of(dim, degree, range(len(exponents_up_to(dim, degree))))
+
+
+def monomial_values(point: Point, degree: int, prime: int, factor: int = 1) -> list[int]:
+    """The values of all monomials of degree at most `degree` at a point modulo a prime, times a factor."""
+    return _products(point, _layers(len(point), degree), prime, factor)
+
+
+def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> list[int]:
+    table = [factor]
+    for layer in layers:
         table += [table[place] * point[variable] % prime for variable, place in layer]
     return table
 

@@ -52,9 +52,9 @@ def test_bases_have_the_dimensions_of_the_literature(name, k):
 def test_as_many_points_as_are_independent_make_all_relations(name, degree):
     map_, other = maps(load(name))[0], maps(load(name))[0]  # the same orbit
     every = relations_on_orbit(map_, degree)
-    independent = every.kernel.ncols() - every.dimension
+    independent = every.independent
     again = relations_on_orbit(other, degree, independent)
-    assert (again.vectors, again.normals, again.end) == (every.vectors, every.normals, every.end)
+    assert (again.vectors, again.normals, again.point) == (every.vectors, every.normals, every.point)
     # With a point less there are relations too many, so that all points are used, of another orbit.
     assert relations_on_orbit(other, degree, independent - 1).dimension == every.dimension
 
@@ -65,10 +65,10 @@ def test_multiples_of_relations_of_lower_degrees_may_be_left_out(name, degree):
     for d in range(1, degree + 1):
         map_, other = maps(load(name))[0], maps(load(name))[0]  # the same orbit
         every, some = relations_on_orbit(map_, d), relations_on_orbit(other, d, leading=leading)
-        assert (some.dimension, some.normals, some.end) == (every.dimension, every.normals, every.end)
+        assert (some.dimension, some.normals, some.point) == (every.dimension, every.normals, every.point)
         assert leading <= some.leading <= every.leading
         leading = some.leading
-    assert some.kernel.ncols() < every.kernel.ncols()
+    assert some.form.ncols() < every.form.ncols()
 
 
 def test_what_leads_no_relation_of_this_orbit_is_not_left_out():
@@ -121,7 +121,7 @@ def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, with_kno
 
     def along(map_, degree, leading):
         count, codimension, period = degrees[degree - 1][next(k for k, one in enumerate(maps) if one is map_)]
-        return OrbitRelations(nmod_mat(0, 0, 101), count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ())
+        return OrbitRelations(nmod_mat(0, 0, 101), 0, count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ())
 
     monkeypatch.setattr(module, "relations_on_orbit", along)
     found = orbit_profile(maps, known=lambda map_, point: [[1, 1, 0]], max_degree=2)

@@ -8,7 +8,7 @@ are found by their exponents (products.py). Source: celledoni-2019.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import comb, prod
@@ -222,23 +222,53 @@ def _search(
     top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
     # With a product in hand only lower degrees are worth a part of the time, and the others of its own degree.
     until = deadline if product is None else time.monotonic() + (deadline - time.monotonic()) / 3
-    for degree in range((top if product is None else min(top, product.degree(dim))) + 1):
-        if time.monotonic() > until:
-            if product is not None:
-                break
-            return [], degree - 1, f"the time was over at degree {degree}"
-        progress(f"densities of degree {degree}")
-        try:
-            first = _space(laboratory.maps[0], degree)
+    top = top if product is None else min(top, product.degree(dim))
+    leaps = _leaps(dim, top) if product is None else [*_leaps(dim, top - 1), top]
+    tried = -1
+    try:
+        for degree, first in _spaces(laboratory.maps[0], leaps, until, progress):
             if first.basis and len(first.basis) == len(_space(laboratory.maps[1], degree, first).basis):
                 found, reason = _formulas(laboratory, first, degree, deadline)
                 if found or product is None:
                     return found, degree, reason
-        except NoPoint as error:
-            return [], degree - 1, str(error)
+            tried = degree
+    except NoPoint as error:
+        return [], tried, str(error)
     if product is not None:
         return [product], product.degree(dim), ""
-    return [], top, ""
+    return [], tried, "" if tried == top else f"the time was over at degree {tried + 1}"
+
+
+def _leaps(dim: int, top: int) -> list[int]:
+    """Some degrees up to `top`, each with at most half as many monomials as the next of them, where there are such.
+
+    >>> _leaps(3, 12), _leaps(6, 5)
+    ([0, 1, 2, 4, 6, 9, 12], [0, 1, 2, 3, 4, 5])
+    """
+    if top < 0:
+        return []
+    below = (d for d in range(top - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + top, top))
+    return [*_leaps(dim, next(below, top - 1)), top]
+
+
+def _spaces(
+    map_: ModularMap, leaps: Sequence[int], until: float, progress: Callable[[str], None]
+) -> Iterator[tuple[int, DarbouxSpace]]:
+    """The spaces of the degrees in `leaps`, until the time is over, each after those of the degrees it leapt over.
+
+    These are passed over where it is empty, as they are then.
+    """
+    below = -1
+    for leap in leaps:
+        if time.monotonic() > until:
+            return
+        progress(f"densities of degree {leap}")
+        whole = _space(map_, leap)
+        for degree in range(below + 1, leap):
+            if whole.basis:
+                yield degree, _space(map_, degree)
+        yield leap, whole
+        below = leap
 
 
 def _product_of_variables(laboratory: Laboratory, max_degree: int | None) -> list[FoundDensity]:

@@ -21,12 +21,17 @@ from typing import Any
 from flint import fmpq_mpoly, nmod_mat
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.modular_matrices import echelon, integers, kernel_vectors, null_space, rank
+from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, rank, split_columns
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, monomial_tables, slope_values
-
-Exponent = tuple[int, ...]
+from kahanmaps.laboratory.modular_points import (
+    Exponent,
+    ModularMap,
+    Point,
+    exponents_up_to,
+    monomial_tables,
+    slope_values,
+)
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
@@ -38,18 +43,19 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 class OrbitRelations:
     """The polynomials up to a degree that vanish along one orbit.
 
-    They span a space of this `dimension`. The columns of `kernel` that are not 0 are a basis, on the monomials of
-    `exponents_up_to` that degree or, where multiples were left out, on the others; the rest of the space follows.
-    `leading` are the last monomials of the basis, whose multiples are dependent in any higher degree; `normals` is a
-    basis of the span of the gradients at the last point, `end`; `period` is the number of points of an orbit that
-    closed, else None.
+    They span a space of this `dimension`; on the orbit `independent` monomials are independent. `form` is the reduced
+    echelon form of the values of the monomials of `exponents_up_to` that degree or, where multiples were left out, of
+    the others, whose relations the rest of the space follows from. `leading` are the monomials that depend on those
+    before them, and their multiples in any higher degree do; `normals` is a basis of the span of the gradients at a
+    `point`; `period` is the number of points of an orbit that closed, else None.
     """
 
-    kernel: nmod_mat
+    form: nmod_mat
+    independent: int
     dimension: int
     normals: list[list[int]]
     period: int | None
-    end: Point
+    point: Point
     leading: frozenset[Exponent] = frozenset()
 
     @property
@@ -60,7 +66,7 @@ class OrbitRelations:
     @cached_property
     def vectors(self) -> list[list[int]]:
         """The reduced echelon basis, where no monomials were left out."""
-        return kernel_vectors(self.kernel, self.dimension, self.kernel.modulus())
+        return echelon(kernel(self.form, self.independent), self.form.modulus())
 
 
 @dataclass(frozen=True)
@@ -117,20 +123,21 @@ def relations_on_orbit(
     `leading` are those of relations of lower degrees: proper multiples of them are left out, dependent as they are.
     Raises NoPoint where orbits meet the singular set.
     """
-    prime, exponents = map_.prime, exponents_up_to(map_.dim, degree)
+    exponents = exponents_up_to(map_.dim, degree)
     support = _not_multiples(map_.dim, degree, leading)
     most = len(support) if most is None else min(most, len(support))
-    rows, end, period = map_.along_orbit(degree, len(exponents) + _SPARE, most + _SPARE)
-    slopes = slope_values(end, degree, prime)
-    if leading:
-        rows, slopes = ([[row[k] for k in support] for row in table] for table in (rows, slopes))
-    kernel, nullity = nmod_mat(rows, prime).nullspace()
-    last = (max(i for i in range(len(support)) if kernel[i, k]) for k in range(nullity))
-    found = frozenset(exponents[support[i]] for i in last)
-    if len(support) - nullity > most or not leading <= found:
+    rows, point, period = map_.along_orbit(degree, most + _SPARE, support)
+    form, independent = matrix(rows, map_.prime).rref()
+    first, free = split_columns(form, independent)
+    found = frozenset(exponents[support[k]] for k in free)
+    if independent > most or not leading <= found:
         return relations_on_orbit(map_, degree)  # what was known is of special orbits
-    normals = echelon(integers((nmod_mat(slopes, prime) * kernel).transpose()), prime)
-    return OrbitRelations(kernel, len(exponents) - len(support) + nullity, normals, period, end, found)
+    # The gradient of a relation is that of its last monomial minus what those of the independent ones make of it.
+    slopes = [[row[k] for k in support] for row in slope_values(point, degree, map_.prime)]
+    of_first = [[row[k] for k in first] + [0] * (form.nrows() - independent) for row in slopes]
+    gradients = matrix(slopes, map_.prime) - matrix(of_first, map_.prime) * form
+    normals = echelon(integers(gradients.transpose()), map_.prime)
+    return OrbitRelations(form, independent, len(exponents) - independent, normals, period, point, found)
 
 
 def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
@@ -150,7 +157,7 @@ def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> l
     """The reduced echelon basis of the span of the relations of all orbits."""
     deadline = time.monotonic() + seconds
     first, still = relations_on_orbit(map_, degree), 0
-    found, most = first.vectors, first.kernel.ncols() - first.dimension
+    found, most = first.vectors, first.independent
     while found and still < 2 and time.monotonic() < deadline:
         more = echelon([*found, *relations_on_orbit(map_, degree, most).vectors], map_.prime)
         still = still + 1 if len(more) == len(found) else 0
@@ -220,7 +227,7 @@ def orbit_profile(
         nullities.append(min(one.dimension for one in found))
         codimensions.append(min(one.codimension for one in found))
         together = [
-            rank([*one.normals, *known(map_, one.end)], map_.prime) for map_, one in zip(maps, found, strict=True)
+            rank([*one.normals, *known(map_, one.point)], map_.prime) for map_, one in zip(maps, found, strict=True)
         ]
         with_known = max(with_known, min(together))
         if period is None and len({one.period for one in found}) == 1:

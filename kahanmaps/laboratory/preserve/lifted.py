@@ -70,16 +70,17 @@ class Lifted(ModularMap):
         ]
 
     def along_orbit(
-        self, degree: int, count: int, used: int | None = None
+        self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[list[list[int]], Point, int | None]:
         """The values along an orbit, as for other maps."""
         points, shift = self.orbit(count + self.lift.shift), self.lift.shift
         closed = len(points) < count + shift
         ahead = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
         rows = [self._values(x, y) for x, y in zip(points, ahead, strict=False)]
-        return rows[:used], points[-1], len(points) if closed else None
+        chosen = rows if support is None else [[row[k] for k in support] for row in rows]
+        return chosen, points[0], len(points) if closed else None
 
-    def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
+    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
         """The values at a point, and those a step later."""
         points = [x, image]
         while len(points) < self.lift.shift + 2:
@@ -88,7 +89,7 @@ class Lifted(ModularMap):
                 raise NoPoint("iterates of a random point modulo a prime have no value")
             points.append(after)
         here, there = (self._values(points[k], points[k + self.lift.shift]) for k in (0, 1))
-        return here, there
+        return [by[0] * value for value in here], [by[1] * value for value in there]
 
 
 def lifted_spaces(map_: ModularMap, lift: Lift) -> list[DarbouxSpace]:

@@ -154,9 +154,8 @@ class Scanned:
             else:
                 rows = []
                 for x, image in over.pairs(sizes[-1] + _SPARE):
-                    above, below = over.determinant(x, image)
-                    here, there = over.moved(x, image, top)
-                    rows.append([(below * b - above * a) % p for a, b in zip(here, there, strict=True)])
+                    here, there = over.moved(x, image, top, over.determinant(x, image))
+                    rows.append([b - a for a, b in zip(here, there, strict=True)])
         except NoPoint:
             return None
         return tuple(rank([row[:size] for row in rows], p) for size in sizes)

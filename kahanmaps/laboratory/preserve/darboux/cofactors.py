@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import sub
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -212,11 +213,12 @@ def cofactor_space(
     terms = len(exponents_up_to(dim, degree))
     places = range(terms) if model is None else model.places
     rows = []
-    for (x, image), (above, below) in zip(
+    for (x, image), sides in zip(
         sample.pairs[: points_needed(dim, degree, model)], sample.values(product), strict=False
     ):
-        here, there = sample.map.moved(x, image, degree)
-        rows.append([(below * there[k] - above * here[k]) % prime for k in places])
+        here, there = sample.map.moved(x, image, degree, sides)
+        row = list(map(sub, there, here))
+        rows.append(row if model is None else [row[k] for k in places])
     vectors = [dict(zip(places, vector, strict=True)) for vector in null_space(rows, len(places), prime)]
     whole = [[vector.get(k, 0) for k in range(terms)] for vector in vectors]
     return DarbouxSpace.spanned_by(dim, degree, whole, prime)

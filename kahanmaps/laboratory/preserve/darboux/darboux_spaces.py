@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from flint import nmod_mat
 
 from kahanmaps.algebra.matrices import combination_of
-from kahanmaps.algebra.modular_matrices import combine, echelon, integers, null_space, pivots, rank
+from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
 from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to, gradient_values, product_of
 from kahanmaps.laboratory.preserve.hirota_kimura import span_of_relations
 
@@ -127,9 +127,9 @@ def _complement(inner: Vectors, outer: Vectors, prime: int) -> Vectors:
 def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
     """The values of the polynomials at random points and at their images: one row a point."""
     prime = map_.prime
-    matrix = nmod_mat(basis, prime).transpose()
+    polynomials = matrix(basis, prime).transpose()
     here, there = (
-        nmod_mat(list(rows), prime) * matrix
+        matrix(rows, prime) * polynomials
         for rows in zip(*(map_.moved(x, image, degree) for x, image in map_.pairs(count)), strict=True)
     )
     return here, there
@@ -153,11 +153,11 @@ def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_m
         rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
     solutions = []
     for vector in null_space(rows, len(places), prime):
-        matrix = nmod_mat(size, size, prime)
+        A = nmod_mat(size, size, prime)
         for (a, b), entry in zip(places, vector, strict=True):
-            matrix[a, b] = entry
-            matrix[b, a] = -entry
-        solutions.append(matrix)
+            A[a, b] = entry
+            A[b, a] = -entry
+        solutions.append(A)
     return solutions
 
 

@@ -92,23 +92,24 @@ class ModularFlow(ModularMap):
         here = monomial_values(x, self.degree, self.prime)
         return 1 + sum(c * here[k] for c, k in self._divergence), 1
 
-    def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
-        """The values of all monomials P up to a degree, and of P + f . grad P."""
+    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
+        """The values of all monomials P up to a degree, and of P + f . grad P; times two numbers."""
         p = self.prime
         here = monomial_values(x, degree, p)
         f = [after - before for before, after in zip(x, image, strict=True)]
         there = [
-            (value + sum(e * here[place] * f[k] for k, e, place in slopes)) % p
+            (value + sum(e * here[place] * f[k] for k, e, place in slopes)) * by[1] % p
             for value, slopes in zip(here, monomial_tables(self.dim, degree), strict=True)
         ]
-        return here, there
+        return [by[0] * value % p for value in here], there
 
     def along_orbit(
-        self, degree: int, count: int, used: int | None = None
+        self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[list[list[int]], Point, int | None]:
         """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
         start = self.random_point()
-        return self.series(start, degree, used or count), start, None
+        rows = self.series(start, degree, count)
+        return rows if support is None else [[row[k] for k in support] for row in rows], start, None
 
     def series(self, start: Point, degree: int, count: int) -> list[list[int]]:
         """The first `count` Taylor coefficients of all monomials along the solution from a point: a row an order."""
