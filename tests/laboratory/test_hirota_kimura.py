@@ -121,7 +121,9 @@ def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, with_kno
 
     def along(map_, degree, leading):
         count, codimension, period = degrees[degree - 1][next(k for k, one in enumerate(maps) if one is map_)]
-        return OrbitRelations(nmod_mat(0, 0, 101), 0, count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ())
+        return OrbitRelations(
+            nmod_mat(0, 0, 101), 0, count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ()
+        )
 
     monkeypatch.setattr(module, "relations_on_orbit", along)
     found = orbit_profile(maps, known=lambda map_, point: [[1, 1, 0]], max_degree=2)

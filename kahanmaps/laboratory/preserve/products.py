@@ -16,16 +16,16 @@ Lyness, (x, y) -> (y, (a + y)/x), neither x nor y is one, and dx dy/(x y) is inv
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import lru_cache, reduce
 from math import prod
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import (
     RationalFunction,
@@ -43,7 +43,7 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolate
 from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.limit.flow import coefficient_rows
-from kahanmaps.maps.implicit import StepOver
+from kahanmaps.maps.implicit import BirationalMap, StepOver
 from kahanmaps.systems.polynomial import PolynomialField
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
@@ -106,33 +106,40 @@ def candidates(
         return list(laboratory.flow_polynomials().functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     known = [one.polynomial for one in cofactors if one.polynomial is not None]
+    found = dict(_irreducible((*context.gens()[:n], *known), n, laboratory.eps))
+    found |= _jacobians(laboratory.map, laboratory.eps, laboratory.system is not None)
+    found |= _irreducible(more, n, laboratory.eps)
+    return sorted(found.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
+
+
+def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) -> dict[str, fmpq_mpoly]:
+    """The irreducible factors in the first n variables, primitive, by their text."""
     found: dict[str, fmpq_mpoly] = {}
-    for P in (*context.gens()[:n], *known, *_jacobians(laboratory), *more):
-        if laboratory.eps is not None:
-            at: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
+    for P in polynomials:
+        if eps is not None:
+            at: dict[str | int, int | fmpz | fmpq] = {"eps": eps}
             P = P.subs(at)
         for factor, _ in [] if P.is_zero() else P.factor()[1]:
             if degree_in(factor, n):
                 one = primitive_part(factor)[1]
                 found.setdefault(str(one), one)
-    return sorted(found.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
+    return found
 
 
-def _jacobians(laboratory: Laboratory) -> list[fmpq_mpoly]:
-    """Numerators and denominators of det dPhi^-1 and, for systems, of det dPhi: among the cofactors of other maps."""
-    map_, found = laboratory.map, list[fmpq_mpoly]()
-    n = map_.dim
-    for backward in (False, True) if laboratory.system is not None else (True,):
+@lru_cache(maxsize=4)  # searches for integrals and densities ask for the same, which may take half a second
+def _jacobians(map_: BirationalMap, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
+    """Factors of numerators and denominators of det dPhi^-1 and, with `both`, of det dPhi."""
+    n, sides = map_.dim, list[Function]()
+    for backward in (False, True) if both else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
-        *x, eps = field.variables
+        *x, step = field.variables
         try:
-            local = map_.at(eps, field, x[n:])
+            local = map_.at(step, field, x[n:])
             local = local.inverse if backward else local
-            sides = jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
+            sides += jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
-        found += [part for side in sides for part in (side.above, side.below)]
-    return found
+    return _irreducible((part for side in sides for part in (side.above, side.below)), n, eps)
 
 
 class _Line:

@@ -79,15 +79,18 @@ def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
     """The two sparsest elements of a pencil: among those that lack a monomial which others have."""
     degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
     P, Q = basis
-    members: dict[tuple[int, ...], list[int]] = {}
-    for a, b in zip(P, Q, strict=True):
-        if a or b:
-            member = [(b * p - a * q) % prime for p, q in zip(P, Q, strict=True)]
-            last = max(k for k, entry in enumerate(member) if entry)
-            inverse = pow(member[last], -1, prime)
-            members[tuple(k for k, entry in enumerate(member) if entry)] = [c * inverse % prime for c in member]
-    keys = sorted(members, key=lambda places: (degrees[places[-1]], len(places), places))
-    return [members[key] for key in keys[:2]]
+    used = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
+    zeros: dict[int | None, set[int]] = {}  # of the members that lack something
+    for k in used:
+        zeros.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
+    supports = [[k for k in used if k not in lacking] for lacking in zeros.values()]
+    found = []
+    for support in sorted(supports, key=lambda places: (degrees[places[-1]], len(places), places))[:2]:
+        first = next(k for k in used if k not in support)
+        member = [(Q[first] * p - P[first] * q) % prime for p, q in zip(P, Q, strict=True)]
+        inverse = pow(member[support[-1]], -1, prime)
+        found.append([c * inverse % prime for c in member])
+    return found
 
 
 def darboux_spaces(
