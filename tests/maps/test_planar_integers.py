@@ -19,7 +19,7 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planar_integers
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.maps.normal_form.planar_integers import IntegerBlock, divide_exactly
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock, common_part, divide_exactly
 
 GENERAL = integer_block(*STARTS["three real roots, irrational"])
 
@@ -162,3 +162,21 @@ def test_the_discriminant_is_the_product_of_the_squared_differences_of_roots(r, 
     )
     differences = [p[0] * q[1] - p[1] * q[0] for p, q in ((r, s), (s, t), (t, r))]
     assert PlanarBlock(*cubic).discriminant == (differences[0] * differences[1] * differences[2]) ** 2
+
+
+@given(
+    numbers=st.lists(st.integers(-(10**6), 10**6), min_size=1, max_size=3),
+    shared=st.lists(st.sampled_from([2, 3, 5, 7]), max_size=12),
+    power=st.sampled_from([2, 6, 30, 9 * 125]),
+)
+def test_what_numbers_have_in_common_in_some_primes(numbers, shared, power):
+    assume(any(numbers))
+    product = 1
+    for prime in shared:
+        product *= prime
+    common = gcd(*(product * number for number in numbers))
+    expected = 1
+    for prime in (2, 3, 5):
+        while power % prime == 0 and common % (expected * prime) == 0:
+            expected *= prime
+    assert common_part([fmpz(product * number) for number in numbers], fmpz(power)) == expected

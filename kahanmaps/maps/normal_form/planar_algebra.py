@@ -20,7 +20,7 @@ from flint import acb, arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock, radical, without
+from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock, bad_part, common_part, radical, without
 
 _SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
 _LEAST = arb(2) ** -50  # of the lengths at the roots, against the greatest
@@ -102,9 +102,11 @@ class AlgebraBlock(LevelBlock):
                 below = below.lcm(entry.q)
             return [(entry * below).p for entry in above], below, below
         cofactor, norm = _adjugate(W)
-        below = norm.p
         above = [entry.p for z in (U, V) for entry in _times(z, cofactor).coefficients]
-        return above, below, reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
+        content = reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
+        rest, part = bad_part(content, self.bad)
+        common = common_part([norm.p, *above], self.bad**4 * part)  # taken out once rather than from every coordinate
+        return [entry // common for entry in above], norm.p // common, rest
 
     def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
         """A number with the primes at which form and denominator may cancel; None if they may at all.

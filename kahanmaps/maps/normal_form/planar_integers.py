@@ -251,6 +251,17 @@ def bad_part(number: fmpz, bad: fmpz) -> tuple[fmpz, fmpz]:
     return number, part
 
 
+def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
+    """What numbers, not all of them zero, have in common in the primes of `power`, any product of powers of them."""
+    while True:
+        common = power
+        for number in numbers:
+            common = common.gcd(number % common)
+        if common == 1 or is_all(common, power):
+            return common
+        power = power * power
+
+
 def strip(triple: Sequence[fmpz], bad: fmpz, divisor: fmpz | None = None, power: fmpz | None = None) -> IntegerTriple:
     """The triple without the common factors that its entries have in the primes of `bad`; and divided by `divisor`.
 
