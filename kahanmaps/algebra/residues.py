@@ -139,5 +139,5 @@ def from_residues(
                     guesses = []
                     break
                 guesses.append(guess)
-            next_guess = count + 1 + count // 4
+            next_guess = count + 1 + count // 6
     return None

@@ -154,6 +154,8 @@ class _Search:
 
     def _residues(self, prime: int, length: int) -> Rows | None:
         """So many points from the start on modulo a prime, one for each step of a factor."""
+        if len(self.factors) == 1:
+            return self.factors[0].integer_steps.residues(self._start, prime, length)
         point = residue(self._start, prime)
         points: Rows = []
         while point is not None and len(points) < length:

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from itertools import product
 from math import prod
 
-from flint import nmod, nmod_mat
+from flint import nmod
 
-from kahanmaps.algebra.modular_matrices import echelon, null_space, pivots
+from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, pivots
 from kahanmaps.maps.orbits.relations.forms import forms
 from kahanmaps.maps.orbits.relations.somos import around, first_terms
 
@@ -118,8 +118,8 @@ def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
     # Sections t are such that t g is a sum of products for products g of coordinates of the points before: of the last
     # ones, which are 1, and of combinations that have no zeros in common with these. Sums are what `checks` annihilate.
     values = [[row[k] for k in sections.products] for row in _table(points, coordinates, count, lag, prime)]
-    sums = nmod_mat(values[: sections.rows], prime)
-    checks, number = sums.transpose().nullspace()
+    sums = matrix(values[: sections.rows], prime)
+    checks = kernel(*sums.transpose().rref())
     factors = [
         [(1, sum((j + 2) ** 3 * x for j, x in enumerate(one))) for one in before]
         for _, *before in _together(points, count, lag)[: sections.rows]
@@ -127,12 +127,11 @@ def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
     weighed = []
     for chosen in list(product((0, 1), repeat=count - 1))[1:]:
         g = [prod(one[i] for one, i in zip(before, chosen, strict=True)) % prime for before in factors]
-        weighed += [[int(checks[n, k]) * x % prime for n, x in enumerate(g)] for k in range(number)]
-    kernel, nullity = (nmod_mat(weighed, prime) * sums).nullspace()
-    if nullity != sections.degree:
+        weighed += [[c and c * x % prime for c, x in zip(check, g, strict=True)] for check in checks]
+    found = kernel(*(matrix(weighed, prime) * sums).rref())
+    if len(found) != sections.degree:
         return None
-    found = nmod_mat(values, prime) * kernel
-    return [[int(found[n, k]) for k in range(nullity)] for n in range(len(values))]
+    return integers(matrix(values, prime) * matrix(found, prime).transpose())
 
 
 def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime: int) -> Rows:
@@ -152,7 +151,7 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
     pencil = null_space(values[: degree - 2], degree, prime)
     if len(pencil) != 2:
         return None
-    quotients = nmod_mat(values[degree - 2 : degree - 2 + _VALUES], prime) * nmod_mat(pencil, prime).transpose()
+    quotients = matrix(values[degree - 2 : degree - 2 + _VALUES], prime) * matrix(pencil, prime).transpose()
     z = [nmod(int(quotients[n, 0]), prime) / int(quotients[n, 1]) for n in range(quotients.nrows())]
     shift = 2 * (first + degree - 2) + (degree - 2) * first + (degree - 2) * (degree - 3) // 2  # of u, for z[0]
     found = _sequence(z, prime)

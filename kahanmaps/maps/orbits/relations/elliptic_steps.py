@@ -87,18 +87,23 @@ class Coordinates:
     """A group of coordinates on one curve: `forms` has a row for each of them, the last one for their denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
-        self._degree, self._forms, self._W, self._U, self._primes = degree, forms, W, U, primes
+        self._degree, self._W, self._U, self._primes = degree, W, U, primes
         self._exponents = exponents(degree)
+        # What a column has in common is multiplied once, by numbers shorter than its entries are multiplied by.
+        self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
+        self._forms = fmpz_mat([[c // g for c, g in zip(row, self._common, strict=True)] for row in forms.tolist()])
 
     def at(self, n: int) -> list[fmpz]:
         """Numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError where it or a term is 0."""
         W, U = self._W, self._U
         ratio, part = U.ratio(n), W.part(n)
-        weights = primitive_integers(tuple(ratio**k * part**j for k, _, j in self._exponents))
+        weights = primitive_integers(
+            tuple(g * ratio**k * part**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
+        )
         first, second = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
         here, (square, outer) = W.integer(n), W.pair(n)
         first, second = (first, second * here) if self._degree % 2 else (first * here, second)
-        powers = {(i, j): square**i * outer**j for _, i, j in self._exponents}
+        powers = {(i, j): square**i * outer**j for i, j in {(i, j) for _, i, j in self._exponents}}
         column = [
             weight * (second if k else first) * powers[i, j]
             for weight, (k, i, j) in zip(weights, self._exponents, strict=True)
