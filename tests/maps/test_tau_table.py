@@ -125,6 +125,15 @@ def test_no_number_is_longer_than_the_result(name, n, monkeypatch):
 # Where it does not apply.
 
 
+@over_smooth
+def test_the_bits_of_a_point_are_bounded_before_it_is_made(name):
+    block = integer_block(*STARTS[name])
+    for n in range(8, 60):
+        bound, point = tau_table.most_bits(block, n), tau_table.iterate(block, n)
+        longest = max(entry.bit_length() for entry in point)
+        assert longest <= bound <= 1.1 * longest + 900
+
+
 @pytest.mark.parametrize("name", ["three real roots, irrational", "P_{-1}, P_0, P_1 on a line", "chi_2 = 0"])
 def test_few_steps_are_left_to_the_steps(name):
     block = integer_block(*STARTS[name])

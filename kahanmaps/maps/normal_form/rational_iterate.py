@@ -27,9 +27,11 @@ from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form import tau_table, translation
 from kahanmaps.maps.normal_form.periods import Kind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Block, PlanesPoint
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.tau_table import most_bits
 
 _RISE = 16  # steps over which a rise of the heights is more than a fluctuation
 _WALKED = 256  # steps taken exactly at first,
@@ -104,6 +106,12 @@ class RationalOrbit:
         The value is None if it was not computed, or is at a pole.
         """
         step = max(1, min(self._far, n - 1))
+        if self._planes.is_within(n, step, self._limit):
+            try:
+                value = self._planes.point(n)
+            except SingularStep:
+                return n, None, 0
+            return n, value, value.exceeding(self._limit)
         target, before = n if self._planes.lazy else _halved(n, step), None
         while True:
             try:
@@ -216,6 +224,19 @@ class _Planes:
         if any(W == 0 for _, _, W in triples):
             raise _no_value(n - 1)
         return PlanesPoint(self._assembly, triples)
+
+    def is_within(self, n: int, step: int, limit: int) -> bool:
+        """Whether step n is sure to be, and not far beyond what was sure before: from what points would be made of."""
+        if self.lazy or not all(isinstance(block, IntegerBlock) for block in self.blocks):
+            return False
+        while True:
+            step = _halved(n, step)
+            bits = [most_bits(block, plane.reduced(step)) for block, plane in zip(self.blocks, self._planes, strict=True)]
+            total = sum(known or 0 for known in bits) + self._assembly.excess
+            if None in bits or total > limit or (step < n and 4 * total > limit):
+                return False
+            if step == n:
+                return True
 
     def first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
         """The first step up to n without a value; `value` is the n-th, to be compared modulo a prime."""

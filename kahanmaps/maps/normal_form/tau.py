@@ -80,6 +80,11 @@ class TauStart:
         self._divisor = numbers.divisor(self.chi[0])
         self._one = one
 
+    @property
+    def lift_bits(self) -> int:
+        """The bit length of the longest entry of the three points, over Q."""
+        return max(int(entry.bit_length()) for lift in self._lifts for entry in lift)
+
     def point(self, chi: Sequence[Any], products: Sequence[Any], ratio: Any, next_ratio: Any) -> Triple:
         """P_n, primitive over Q, from chi at n-1, n, n+1 and products of psi.
 

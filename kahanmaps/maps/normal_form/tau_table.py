@@ -48,16 +48,25 @@ def iterate(block: Any, n: int) -> Triple | None:
     if block.is_constant:
         at_rest: Triple = block.start
         return at_rest
-    table = block.table
-    if table is None or table.points_taken >= _SHARED:
-        start = _start(block)
-        if start is None:
-            return None
-        table = block.table = TauTable(start)
-    if n - table.base < _FIRST:
+    table = _table(block)
+    if table is None or n - table.base < _FIRST:
         return None
     found: Triple = table.point(n - table.base)
     return found
+
+
+def most_bits(block: Any, n: int) -> int | None:
+    """A number of bits that no entry of P_n over Q has more of, from what P_n is made of; None as for `iterate`."""
+    table = None if block.is_constant else _table(block)
+    return None if table is None or n - table.base < _FIRST else table.most_bits(n - table.base)
+
+
+def _table(block: Any) -> TauTable | None:
+    if block.table is None or block.table.points_taken >= _SHARED:
+        start = _start(block)
+        block.table = None if start is None else TauTable(start)
+    table: TauTable | None = block.table
+    return table
 
 
 def _start(block: Any) -> TauStart | None:
@@ -136,6 +145,13 @@ class TauTable:
         before, here, after = self.psi[n - 1], self.psi[n], self.psi[n + 1]
         chi = [self.chi[n - 1], self.chi[n], self.chi[n + 1]]
         return self._start.point(chi, [before * after, here * after, before * here], self._r[n], self._r[n + 1])
+
+    def most_bits(self, n: int) -> int:
+        """What the terms of P_n may have at most, over Q."""
+        psi, chi = ([table[k].bit_length() for k in (n - 1, n, n + 1)] for table in (self.psi, self.chi))
+        scales = sum(scale.p.bit_length() + scale.q.bit_length() for scale in (self._r[n], self._r[n + 1]))
+        terms = max(sum(psi) - one + other for one, other in zip(psi, chi, strict=True))
+        return int(terms + scales + self._start.lift_bits + 2)
 
     def _new_psi(self, n: int) -> Any:
         k = n // 2
