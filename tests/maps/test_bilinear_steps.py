@@ -23,6 +23,7 @@ from kahanmaps.maps.orbits.integer_steps import lowest
 def early(monkeypatch):
     """Forms are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_LONG", 20)
+    monkeypatch.setattr(rational_orbit, "_LONG_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
 
 
@@ -124,12 +125,17 @@ def test_relations_are_looked_for_where_they_may_pay(monkeypatch):
     monkeypatch.setattr(rational_orbit, "relations", lambda *given: asked.append(given))
     walked(over("lorenz"), begin(over("lorenz")), 8)  # numbers double
     assert not asked
-    for least in (100, 140, 200, 300):
-        monkeypatch.setattr(rational_orbit, "_LONG", least)
+    for name, least in [("_LONG_BY_COORDINATES", k) for k in (100, 140, 200, 300)] + [("_LONG", 5000)]:
+        monkeypatch.setattr(rational_orbit, name, least)
         points, _ = walked(over("euler_top"), begin(over("euler_top")), 30)
         at = points.index(asked.pop()[2])
-        assert points[at].bits >= 16 * least > points[at - 1].bits
+        assert points[at].bits >= (least if name == "_LONG" else 16 * least) > points[at - 1].bits
+        for most, count in ((2 * points[at].bits, 0), (2 * points[at].bits + 2, 1)):  # few steps are left, or enough
+            list(rational_orbit.RationalOrbit(over("euler_top"), begin(over("euler_top")), most))
+            assert len(asked) == count
+        asked.clear()
     monkeypatch.setattr(rational_orbit, "_LONG", 0)
+    monkeypatch.setattr(rational_orbit, "_LONG_BY_COORDINATES", 0)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 8)
     points, _ = walked(
         over("weierstrass"), IntegerPoint.from_rationals((fmpq(3**60 + 2, 2**100), fmpq(-(7**40), 2**100))), 14

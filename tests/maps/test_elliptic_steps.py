@@ -5,6 +5,7 @@ orbits lie on elliptic curves, also on several in turn, and nowhere else; what i
 """
 
 from functools import reduce
+from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
@@ -32,6 +33,7 @@ small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x:
 def early(monkeypatch):
     """Sequences are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_LONG", 20)
+    monkeypatch.setattr(rational_orbit, "_LONG_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
     monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: None)
     monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 1)
@@ -349,7 +351,8 @@ def test_numbers_that_are_as_long_as_points_are_not_looked_for(monkeypatch):
     monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 100)
     monkeypatch.setattr(elliptic, "image_modulo", lambda *given: asked.append(given) or image_modulo(*given))
     image_modulo = elliptic_steps.image_modulo
-    assert elliptic.elliptic_steps(map_over, begin(map_over), 600) is None
+    with pytest.raises(elliptic.TooLong):
+        elliptic.elliptic_steps(map_over, begin(map_over), 600)
     assert len(asked) < 600
 
 
@@ -430,3 +433,24 @@ def test_where_a_point_is_not_given_single_steps_start_from_the_one_before(monke
     monkeypatch.setattr(elliptic_steps.EllipticSteps, "point", lambda *_: None)
     points = [*rational_orbit.RationalOrbit(map_over, expected[0], 60_000, wanted={80}.__contains__)]
     assert points[80] == expected[80]
+
+
+def test_numbers_that_are_too_long_are_looked_for_again_along_longer_points(monkeypatch):
+    asked = []
+
+    def counted(map_over, start, bits):
+        asked.append(bits)
+        return elliptic.elliptic_steps(map_over, start, bits)
+
+    monkeypatch.setattr(rational_orbit, "elliptic_steps", counted)
+    monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 100)
+    map_over = over("repaired_octahedral")
+    points, orbit = walked(map_over, begin(map_over), 40)
+    assert points == single_steps(map_over, begin(map_over), 40)
+    assert len(asked) > 1
+    assert all(later >= 4 * sooner for sooner, later in pairwise(asked))
+    assert points[orbit.since - 1].bits == asked[-1]
+    asked.clear()
+    monkeypatch.setattr(elliptic, "_MOST_PRIMES", 2)  # along longer points there would be no more
+    again, orbit = walked(map_over, begin(map_over), 40)
+    assert (again, orbit.relations, len(asked)) == (points, None, 1)

@@ -231,7 +231,9 @@ class _Planes:
             return False
         while True:
             step = _halved(n, step)
-            bits = [most_bits(block, plane.reduced(step)) for block, plane in zip(self.blocks, self._planes, strict=True)]
+            bits = [
+                most_bits(block, plane.reduced(step)) for block, plane in zip(self.blocks, self._planes, strict=True)
+            ]
             total = sum(known or 0 for known in bits) + self._assembly.excess
             if None in bits or total > limit or (step < n and 4 * total > limit):
                 return False

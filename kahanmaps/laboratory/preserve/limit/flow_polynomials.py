@@ -23,7 +23,7 @@ from flint import fmpq_mpoly, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.modular_matrices import combine, null_space, rank
+from kahanmaps.algebra.modular_matrices import combine, matrix, null_space, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import random_prime, rational_vector
 from kahanmaps.errors import BadPrime
@@ -235,7 +235,7 @@ class _Line:
         values: list[tuple[int, ...]] = []
         for t in range(top + 1):
             *rows, last, following = flow.series(self.at(t), self.degree, size + 1)
-            minors = (nmod_mat([*rows, one], p) * mix for one, mix in zip((last, following), mixes, strict=True))
+            minors = (matrix([*rows, one], p) * mix for one, mix in zip((last, following), mixes, strict=True))
             values.append(tuple(int(minor.det()) for minor in minors))
         first, second = (interpolated(range(top + 1), column, p) for column in zip(*values, strict=True))
         return first.gcd(second)

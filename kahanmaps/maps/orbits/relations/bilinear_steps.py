@@ -20,10 +20,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flint import fmpq, fmpz, fmpz_mat, nmod_mat
+from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
-from kahanmaps.algebra.modular_matrices import echelon, pivots
+from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, pivots
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.elimination import ExactDivisor
@@ -140,10 +140,10 @@ def _factors(
         rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
         rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
     used = list(range(3 * unknowns)) if used is None else used
-    kernel, nullity = nmod_mat([[row[k] for k in used] for row in rows], prime).nullspace()
-    if nullity != 1:
+    relations = kernel(*matrix([[row[k] for k in used] for row in rows], prime).rref())
+    if len(relations) != 1:
         return None
-    weights = {k: int(kernel[i, 0]) for i, k in enumerate(used)}
+    weights = dict(zip(used, relations[0], strict=True))
     factors = [sum(weights.get(2 * unknowns + k, 0) * entry for k, entry in enumerate(row)) % prime for row in values]
     return factors, [k for k, weight in weights.items() if weight]
 
@@ -152,9 +152,9 @@ def _solved(values: Rows, sides: Rows, prime: int) -> Rows | None:
     """The combinations of the columns of the first that are the columns of the second; None if one of them is not."""
     unknowns = len(values[0])
     try:
-        found = nmod_mat(values[:unknowns], prime).solve(nmod_mat(sides[:unknowns], prime))
+        found = matrix(values[:unknowns], prime).solve(matrix(sides[:unknowns], prime))
     except ZeroDivisionError:
         return None
-    if nmod_mat(values, prime) * found != nmod_mat(sides, prime):
+    if matrix(values, prime) * found != matrix(sides, prime):
         return None
-    return [[int(entry) for entry in column] for column in found.transpose().tolist()]
+    return integers(found.transpose())

@@ -36,13 +36,19 @@ _MOST_FACTORS = 8
 _LEFT_OUT = 3  # steps, where the start is special: as for W(0), terms of U near the beginning may be 0
 _FIRST = 2  # the least n of forms
 
+
+class TooLong(ArithmeticError):
+    """The orbit lies on elliptic curves, but numbers of its forms are too long to be found yet."""
+
+
 Groups = Sequence[tuple[int, ...]]  # of coordinates that have a denominator in common
 
 
 def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> EllipticSteps | None:
     """The steps of the orbit from a start; None where it is not known to lie on elliptic curves.
 
-    No numbers are looked for that are not much shorter than points with so many bits.
+    No numbers are looked for that are not much shorter than points with so many bits. Raises TooLong where there are
+    some that would be looked for along longer points.
     """
     unit = _unit(map_over.factors)
     most_primes = min(_MOST_PRIMES, bits // _BITS_FOR_A_PRIME)
@@ -64,6 +70,8 @@ def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> Ellipti
             if exact is not None and _is_proved(first, search, exact.steps(map_over)):
                 return exact.steps(map_over, left_out)
             if search.sections:  # there are numbers, but they are too long
+                if most_primes < _MOST_PRIMES:
+                    raise TooLong
                 return None
         if not is_special:
             break

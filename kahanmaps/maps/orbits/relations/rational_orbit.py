@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count
+from math import inf
 from typing import Protocol
 
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
-from kahanmaps.maps.orbits.relations.elliptic_orbit import elliptic_steps
+from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLong, elliptic_steps
 
-# Relations are looked for once, when points have _LONG times the square of the number of coordinates bits, and numbers
-# grow by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they pay. As their
-# coefficients are about as long as the start, points have to be longer.
-_LONG = 500
+# Relations are looked for when the steps so far took about as long as that, and numbers grow by less than _SLOW_GROWTH
+# in a step: elsewhere there are none, or no steps for which they pay. As their coefficients are about as long as the
+# start, points have to be longer; where coefficients are even longer, they are looked for again _AGAIN times as far.
+_LONG, _LONG_BY_COORDINATES = 4500, 300  # bits; the second is multiplied by the square of their number
+_AGAIN = 4
 _LONGER_THAN_START = 8
 _SLOW_GROWTH = 1.5
 
@@ -56,8 +58,9 @@ class RationalOrbit:
 
     def __iter__(self) -> Iterator[IntegerPoint | None]:
         last, reached = deque([self.start], maxlen=3), 0
-        is_tried = False
-        long = max(_LONG * (self.map.dim + 1) ** 2, _LONGER_THAN_START * self.start.bits)
+        by_coordinates = _LONG_BY_COORDINATES * (self.map.dim + 1) ** 2
+        long: float = max(_LONG, by_coordinates, _LONGER_THAN_START * self.start.bits)
+        too_late = inf if self.max_bits is None else self.max_bits / 2
         yield self.start
         for number in count(1):
             if self._skips(number, reached, last[-1]):
@@ -79,9 +82,12 @@ class RationalOrbit:
             before = last[-1]
             last.append(image)
             reached = number
-            if not is_tried and number > 1 and image.bits >= long and image.bits < _SLOW_GROWTH * before.bits:
-                is_tried = True
-                self.relations = relations(self.map, self.start, image)
+            if long < too_late and number > 1 and long <= image.bits < min(too_late, _SLOW_GROWTH * before.bits):
+                try:
+                    self.relations = relations(self.map, self.start, image)
+                    long = inf
+                except TooLong:
+                    long = _AGAIN * image.bits
                 self.since = None if self.relations is None else number + 1
 
     def _skips(self, number: int, reached: int, last: IntegerPoint) -> bool:
@@ -106,5 +112,5 @@ class RationalOrbit:
 
 
 def relations(map_over: MapOver, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
-    """The relations that make steps shortest along the orbit of a start, on which another point lies."""
+    """The relations that make steps shortest along the orbit of a start on which the point lies. Raises TooLong."""
     return elliptic_steps(map_over, start, point.bits) or bilinear_forms(map_over, point)
