@@ -141,10 +141,6 @@ class NormalForm(Displayed):
         z = [element[k] for element in (X, Y) for k in range(self.m)]
         return tuple((self.S * fmpq_mat(self.dim, 1, z)).entries())
 
-    def functional(self, element: Any) -> fmpq:
-        """l: the coefficient of t^(m-1)."""
-        return self._elements(element)[0][self.m - 1]
-
     def h(self, X: Any, Y: Any) -> fmpq_poly:
         """h(X, Y), an element of K."""
         X, Y = self._elements(X, Y)

@@ -96,10 +96,6 @@ class IntegerSteps:
         """Whether the map is sure to have this value there."""
         return is_the_solution(image, *self._equation(point))
 
-    def is_regular(self, point: IntegerPoint) -> bool:
-        """Whether M is sure to be invertible there: modulo a prime."""
-        return self.residues(point, 2**61 - 1, 2) is not None
-
     def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
         """So many points from this one on modulo a prime below 2^63, each with 1 behind its coordinates."""
         n, forms = self.dim, nmod_mat(self._forms, prime)
