@@ -332,14 +332,18 @@ class PrimeField(Field):
         if isinstance(value, int | fmpz) and not isinstance(value, bool):
             return self._element(value)
         number = rational(value)
-        below = self._element(number.q)
-        if below == 0:
+        try:
+            return (
+                self._element(number.p) / self._element(number.q)
+                if self._large is not None
+                else nmod(number, self.prime)
+            )
+        except ZeroDivisionError:
             raise BadPrime(
                 f"the prime {self.prime} divides the denominator of {_shorten(format_number(number))}: "
                 "take another prime",
                 self.prime,
-            )
-        return self._element(number.p) / below
+            ) from None
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
         return self._element(rng.randrange(self.prime))

@@ -160,9 +160,9 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     with field.working():
         for monomial, coefficient in polynomial.terms():
             term = field.convert(coefficient)
-            for i, exponent in enumerate(monomial):
+            for table, exponent in zip(powers, monomial, strict=True):
                 if exponent:
-                    term = term * _power(powers[i], exponent)
+                    term = term * _power(table, exponent)
             total = total + term
     return total
 
