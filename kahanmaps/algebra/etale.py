@@ -11,15 +11,16 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq, fmpq_mat, fmpq_poly, fmpz
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix, trace
 from kahanmaps.algebra.written.text import format_univariate
 from kahanmaps.errors import InputError
 
-# Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm.
-_LONG = 2000
+# Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm, and those from which
+# on products are made here.
+_LONG, _LONG_PRODUCT = 2000, 8000
 
 
 class EtaleAlgebra(Field):
@@ -131,7 +132,10 @@ class EtaleElement(Element):
         return EtaleElement(self.field, -self.polynomial)
 
     def _times(self, other: EtaleElement) -> EtaleElement:
-        return EtaleElement(self.field, self.polynomial * other.polynomial % self.field.chi)
+        first, second = self.polynomial, other.polynomial
+        is_long = first[0].p.bit_length() > _LONG_PRODUCT and second[0].p.bit_length() > _LONG_PRODUCT
+        product = _product(first, second) if is_long else first * second
+        return EtaleElement(self.field, product % self.field.chi)
 
     def _over(self, other: EtaleElement) -> EtaleElement:
         if max((max(c.p.bit_length(), c.q.bit_length()) for c in other.polynomial.coeffs()), default=0) > _LONG:
@@ -152,6 +156,23 @@ class EtaleElement(Element):
 
     def _same(self, other: EtaleElement) -> bool:
         return bool(self.polynomial == other.polynomial)
+
+
+def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
+    """The product of polynomials with long coefficients.
+
+    FLINT multiplies each coefficient by each; with a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j it is
+    one product for each pair.
+    """
+    count = max(first.length(), second.length())
+    a, b = ([numerator[k] for k in range(count)] for numerator in (first.numer(), second.numer()))
+    squares = [x * y for x, y in zip(a, b, strict=True)]
+    terms = [fmpz(0)] * (2 * count - 1)
+    for i in range(count):
+        terms[2 * i] += squares[i]
+        for j in range(i):
+            terms[i + j] += (a[i] + a[j]) * (b[i] + b[j]) - squares[i] - squares[j]
+    return fmpq_poly(terms, first.denom() * second.denom())
 
 
 class EtaleMatrix(EntryMatrix):

@@ -215,6 +215,14 @@ def test_both_ways_to_a_quotient_lead_to_the_same(field, monkeypatch):
     assert [a / b for a in elements for b in elements] == quotients
 
 
+@pytest.mark.parametrize("field", [GOLDEN, CUBIC, SPLIT], ids=repr)
+def test_both_ways_to_a_product_lead_to_the_same(field, monkeypatch):
+    elements = [*long_elements(field, 3), field.convert(7**900)]
+    products = [a * b for a in elements for b in elements]
+    monkeypatch.setattr("kahanmaps.algebra.etale._LONG_PRODUCT", 100)
+    assert [a * b for a in elements for b in elements] == products
+
+
 def test_a_long_zero_divisor_is_refused_too():
     with pytest.raises(ZeroDivisionError, match="zero divisor"):
         SPLIT.one / ((SPLIT.generator - 1) * 10**1000)

@@ -147,12 +147,3 @@ def test_a_wrong_iterate_does_not_pass(monkeypatch):
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
         NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 100)
-
-
-@over_fields
-def test_long_products_are_products(name):
-    algebra, rng = algebra_of(name), random.Random(name)
-    numbers = [[rng.getrandbits(9000) - 2**8999 for _ in range(algebra.degree)] for _ in range(2)]
-    first, second = (algebra.convert(fmpq_poly(entries)) for entries in numbers)
-    assert planar_algebra._bits(first) > planar_algebra._KARATSUBA
-    assert planar_algebra._times(first, second) == first * second

@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache, reduce
 from itertools import combinations, product
 from typing import Any
 
-from flint import acb, arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
+from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
@@ -24,7 +24,6 @@ from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock,
 
 _SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
 _LEAST = arb(2) ** -50  # of the lengths at the roots, against the greatest
-_KARATSUBA = 8000  # bits from which on `_times` is faster
 
 
 class AlgebraBlock(LevelBlock):
@@ -102,7 +101,7 @@ class AlgebraBlock(LevelBlock):
                 below = below.lcm(entry.q)
             return [(entry * below).p for entry in above], below, below
         cofactor, norm = _adjugate(W)
-        above = [entry.p for z in (U, V) for entry in _times(z, cofactor).coefficients]
+        above = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
         content = reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
         rest, part = bad_part(content, self.bad)
         common = common_part([norm.p, *above], self.bad**4 * part)  # taken out once rather than from every coordinate
@@ -182,26 +181,33 @@ class ShortElements:
         )
         return (value, self._algebra.one) if value == 0 else self.split(value)
 
-    @staticmethod
-    def lifts(points: Sequence[Triple]) -> Sequence[Triple]:
-        """The triples as they are."""
-        return points
+    def lifts(self, points: Sequence[Triple]) -> tuple[fmpz_mat, fmpz]:
+        """The matrix over Q that makes the sum of term times point of terms, all in the powers of t, in integers."""
+        degree = self._algebra.degree
+        blocks = [[point[i].matrix.tolist() for point in points] for i in range(3)]
+        rows = [[entry for block in row for entry in block[k]] for row in blocks for k in range(degree)]
+        return fmpq_mat(rows).numer_denom()
 
     def combined(
-        self, scales: Sequence[Any], terms: Sequence[Any], lifts: Sequence[Triple], inverse: EtaleElement
+        self, scales: Sequence[Any], terms: Sequence[Any], lifts: tuple[fmpz_mat, fmpz], inverse: EtaleElement
     ) -> Triple:
-        """The sum of scale times term times lift, times the inverse, in Z[t] and without a common integer factor."""
-        g, factors = self._algebra.chi, [(scale * inverse).polynomial for scale in scales]
-        raw = []
-        for i in range(3):
-            total = fmpq_poly([0])
-            for factor, term, lift in zip(factors, terms, lifts, strict=True):
-                total += (factor * lift[i].polynomial % g) * term.polynomial
-            raw.append(total % g)
-        below = fmpz(1)
-        for entry in raw:
-            below = below.lcm(entry.denom())
-        U, V, W = (EtaleElement(self._algebra, entry if below == 1 else entry * below) for entry in raw)
+        """The sum of scale times term times lift, times the inverse, in Z[t] and without primes of denominators."""
+        degree = self._algebra.degree
+        factors = [(scale * inverse).matrix.numer_denom() for scale in scales]
+        below = reduce(fmpz.lcm, (denominator for _, denominator in factors))
+        scaled: list[fmpz] = []
+        for (factor, denominator), term in zip(factors, terms, strict=True):
+            column = fmpz_mat(degree, 1, [entry.p for entry in term.coefficients])
+            scaled += (factor * (below // denominator) * column).entries()
+        matrix, below_lifts = lifts
+        entries = (matrix * fmpz_mat(3 * degree, 1, scaled)).entries()
+        common = below * below_lifts
+        for entry in entries:
+            common = common.gcd(entry % common)
+        integers = [entry // common for entry in entries] if common != 1 else entries
+        U, V, W = (
+            EtaleElement(self._algebra, fmpq_poly(integers[k : k + degree])) for k in range(0, 3 * degree, degree)
+        )
         return U, V, W
 
     def _multiplier(self, value: EtaleElement) -> EtaleElement | None:
@@ -258,24 +264,6 @@ def _signs(count: int) -> list[tuple[int, ...]]:
 def _parts(powers: Sequence[acb], k: int) -> list[arb]:
     """The k-th power of a root, as real and imaginary part unless the root is real."""
     return [powers[k].real] if powers[1].imag == 0 else [powers[k].real, powers[k].imag]
-
-
-def _times(first: EtaleElement, second: EtaleElement) -> EtaleElement:
-    """The product of two elements of Z[t].
-
-    FLINT multiplies each coefficient by each; with a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j it is
-    one product for each pair.
-    """
-    if _bits(first) < _KARATSUBA:
-        return first * second
-    a, b = ([entry.p for entry in element.coefficients] for element in (first, second))
-    squares = [x * y for x, y in zip(a, b, strict=True)]
-    terms = [fmpz(0)] * (2 * len(a) - 1)
-    for i in range(len(a)):
-        terms[2 * i] += squares[i]
-        for j in range(i):
-            terms[i + j] += (a[i] + a[j]) * (b[i] + b[j]) - squares[i] - squares[j]
-    return EtaleElement(first.field, fmpq_poly(terms) % first.field.chi)
 
 
 def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpz_mat, nmod
+from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 
+from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, pivots
 from kahanmaps.maps.orbits.relations.somos import around
 
@@ -45,17 +46,28 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
         length = degree + more
         if table.nrows() * max(more, 1) < length:
             continue
-        basis, products = [], []
+        basis, products, factor = [], [], fmpq(1)
         terms = around(W, length // 2 + 3), around(U, length // 2 + 3, W)
         for n in range(-(length // 2), length - length // 2):
             values = (fmpq_mat(table) * fmpq_mat(degree, 1, forms(degree, *terms, n))).entries()
-            basis.append(forms(length, *terms, n))
-            products.append([value * psi for value in values for psi in _of_multiples(more, terms[0], n)])
-        residues = [[int(nmod(int(x.p % _PRIME), _PRIME) / int(x.q % _PRIME)) for x in row] for row in products]
-        columns = pivots(echelon(residues, _PRIME))
+            below, one = _primitive(forms(length, *terms, n))
+            above, another = _primitive([value * psi for value in values for psi in _of_multiples(more, terms[0], n)])
+            basis.append(one)
+            products.append(another)
+            factor *= above / below
+        columns = pivots(echelon([[int(x % _PRIME) for x in row] for row in products], _PRIME))
         if len(columns) == length:
-            chosen = fmpq_mat([[row[k] for k in columns] for row in products])
-            return chosen.det() / fmpq_mat(basis).det()
+            chosen = fmpz_mat([[row[k] for k in columns] for row in products])
+            return factor * chosen.det() / fmpz_mat(basis).det()
+    raise ArithmeticError("coordinates have zeros in common")
+
+
+def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
+    """A row as a number times integers without a common factor, which are much shorter. Raises ArithmeticError for 0."""
+    integers = primitive_integers(tuple(row))
+    for value, integer in zip(row, integers, strict=True):
+        if integer:
+            return value / integer, integers
     raise ArithmeticError("coordinates have zeros in common")
 
 
