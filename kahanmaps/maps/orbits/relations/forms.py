@@ -63,7 +63,7 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
 
 
 def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
-    """A row as a number times integers without a common factor, which are much shorter. Raises ArithmeticError for 0."""
+    """A row as a number times integers without a common factor, much shorter ones. Raises ArithmeticError for 0."""
     integers = primitive_integers(tuple(row))
     for value, integer in zip(row, integers, strict=True):
         if integer:
