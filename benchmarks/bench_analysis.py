@@ -1,4 +1,4 @@
-"""`analyze` in dimension 6, and the relations along orbits in it, against the same relations by hand.
+"""`analyze`: relations along orbits in dimension 6 against the same by hand, and whole processes.
 
     python benchmarks/bench_analysis.py [--quick]
 
@@ -9,12 +9,15 @@ that matrix modulo a prime; for two primes, with python-flint. kahanmaps takes t
 from __future__ import annotations
 
 import random
+import resource
+import subprocess
 import sys
+import time
 from functools import partial
 from math import comb
 
 from flint import nmod_mat
-from work import Row, require_equal, row, table, timed
+from work import Row, require_equal, row, say, table, timed
 
 from kahanmaps import analyze, load
 from kahanmaps.algebra.polynomials import monomials
@@ -30,6 +33,16 @@ DEGREE = 6
 OURS = "kahanmaps: relations along orbits"
 BY_HAND = "python-flint: the same by square matrices"
 WHOLE = "kahanmaps: all of analyze"
+PROCESSES = "Whole processes of analyze"
+COMMAND = "kahanmaps analyze"
+IN_DIMENSION_3 = [
+    "euler_top",
+    "dressing_chain_3",
+    "volterra_periodic_3",
+    "zhukovski_volterra_1",
+    "zhukovski_volterra_2",
+]
+IN_DIMENSION_3 += ["lorenz", "todd"]
 _SPARE = 8
 
 
@@ -60,9 +73,29 @@ def _nullity(map_: ModularMap, degree: int) -> int:
     return unknowns - int(nmod_mat(rows, p).rank())
 
 
+def process(name: str) -> tuple[float, float]:
+    """The time that a command takes, and that of the processors."""
+    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    command = [sys.executable, "-m", "kahanmaps_cli", "analyze", name, "--json"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    took, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return took, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def whole_processes(names: list[str]) -> list[Row]:
+    """Each the best of three."""
+    rows: list[Row] = []
+    for name in names:
+        took, processors = min(process(name) for _ in range(3))
+        what, note = f"{name}, dimension {load(name).dim}", f"{took:.2g} s, of the processors {processors:.2g} s"
+        rows.append(row(PROCESSES, what, COMMAND, took, None, note))
+        say(f"  {what}: {note}")
+    return rows
+
+
 def measure(quick: bool = False) -> list[Row]:
     """The rows of this part."""
-    rows: list[Row] = []
+    rows = whole_processes(QUICK if quick else [*IN_DIMENSION_3, *WORKS])
     degree = 3 if quick else DEGREE
     for name in QUICK if quick else WORKS:
         file = load(name)
