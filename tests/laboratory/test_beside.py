@@ -87,6 +87,15 @@ def test_what_a_killed_process_did_not_do_is_done_here() -> None:
     assert found.skipped == []
 
 
+def test_where_there_is_no_second_process_all_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> int:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr("os.fork", refused)
+    found = analyze(load("harmonic"), parts=[apart("first", where), apart("second", where)], processes=2)
+    assert found["first"] == found["second"] == os.getpid()
+
+
 def test_mistakes_are_not_swallowed_and_no_process_is_left() -> None:
     with pytest.raises(ZeroDivisionError):
         analyze(load("harmonic"), parts=[apart("first", failing)], processes=2)

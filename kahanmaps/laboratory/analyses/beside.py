@@ -13,7 +13,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import IO, Any
 
 import kahanmaps.algebra.written.pickles  # noqa: F401
 from kahanmaps.errors import KahanmapsError
@@ -40,12 +40,14 @@ class Beside:
         self.waiting = list(parts)
         self._run = run
         self._process: int | None = None
+        self._answers: IO[bytes] | None = None
         if not parts:
             return
         parent = os.getpid()
         reading, writing = os.pipe()
         self._answers = os.fdopen(reading, "rb")
-        self._process = os.fork()
+        with suppress(OSError):  # no memory for one more process, or too many: then there are no answers
+            self._process = os.fork()
         if self._process == 0:
             _work(parent, run, parts, writing)
         os.close(writing)
@@ -53,11 +55,12 @@ class Beside:
     @property
     def has_answered(self) -> bool:
         """Whether something of the first one that is waiting has come."""
-        return bool(self.waiting and select.select([self._answers], [], [], 0)[0])
+        return bool(self.waiting and self._answers and select.select([self._answers], [], [], 0)[0])
 
     def next(self) -> tuple[Part, Any, str]:
         """The first one that is waiting and its outcome; where the process has ended early, it is done here."""
         part = self.waiting.pop(0)
+        assert self._answers is not None  # there are no parts without
         try:
             found, reason = pickle.load(self._answers)
         except (EOFError, pickle.UnpicklingError):  # killed, or it met an error, which it will meet here again
@@ -72,6 +75,8 @@ class Beside:
             with suppress(ProcessLookupError):
                 os.kill(self._process, signal.SIGKILL)
             os.waitpid(self._process, 0)
+            self._process = None
+        if self._answers is not None:
             self._answers.close()
 
 
