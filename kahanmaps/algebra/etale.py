@@ -21,6 +21,7 @@ from kahanmaps.errors import InputError
 # Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm, and those from which
 # on products are made here.
 _LONG, _LONG_PRODUCT = 2000, 8000
+_FEW = 6  # coefficients up to which these are faster than FLINT's
 
 
 class EtaleAlgebra(Field):
@@ -133,8 +134,9 @@ class EtaleElement(Element):
 
     def _times(self, other: EtaleElement) -> EtaleElement:
         first, second = self.polynomial, other.polynomial
+        # One coefficient tells how long the others are, but for rare ones: then the product takes a little longer.
         is_long = first[0].p.bit_length() > _LONG_PRODUCT and second[0].p.bit_length() > _LONG_PRODUCT
-        product = _product(first, second) if is_long else first * second
+        product = _product(first, second) if is_long and self.field.degree <= _FEW else first * second
         return EtaleElement(self.field, product % self.field.chi)
 
     def _over(self, other: EtaleElement) -> EtaleElement:
@@ -159,10 +161,13 @@ class EtaleElement(Element):
 
 
 def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
-    """The product of polynomials with long coefficients.
+    """The product of polynomials with few long coefficients.
 
-    FLINT multiplies each coefficient by each; with a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j it is
-    one product for each pair.
+    FLINT multiplies each of few coefficients by each; with
+
+        a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j
+
+    it is one product for each pair.
     """
     count = max(first.length(), second.length())
     a, b = ([numerator[k] for k in range(count)] for numerator in (first.numer(), second.numer()))

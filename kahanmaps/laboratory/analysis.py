@@ -127,7 +127,8 @@ def analyze(
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
         parts: the analyses to do, in this order; the verdict rests on these.
-        processes: with 2 a copy of this process does a part of them where there is a second processor (on Linux).
+        processes: 1, or 2: then a forked copy of this process does some of the analyses, where there is a second
+            processor (on Linux only; what runs in other threads should bear a fork).
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -169,7 +170,7 @@ def analyze(
         while beside.waiting:
             progress(beside.waiting[0].name)
             take(*beside.next())
-    found.skipped.sort(key=lambda line: [part.name for part in todo].index(line.partition(": ")[0]))
+    found.skipped.sort(key=lambda line: next(k for k, part in enumerate(todo) if line.startswith(f"{part.name}: ")))
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")

@@ -113,7 +113,7 @@ class ModularMap:
         return [_products(x, layers, self.prime) for x in points], points[0], period
 
     def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
-        """The values of all monomials up to a degree at a point, and what a step makes of them; times two numbers."""
+        """The values of all monomials up to a degree at a point, and a step later; each times its number of `by`."""
         p = self.prime
         return monomial_values(x, degree, p, by[0]), monomial_values(image, degree, p, by[1])
 

@@ -14,6 +14,7 @@ from helpers import rationals, some
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra import etale
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det, solve
@@ -219,8 +220,15 @@ def test_both_ways_to_a_quotient_lead_to_the_same(field, monkeypatch):
 def test_both_ways_to_a_product_lead_to_the_same(field, monkeypatch):
     elements = [*long_elements(field, 3), field.convert(7**900)]
     products = [a * b for a in elements for b in elements]
-    monkeypatch.setattr("kahanmaps.algebra.etale._LONG_PRODUCT", 100)
+    asked = []
+    product = etale._product
+    monkeypatch.setattr(etale, "_LONG_PRODUCT", 100)
+    monkeypatch.setattr(etale, "_product", lambda *both: asked.append(both) or product(*both))
     assert [a * b for a in elements for b in elements] == products
+    assert len(asked) == len(products)
+    monkeypatch.setattr(etale, "_FEW", field.degree - 1)  # with more coefficients FLINT is faster
+    assert elements[0] * elements[1] == products[1]
+    assert len(asked) == len(products)
 
 
 def test_a_long_zero_divisor_is_refused_too():

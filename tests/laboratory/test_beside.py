@@ -3,8 +3,10 @@
 import os
 import pickle
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,8 +17,9 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis
+from kahanmaps.laboratory.analyses import beside
 from kahanmaps.laboratory.analyses.beside import CAN_FORK
-from kahanmaps.laboratory.analyses.part import Of, Part
+from kahanmaps.laboratory.analyses.part import Of, Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import Analysis, analyze
 
@@ -33,8 +36,17 @@ def told(found: Analysis) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", ["euler_top", "lotka_volterra", "hky", "paper_m2"])
-def test_two_processes_find_what_one_finds(name: str) -> None:
-    assert told(analyze(load(name), processes=2)) == told(analyze(load(name)))
+def test_two_processes_find_what_one_finds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = told(analyze(load(name)))
+    done = beside.outcome
+
+    def there(run: Run, part: Part) -> tuple[Any, str]:
+        if CAN_FORK and os.getpid() == HERE:
+            pytest.fail(f"{part.name} was done again here")
+        return done(run, part)
+
+    monkeypatch.setattr(beside, "outcome", there)
+    assert told(analyze(load(name), processes=2)) == expected
 
 
 def apart(name: str, look: Callable[..., Any]) -> Part:
@@ -79,6 +91,74 @@ def test_with_one_process_or_processor_all_are_done_here(
 
 
 @needs_fork
+def test_what_has_come_is_taken_between_two_parts() -> None:
+    def slow(*_: Any, **__: Any) -> int:
+        time.sleep(0.5)
+        return 0
+
+    def seen(run: Run, **_: Any) -> tuple[Any, Any]:
+        return run.found["first"], run.found["second"]
+
+    here = [replace(apart(name, look), is_apart=False) for name, look in (("third", slow), ("fourth", seen))]
+    found = analyze(load("harmonic"), parts=[apart("first", where), apart("second", where), *here], processes=2)
+    assert found["first"] != os.getpid()
+    assert found["fourth"] == (found["first"], found["second"])
+
+
+@needs_fork
+def test_progress_is_told_here_of_what_is_waited_for(tmp_path: Path) -> None:
+    def look(run: Run, progress: Callable[[str], None], **_: Any) -> int:
+        progress("halfway")
+        time.sleep(0.2)
+        return os.getpid()
+
+    log = tmp_path / "log"
+    log.touch()
+
+    def told(text: str) -> None:
+        with log.open("a") as file:
+            file.write(f"{os.getpid()} {text}\n")
+
+    found = analyze(load("harmonic"), parts=[apart("first", look)], processes=2, progress=told)
+    assert found["first"] != os.getpid()
+    assert log.read_text().splitlines() == [f"{os.getpid()} first"]
+
+
+@needs_fork
+def test_an_interrupt_is_for_the_first_process() -> None:
+    def look(*_: Any, **__: Any) -> int:
+        if os.getpid() != HERE:
+            os.kill(os.getpid(), signal.SIGINT)
+        return os.getpid()
+
+    assert analyze(load("harmonic"), parts=[apart("first", look)], processes=2)["first"] != os.getpid()
+
+
+@needs_fork
+def test_the_second_process_ends_with_the_first_and_with_its_analysis() -> None:
+    def sleeping(*_: Any, **__: Any) -> int:
+        time.sleep(60)
+        return 0
+
+    began = time.monotonic()
+    parts = [apart("first", sleeping), replace(apart("second", failing), is_apart=False)]
+    with pytest.raises(ZeroDivisionError):
+        analyze(load("harmonic"), parts=parts, processes=2)
+    assert time.monotonic() - began < 30
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@needs_fork
+def test_who_waits_for_no_children_gets_an_analysis_too() -> None:
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        assert analyze(load("harmonic"), parts=[apart("first", where)], processes=2)["first"] != os.getpid()
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
+@needs_fork
 def test_what_a_killed_process_did_not_do_is_done_here() -> None:
     parts = [apart("first", where), apart("second", killed_elsewhere), apart("third", where)]
     found = analyze(load("harmonic"), parts=parts, processes=2)
@@ -110,12 +190,11 @@ def test_a_part_that_gives_up_elsewhere_is_told() -> None:
     assert found["first"] is None
 
 
-def test_what_is_apart_reads_nothing_of_what_is_not() -> None:
-    """Its names of results are those that `look` functions of such parts take from what was found."""
-    apart_parts = [part for part in ANALYSES if part.is_apart]
-    kept = analyze(load("volterra_periodic_4"), parts=apart_parts)
-    whole = analyze(load("volterra_periodic_4"))
-    assert all(kept[part.result] == whole[part.result] for part in apart_parts)
+@pytest.mark.parametrize("is_apart", [True, False])
+def test_neither_kind_of_parts_reads_results_of_the_other(is_apart: bool) -> None:
+    parts = [part for part in ANALYSES if part.is_apart is is_apart]
+    kept, whole = (analyze(load("volterra_periodic_4"), parts=some) for some in (parts, ANALYSES))
+    assert [part.name for part in parts if part.to_json(kept) != part.to_json(whole)] == []
 
 
 x, y = ring(["x", "y"]).gens()

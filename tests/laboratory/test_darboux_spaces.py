@@ -4,8 +4,10 @@ import random
 from math import comb
 
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
-from kahanmaps.algebra.modular_matrices import combine
+from kahanmaps.algebra.modular_matrices import combine, rank
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
@@ -83,6 +85,25 @@ def test_of_a_pencil_the_sparsest_come_first():
     space = DarbouxSpace.spanned_by(2, 2, [squares, [1, *squares[1:]]], SMALL)
     assert space.basis == [[1, 0, 0, 0, 0, 0], squares]
     assert set(space.support) == {(0, 0), (2, 0), (0, 2)}
+
+
+@given(st.randoms(use_true_random=False))
+def test_no_members_of_a_pencil_are_sparser(rng):
+    exponents, p = exponents_up_to(2, 2), 11
+    dense, sparse = ([rng.randrange(p) for _ in exponents] for _ in range(2))
+    for k in rng.sample(range(6), 3):
+        sparse[k] = 0
+    P, Q = sparse, [(a + 3 * b) % p for a, b in zip(dense, sparse, strict=True)]
+    assume(rank([P, Q], p) == 2)
+    supports = {
+        tuple(k for k, (a, b) in enumerate(zip(P, Q, strict=True)) if (u * a + v * b) % p)
+        for u, v in [(0, 1), *((1, v) for v in range(p))]
+    }
+    by_size = sorted(supports, key=lambda places: (sum(exponents[places[-1]]), len(places), places))
+    basis = DarbouxSpace.spanned_by(2, 2, [P, Q], p).basis
+    found = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
+    assert found == by_size[:2]
+    assert rank([*basis, P, Q], p) == rank(basis, p) == 2
 
 
 def test_too_many_dimensions_are_not_searched(monkeypatch):

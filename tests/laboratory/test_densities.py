@@ -3,6 +3,7 @@
 from fractions import Fraction
 from functools import cache, partial
 from itertools import islice
+from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -18,6 +19,7 @@ from kahanmaps.documents.inline import System
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import NoPoint
 from kahanmaps.laboratory.preserve import densities as module
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
@@ -172,3 +174,38 @@ def test_random_systems_have_none(dim, seed):
     found = find_densities(random_system(dim, seed), max_degree=5)
     assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
     assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
+
+
+def with_densities_from(degree, monkeypatch):
+    """The degrees that are tried, where the space of each from this one on is not empty."""
+    tried = []
+
+    def space(map_, degree_, model=None):
+        tried.append(degree_)
+        return SimpleNamespace(basis=[1] * (degree_ >= degree))
+
+    monkeypatch.setattr(module, "_space", space)
+    return tried
+
+
+def test_degrees_are_leapt_over_only_where_there_is_nothing(monkeypatch):
+    tried, told = with_densities_from(5, monkeypatch), []
+    found = list(module._spaces(None, [0, 1, 2, 4, 7, 9], inf, told.append))
+    assert [(degree, bool(space.basis)) for degree, space in found] == [
+        *((0, False), (1, False), (2, False), (4, False)),
+        *((5, True), (6, True), (7, True), (8, True), (9, True)),
+    ]
+    assert tried == [0, 1, 2, 4, 7, 5, 6, 9, 8]
+    assert told == [f"densities of degree {degree}" for degree in tried]
+    assert list(module._spaces(None, [0, 1], 0, told.append)) == []  # the time is over
+
+
+def test_where_points_give_out_the_last_degree_that_was_tried_is_said(monkeypatch):
+    def space(map_, degree, model=None):
+        if degree > 3:
+            raise NoPoint("no points")
+        return SimpleNamespace(basis=[])
+
+    monkeypatch.setattr(module, "_space", space)
+    laboratory = Laboratory(load("lotka_volterra"))
+    assert module._search(laboratory, None, 9, inf, lambda _: None) == ([], 3, "no points")

@@ -137,6 +137,36 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
         assert coordinates(found.value(start, n)) == points[n]
 
 
+@pytest.mark.parametrize("more", [24, 30])
+def test_a_pole_at_the_iterate_itself_is_said(more):
+    name = "a pole at step 2"
+    U, V, W = before(*STARTS[name], more)
+    system, normal_form, (_, u, _, v) = side_by_side(name, "three real roots, irrational")
+    start = (fmpq(U, W), u, fmpq(V, W), v)
+    _, end = walked(system, "1/2", QQ, start, more + 4)
+    assert end.status == "singular"
+    for n in (end.steps + 1, end.steps + 2):
+        with pytest.raises(SingularStep, match=f"no value at step {end.steps}$"):
+            NthIterate(normal_form, "1/2", QQ).value(start, n)
+
+
+def test_points_half_way_are_made_only_where_numbers_may_become_too_long(monkeypatch):
+    normal_form, system = structure_and_system("m = 2")
+    start = random_point(system.dim, 6, height=3)
+    asked, planes = [], rational_iterate._Planes
+    point = planes.point
+    monkeypatch.setattr(planes, "point", lambda self, n: asked.append(n) or point(self, n))
+    bits = NthIterate(normal_form, "1/10", QQ).value(start, 200).bits
+    assert asked == [200]
+    asked.clear()
+    NthIterate(normal_form, "1/10", QQ).value(start, 200, max_bits=2 * bits)
+    assert asked == [200]
+    asked.clear()
+    with pytest.raises(OverBudget):
+        NthIterate(normal_form, "1/10", QQ).value(start, 200, max_bits=bits // 3)
+    assert asked[0] < 200
+
+
 @pytest.mark.parametrize("more", [1, 8, 24])
 def test_the_pole_of_an_orbit_of_planes_is_where_it_is(more):
     name = "a pole at step 2"

@@ -8,7 +8,7 @@ import random
 from itertools import islice
 
 import pytest
-from flint import fmpq, fmpq_poly
+from flint import fmpq, fmpq_poly, fmpz
 from helpers import random_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -147,3 +147,14 @@ def test_a_wrong_iterate_does_not_pass(monkeypatch):
     monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
         NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 100)
+
+
+def test_what_denominators_have_in_common_with_a_point_is_taken_out():
+    algebra = algebra_of("three real roots")
+    numbers = planar_algebra.ShortElements(algebra, fmpz(6))
+    zero, one, t = algebra.zero, algebra.one, algebra.generator
+    lifts = numbers.lifts([(one, zero, zero), (zero, one / 2, zero), (zero, zero, one)])
+    terms = [6 * t + 12, 12 * t * t, 18 * one]
+    found = numbers.combined([one / 6, one / 6, one / 3], terms, lifts, one / 5)
+    assert same_point(found, (t + 2, t * t, 6 * one))
+    assert found == (t + 2, t * t, 6 * one)

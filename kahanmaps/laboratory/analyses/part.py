@@ -46,7 +46,9 @@ class Part:
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
     slow_above: float = inf  # the dimension above which it comes last and gets a quarter of its share
-    is_apart: bool = False  # reads nothing of parts that are not; a second process may do it
+    # It reads nothing of parts that are not apart, and they nothing of it, and its result can be pickled: a second
+    # process may do it.
+    is_apart: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 
     def __post_init__(self) -> None:

@@ -240,10 +240,10 @@ def _search(
 
 
 def _leaps(dim: int, top: int) -> list[int]:
-    """Some degrees up to `top`, each with at most half as many monomials as the next of them, where there are such.
+    """Degrees up to `top`: up to each there are at most half as many monomials as up to the one listed after it, if so.
 
-    >>> _leaps(3, 12), _leaps(6, 5)
-    ([0, 1, 2, 4, 6, 9, 12], [0, 1, 2, 3, 4, 5])
+    >>> _leaps(3, 12), _leaps(6, 5), _leaps(1, 7)
+    ([0, 1, 2, 4, 6, 9, 12], [0, 1, 2, 3, 4, 5], [0, 1, 3, 7])
     """
     if top < 0:
         return []
@@ -254,9 +254,9 @@ def _leaps(dim: int, top: int) -> list[int]:
 def _spaces(
     map_: ModularMap, leaps: Sequence[int], until: float, progress: Callable[[str], None]
 ) -> Iterator[tuple[int, DarbouxSpace]]:
-    """The spaces of the degrees in `leaps`, until the time is over, each after those of the degrees it leapt over.
+    """The spaces of the degrees in `leaps` and, before one that is not empty, those of the degrees it leapt over.
 
-    These are passed over where it is empty, as they are then.
+    Where the space of a leap is empty, so are those of lower degrees. It ends when the time is over.
     """
     below = -1
     for leap in leaps:
@@ -264,9 +264,11 @@ def _spaces(
             return
         progress(f"densities of degree {leap}")
         whole = _space(map_, leap)
-        for degree in range(below + 1, leap):
-            if whole.basis:
-                yield degree, _space(map_, degree)
+        for degree in range(below + 1, leap) if whole.basis else ():
+            if time.monotonic() > until:
+                return
+            progress(f"densities of degree {degree}")
+            yield degree, _space(map_, degree)
         yield leap, whole
         below = leap
 

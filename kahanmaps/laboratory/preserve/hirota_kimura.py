@@ -126,7 +126,8 @@ def relations_on_orbit(
     exponents = exponents_up_to(map_.dim, degree)
     support = _not_multiples(map_.dim, degree, leading)
     most = len(support) if most is None else min(most, len(support))
-    rows, point, period = map_.along_orbit(degree, most + _SPARE, support)
+    left = support if len(support) < len(exponents) else None
+    rows, point, period = map_.along_orbit(degree, most + _SPARE, left)
     form, independent = matrix(rows, map_.prime).rref()
     first, free = split_columns(form, independent)
     found = frozenset(exponents[support[k]] for k in free)

@@ -81,7 +81,7 @@ class Lifted(ModularMap):
         return chosen, points[0], len(points) if closed else None
 
     def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
-        """The values at a point, and those a step later."""
+        """The values at a point, and those a step later; each times its number of `by`."""
         points = [x, image]
         while len(points) < self.lift.shift + 2:
             after = self.step(points[-1])

@@ -106,7 +106,7 @@ def candidates(
         return list(laboratory.flow_polynomials().functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     known = [one.polynomial for one in cofactors if one.polynomial is not None]
-    found = dict(_irreducible((*context.gens()[:n], *known), n, laboratory.eps))
+    found = _irreducible((*context.gens()[:n], *known), n, laboratory.eps)
     found |= _jacobians(laboratory.map, laboratory.eps, laboratory.system is not None)
     found |= _irreducible(more, n, laboratory.eps)
     return sorted(found.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]

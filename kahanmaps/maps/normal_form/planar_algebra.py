@@ -92,7 +92,8 @@ class AlgebraBlock(LevelBlock):
     def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
         """Numerators of the coefficients of U/W and V/W, the denominator, and an integer whose primes may cancel.
 
-        Outside the primes of the third number there is one prime ideal of degree 1 above a prime of the denominator.
+        Outside the bad primes and those of the third number there is one prime ideal of degree 1 above a prime of the
+        denominator. Where W is no number, the start has to have a level.
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
@@ -182,7 +183,7 @@ class ShortElements:
         return (value, self._algebra.one) if value == 0 else self.split(value)
 
     def lifts(self, points: Sequence[Triple]) -> tuple[fmpz_mat, fmpz]:
-        """The matrix over Q that makes the sum of term times point of terms, all in the powers of t, in integers."""
+        """The matrix of (a_1, a_2, a_3) -> sum of a_i P_i on coefficients, times a number; that number."""
         degree = self._algebra.degree
         blocks = [[point[i].matrix.tolist() for point in points] for i in range(3)]
         rows = [[entry for block in row for entry in block[k]] for row in blocks for k in range(degree)]
@@ -191,7 +192,10 @@ class ShortElements:
     def combined(
         self, scales: Sequence[Any], terms: Sequence[Any], lifts: tuple[fmpz_mat, fmpz], inverse: EtaleElement
     ) -> Triple:
-        """The sum of scale times term times lift, times the inverse, in Z[t] and without primes of denominators."""
+        """The sum of scale times term times lift, times the inverse, times a number that makes it integral.
+
+        Terms are in Z[t], and so is the triple; its coefficients have nothing in common with the denominators left.
+        """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]
         below = reduce(fmpz.lcm, (denominator for _, denominator in factors))

@@ -252,7 +252,7 @@ def bad_part(number: fmpz, bad: fmpz) -> tuple[fmpz, fmpz]:
 
 
 def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
-    """What numbers, not all of them zero, have in common in the primes of `power`, any product of powers of them."""
+    """The common factor of numbers, not all of them zero, that is made of the primes of `power`, which is to be > 0."""
     while True:
         common = power
         for number in numbers:

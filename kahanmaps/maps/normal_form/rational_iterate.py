@@ -31,7 +31,6 @@ from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Block, PlanesPoint
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.maps.normal_form.steps import NormalSteps
-from kahanmaps.maps.normal_form.tau_table import most_bits
 
 _RISE = 16  # steps over which a rise of the heights is more than a fluctuation
 _WALKED = 256  # steps taken exactly at first,
@@ -226,13 +225,17 @@ class _Planes:
         return PlanesPoint(self._assembly, triples)
 
     def is_within(self, n: int, step: int, limit: int) -> bool:
-        """Whether step n is sure to be, and not far beyond what was sure before: from what points would be made of."""
+        """Whether the n-th point surely has at most `limit` bits, from bounds that need no point; the `step` has.
+
+        It is left undecided, False, where the limit may come soon after a step on the way.
+        """
         if self.lazy or not all(isinstance(block, IntegerBlock) for block in self.blocks):
             return False
         while True:
             step = _halved(n, step)
             bits = [
-                most_bits(block, plane.reduced(step)) for block, plane in zip(self.blocks, self._planes, strict=True)
+                tau_table.most_bits(block, plane.reduced(step))
+                for block, plane in zip(self.blocks, self._planes, strict=True)
             ]
             total = sum(known or 0 for known in bits) + self._assembly.excess
             if None in bits or total > limit or (step < n and 4 * total > limit):

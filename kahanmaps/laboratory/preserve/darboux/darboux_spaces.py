@@ -83,10 +83,9 @@ def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
     zeros: dict[int | None, set[int]] = {}  # of the members that lack something
     for k in used:
         zeros.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
-    supports = [[k for k in used if k not in lacking] for lacking in zeros.values()]
+    supports = [([k for k in used if k not in lacking], min(lacking)) for lacking in zeros.values()]
     found = []
-    for support in sorted(supports, key=lambda places: (degrees[places[-1]], len(places), places))[:2]:
-        first = next(k for k in used if k not in support)
+    for support, first in sorted(supports, key=lambda one: (degrees[one[0][-1]], len(one[0]), one[0]))[:2]:
         member = [(Q[first] * p - P[first] * q) % prime for p, q in zip(P, Q, strict=True)]
         inverse = pow(member[support[-1]], -1, prime)
         found.append([c * inverse % prime for c in member])

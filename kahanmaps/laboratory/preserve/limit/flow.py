@@ -93,7 +93,7 @@ class ModularFlow(ModularMap):
         return 1 + sum(c * here[k] for c, k in self._divergence), 1
 
     def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
-        """The values of all monomials P up to a degree, and of P + f . grad P; times two numbers."""
+        """The values of all monomials P up to a degree, and of P + f . grad P; each times its number of `by`."""
         p = self.prime
         here = monomial_values(x, degree, p)
         f = [after - before for before, after in zip(x, image, strict=True)]

@@ -36,12 +36,11 @@ _MOST_FACTORS = 8
 _LEFT_OUT = 3  # steps, where the start is special: as for W(0), terms of U near the beginning may be 0
 _FIRST = 2  # the least n of forms
 
-
-class TooLong(ArithmeticError):
-    """The orbit lies on elliptic curves, but numbers of its forms are too long to be found yet."""
-
-
 Groups = Sequence[tuple[int, ...]]  # of coordinates that have a denominator in common
+
+
+class TooLong(Exception):
+    """The orbit lies on elliptic curves, but numbers of its forms are too long to be found yet."""
 
 
 def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> EllipticSteps | None:

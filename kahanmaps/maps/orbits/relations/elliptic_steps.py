@@ -89,7 +89,7 @@ class Coordinates:
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
         self._degree, self._W, self._U, self._primes = degree, W, U, primes
         self._exponents = exponents(degree)
-        # What a column has in common is multiplied once, by numbers shorter than its entries are multiplied by.
+        # What the entries of a column have in common would be multiplied once for each row, by longer numbers.
         self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
         self._forms = fmpz_mat([[c // g for c, g in zip(row, self._common, strict=True)] for row in forms.tolist()])
 

@@ -68,7 +68,7 @@ def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
     for value, integer in zip(row, integers, strict=True):
         if integer:
             return value / integer, integers
-    raise ArithmeticError("coordinates have zeros in common")
+    raise ArithmeticError("all values at a point are 0")
 
 
 def _of_multiples(degree: int, W: Mapping[int, fmpq], n: int) -> list[fmpq]:

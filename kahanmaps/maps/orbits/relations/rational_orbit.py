@@ -13,10 +13,11 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLong, elliptic_steps
 
-# Relations are looked for when the steps so far took about as long as that, and numbers grow by less than _SLOW_GROWTH
-# in a step: elsewhere there are none, or no steps for which they pay. As their coefficients are about as long as the
-# start, points have to be longer; where coefficients are even longer, they are looked for again _AGAIN times as far.
-_LONG, _LONG_BY_COORDINATES = 4500, 300  # bits; the second is multiplied by the square of their number
+# Relations are looked for when the steps so far took about as long as the search will, which depends on the bits of
+# points, and numbers grow by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they
+# pay. As their coefficients are about as long as the start, points have to be longer; where coefficients are even
+# longer, they are looked for again when points are _AGAIN times as long.
+_LONG, _LONG_BY_COORDINATES = 4500, 300  # bits; the second times the square of (dimension + 1)
 _AGAIN = 4
 _LONGER_THAN_START = 8
 _SLOW_GROWTH = 1.5
@@ -60,7 +61,7 @@ class RationalOrbit:
         last, reached = deque([self.start], maxlen=3), 0
         by_coordinates = _LONG_BY_COORDINATES * (self.map.dim + 1) ** 2
         long: float = max(_LONG, by_coordinates, _LONGER_THAN_START * self.start.bits)
-        too_late = inf if self.max_bits is None else self.max_bits / 2
+        too_late = inf if self.max_bits is None else self.max_bits / 2  # few steps are left then: bits grow like n^2
         yield self.start
         for number in count(1):
             if self._skips(number, reached, last[-1]):
