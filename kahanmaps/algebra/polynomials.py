@@ -160,9 +160,9 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     with field.working():
         for monomial, coefficient in polynomial.terms():
             term = field.convert(coefficient)
-            for table, exponent in zip(powers, monomial, strict=True):
+            for i, exponent in enumerate(monomial):
                 if exponent:
-                    term = term * _power(table, exponent)
+                    term = term * _power(powers[i], exponent)
             total = total + term
     return total
 
