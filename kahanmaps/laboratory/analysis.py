@@ -152,9 +152,12 @@ def analyze(
     reached(found)
     apart = [part for part in todo if part.is_apart] if processes > 1 and processors() > 1 and CAN_FORK else []
 
+    skipped: dict[str, str] = {}
+
     def take(part: Part, result: Any, reason: str) -> None:
         if reason:
-            found.skipped.append(f"{part.name}: {reason}")
+            skipped[part.name] = f"{part.name}: {reason}"
+            found.skipped = [skipped[one.name] for one in todo if one.name in skipped]
         else:
             found[part.result] = result
         found.pending.remove(part.name)
@@ -170,7 +173,6 @@ def analyze(
         while beside.waiting:
             progress(beside.waiting[0].name)
             take(*beside.next())
-    found.skipped.sort(key=lambda line: next(k for k, part in enumerate(todo) if line.startswith(f"{part.name}: ")))
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")
