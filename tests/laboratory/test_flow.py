@@ -11,8 +11,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.lifted import Lift, Lifted
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 
 PRIME = 2**61 - 1
@@ -45,6 +46,18 @@ def test_the_rational_integrals_of_a_flow_are_found(name, count):
         assert str(one.verdict) == "proved"
         x = tuple(fmpq(rng.randint(1, 9), rng.randint(1, 9)) for _ in range(file.dim))
         assert derivative(file, one.function, x) == 0
+
+
+@pytest.mark.parametrize("kind", ["map", "flow", "lifted"])
+def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
+    system = load("lotka_volterra").system
+    map_ = ModularFlow(system, PRIME) if kind == "flow" else ModularMap(system, PRIME, 7)
+    map_ = Lifted(map_, Lift(1, 1)) if kind == "lifted" else map_
+    ((x, image),) = map_.pairs(1)
+    plain, weighed = map_.moved(x, image, 2), map_.moved(x, image, 2, (3, 5))
+    for values, more, number in zip(plain, weighed, (3, 5), strict=True):
+        assert [number * value % PRIME for value in values] == [value % PRIME for value in more]
+    assert plain[0] != plain[1]
 
 
 def test_the_series_of_a_solution_solve_the_equation():
