@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,7 +128,7 @@ def analyze(
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
         parts: the analyses to do, in this order; the verdict rests on these.
-        processes: 1, or 2: then a forked copy of this process does some of the analyses, where there is a second
+        processes: 1, or 2: then forked copies of this process do some of the analyses, where there is a second
             processor (on Linux only; what runs in other threads should bear a fork).
 
     Returns:
@@ -150,8 +151,7 @@ def analyze(
     todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
     found.pending = [part.name for part in todo]
     reached(found)
-    apart = [part for part in todo if part.is_apart] if processes > 1 and processors() > 1 and CAN_FORK else []
-
+    can_fork = processes > 1 and processors() > 1 and CAN_FORK
     skipped: dict[str, str] = {}
 
     def take(part: Part, result: Any, reason: str) -> None:
@@ -163,16 +163,25 @@ def analyze(
         found.pending.remove(part.name)
         reached(found)
 
-    with Beside(run, apart) as beside:
-        for part in todo:
-            if part not in apart:
-                progress(part.name)
-                take(part, *outcome(run, part))
-            while beside.has_answered:
-                take(*beside.next())
-        while beside.waiting:
-            progress(beside.waiting[0].name)
-            take(*beside.next())
+    with ExitStack() as stack:
+        left, beside = list(todo), list[Beside]()
+        while found.pending:
+            ready = [part for part in left if not set(part.needs).intersection(found.pending)]
+            chosen = [part for part in ready if part.is_apart and can_fork]
+            if chosen:
+                beside.append(stack.enter_context(Beside(run, chosen)))
+            elif ready:
+                chosen = ready[:1]
+                progress(chosen[0].name)
+                take(chosen[0], *outcome(run, chosen[0]))
+            left = [part for part in left if part not in chosen]
+            waiting = [one for one in beside if one.waiting]
+            if not (ready or any(one.has_answered for one in waiting)):
+                progress(waiting[0].waiting[0].name)
+                take(*waiting[0].next())
+            for one in waiting:
+                while one.has_answered:
+                    take(*one.next())
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")

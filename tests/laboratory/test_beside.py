@@ -6,6 +6,7 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -191,11 +192,55 @@ def test_a_part_that_gives_up_elsewhere_is_told() -> None:
     assert found["first"] is None
 
 
-@pytest.mark.parametrize("is_apart", [True, False])
-def test_neither_kind_of_parts_reads_results_of_the_other(is_apart: bool) -> None:
-    parts = [part for part in ANALYSES if part.is_apart is is_apart]
-    kept, whole = (analyze(load("volterra_periodic_4"), parts=some) for some in (parts, ANALYSES))
-    assert [part.name for part in parts if part.to_json(kept) != part.to_json(whole)] == []
+def without(chosen: list[Part]) -> list[Part]:
+    return [part for part in ANALYSES if part not in chosen]
+
+
+@cache
+def whole(name: str) -> Analysis:
+    return analyze(load(name))
+
+
+def needed(names: tuple[str, ...]) -> list[Part]:
+    """Those parts with what they need in turn."""
+    return [one for part in ANALYSES if part.name in names for one in (*needed(part.needs), part)]
+
+
+@pytest.mark.parametrize("needs", sorted({part.needs for part in ANALYSES if part.is_apart}))
+@pytest.mark.parametrize("name", ["euler_top", "lorenz"])
+def test_parts_that_are_apart_read_what_they_need_and_are_read_by_those_that_need_them(
+    name: str, needs: tuple[str, ...]
+) -> None:
+    together = [part for part in ANALYSES if part.is_apart and part.needs == needs]
+    readers = [part for part in ANALYSES if any(one.name in part.needs for one in together)]
+    for checked, parts in (
+        (together, [*needed(needs), *together]),
+        (without(together + readers), without(together + readers)),
+    ):
+        kept = analyze(load(name), parts=parts)
+        assert [part.name for part in checked if part.to_json(kept) != part.to_json(whole(name))] == []
+
+
+@needs_fork
+def test_what_needs_others_waits_for_them_and_then_has_them() -> None:
+    def slow(*_: Any, **__: Any) -> int:
+        time.sleep(0.3)
+        return os.getpid()
+
+    def seen(*names: str) -> Callable[..., Any]:
+        return lambda run, **_: (*(run.found[name] for name in names), os.getpid())
+
+    parts = [
+        replace(apart("last", seen("first", "third")), is_apart=False, needs=("first", "third")),
+        apart("first", slow),
+        replace(apart("third", seen("second")), needs=("second",)),
+        replace(apart("second", where), is_apart=False),
+    ]
+    found = analyze(load("harmonic"), parts=parts, processes=2)
+    here, first, (second, third) = os.getpid(), found["first"], found["third"]
+    assert len({here, first, third}) == 3
+    assert second == here
+    assert found["last"] == (first, (here, third), here)
 
 
 x, y = ring(["x", "y"]).gens()

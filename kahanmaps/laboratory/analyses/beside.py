@@ -1,4 +1,4 @@
-"""Parts of an analysis that a second process does, while this one does the others.
+"""Parts of an analysis that another process does, while this one does others.
 
 It is a copy of this process: it has the map and all that was found so far without being told. What it finds comes back
 as pickles, one for each part.
@@ -33,7 +33,7 @@ def outcome(run: Run, part: Part) -> tuple[Any, str]:
 
 
 class Beside:
-    """The parts that a second process does, in their order, inside a `with` block, whose end is its end."""
+    """The parts that another process does, in their order, inside a `with` block, whose end is its end."""
 
     def __init__(self, run: Run, parts: Sequence[Part]) -> None:
         self.waiting = list(parts)

@@ -7,15 +7,18 @@ from typing import Any
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map
+from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map, with_limit
 
 
-def flow(run: Run, **budget: Any) -> FlowAndMap | None:
-    """The limits of integrals and densities for eps -> 0, and the integrals of the flow."""
+def integrals(run: Run, **budget: Any) -> FlowAndMap | None:
+    """The limits of integrals for eps -> 0, and integrals and a density of the flow."""
     found = run.found
-    if found.integrals is None:
-        return None
-    return flow_and_map(found.integrals, found.densities, known=found.integral_count, **budget)
+    return None if found.integrals is None else flow_and_map(found.integrals, known=found.integral_count, **budget)
+
+
+def densities(run: Run, **_: Any) -> FlowAndMap | None:
+    """The same with the limit of a density of the map."""
+    return None if run.found.flow is None else with_limit(run.found.flow, run.found.densities)
 
 
 def statements(found: Findings) -> list[Statement]:

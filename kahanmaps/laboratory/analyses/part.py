@@ -46,8 +46,9 @@ class Part:
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
     slow_above: float = inf  # the dimension above which it comes last and gets a quarter of its share
-    # It reads nothing of parts that are not apart, and they nothing of it, and its result can be pickled: a second
-    # process may do it.
+    needs: tuple[str, ...] = ()  # the parts that have to be gone through before
+    # Another process may do it, after those in `needs`: its result can be pickled, it reads nothing else but of parts
+    # that are apart and need the same, and only those that need it read what it found.
     is_apart: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 

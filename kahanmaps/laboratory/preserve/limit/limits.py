@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from math import prod
 from typing import Any
@@ -224,15 +224,35 @@ def flow_and_map(
     offered = flow.integrals if flow is not None else ()
     others = [one for one in offered if independent.add(independent.gradient(one.function))]
     functions = [*(one.leading for one in limits), *(one.function for one in others)]
-    density, sought_density = _density(laboratory, densities if is_kahan else None, seconds)
     count = max(known, search.codimension)
     without = max(0, count - len(limits))
     progress("Darboux polynomials of the flow")
     sought = laboratory.flow_polynomials()
-    known_factors = [*functions, *([] if density is None else [density.function])]
-    polynomials = _polynomials(laboratory, sought.functions, known_factors)
-    known_density = density, sought_density
-    return FlowAndMap(limits, tuple(others), without, count, search, flow, *known_density, polynomials, sought.degree)
+    found = find_densities(
+        laboratory.file, symbols=laboratory.symbols, flow=True, max_degree=_DENSITY_DEGREE, seconds=seconds
+    )
+    density = next(iter(found.densities), None)
+    functions += [] if density is None else [density.function]
+    polynomials = _polynomials(laboratory, sought.functions, functions)
+    beside = (tuple(others), without, count, search, flow, density, found, polynomials, sought.degree)
+    return with_limit(FlowAndMap(limits, *beside), densities)
+
+
+def with_limit(found: FlowAndMap, densities: DensitySearch | None) -> FlowAndMap:
+    """The same with the limit of a density of the map for the density of the flow, where it is one."""
+    search = found.map_search
+    if densities is None or not isinstance(search.file.map, Kahan):
+        return found
+    laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
+    for one in densities.densities:
+        field = FunctionField(laboratory.map.names)
+        *_, phi = _leading(Function(field, one.function.numerator, one.function.denominator))
+        verdict, evidence = laboratory.verdict_on(phi, is_density=True)
+        if verdict.holds:
+            density = FoundDensity(phi, verdict, evidence)
+            polynomials = _polynomials(laboratory, found.polynomials, [phi])
+            return replace(found, density=density, density_search=None, polynomials=polynomials)
+    return found
 
 
 def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
@@ -368,22 +388,6 @@ def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fm
         if vectors := nullspace(QQ, fmpq_mat(rows)):
             return ring([f"r{k}" for k in range(count)]).from_dict(dict(zip(support, vectors[0], strict=True)))
     raise _NoLimit("leading terms depend on each other, but not by a relation of low degree")
-
-
-def _density(
-    laboratory: Laboratory, densities: DensitySearch | None, seconds: float
-) -> tuple[FoundDensity | None, DensitySearch | None]:
-    """A density of the flow: the limit of one of the map where that is one, else one that is sought."""
-    for one in densities.densities if densities is not None else ():
-        field = FunctionField(laboratory.map.names)
-        *_, phi = _leading(Function(field, one.function.numerator, one.function.denominator))
-        verdict, evidence = laboratory.verdict_on(phi, is_density=True)
-        if verdict.holds:
-            return FoundDensity(phi, verdict, evidence), None
-    search = find_densities(
-        laboratory.file, symbols=laboratory.symbols, flow=True, max_degree=_DENSITY_DEGREE, seconds=seconds
-    )
-    return (search.densities[0] if search.densities else None), search
 
 
 def _polynomials(
