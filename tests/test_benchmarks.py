@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps import KahanMap, load
+from kahanmaps import KahanMap, load, system_normal_form
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 STEPS = 4
@@ -66,6 +66,35 @@ def test_contestants_on_the_catalogue_arrive_at_one_point(name):
     map_over = load(name).map.at(bench_catalogue.EPS)
     assert bench_catalogue.ours(map_over, STEPS) == bench_catalogue.plain(map_over, STEPS)
     assert bench_catalogue.ours(map_over, STEPS) != bench_catalogue.plain(map_over, STEPS + 1)
+
+
+@pytest.mark.parametrize("name", ["euler_top", "paper_m2"])
+def test_longer_orbits_are_the_same_with_relations_and_in_normal_form(name, monkeypatch):
+    import bench_catalogue
+    import work
+
+    monkeypatch.setattr(bench_catalogue, "LONG_BITS", 5_000)
+    file = load(name)
+    normal = system_normal_form(file.system) if name == "paper_m2" else None
+    try:
+        rows = bench_catalogue._longer(name, file.map.at(bench_catalogue.EPS), normal, "matsolve on integers")
+    except work.Absent as reason:
+        pytest.skip(str(reason))
+    assert [one["group"] for one in rows] == [bench_catalogue.LONG] * 2
+    assert rows[0]["work"].startswith(f"{name}, N = ")
+    monkeypatch.setattr(bench_catalogue, "pari", lambda *_: (1.0, [], ""))
+    with pytest.raises(work.Disagreement):
+        bench_catalogue._longer(name, file.map.at(bench_catalogue.EPS), normal, "")
+
+
+def test_the_claim_on_longer_orbits_is_the_worst_of_them_all():
+    import run
+
+    found = [run.bench_catalogue.row(run.bench_catalogue.LONG, run.bench_catalogue.PARI, k, 1.0, k) for k in (7, 6, 9)]
+    others = [run.bench_catalogue.row(run.bench_catalogue.GROUP, run.bench_catalogue.PARI, "", 1.0, 2)]
+    assert run._least_of_longer(found + others) == 6
+    with pytest.raises(KeyError):
+        run._least_of_longer(others)
 
 
 def test_a_contestant_with_another_result_stops_the_run():
