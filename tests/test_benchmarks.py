@@ -1,6 +1,7 @@
 """The benchmarks measure the same thing: all contestants that are present compute the same numbers, on a tiny case."""
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -17,7 +18,7 @@ def _scripts(monkeypatch):
     """The scripts import each other by name, as they do when they are run."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     yield
-    for name in ("work", "run", "bench_exact", "bench_catalogue", "bench_iterate", "bench_degrees", "bench_analysis"):
+    for name in [one for one in sys.modules if one in ("work", "run") or one.startswith("bench_")]:
         sys.modules.pop(name, None)
 
 
@@ -141,6 +142,20 @@ def test_the_walkers_of_a_line_agree():
                 assert run(system, n)[1] == degrees, label
             except work.Absent:
                 continue
+
+
+def test_peaks_of_memory_are_those_of_the_processes_alone(tmp_path):
+    import bench_memory
+
+    held = bytearray(200 << 20)
+    megabytes, _, note = bench_memory.batch(tmp_path, 5)
+    assert 20 < megabytes < len(held) >> 20
+    assert note == "0 MB of results"
+    more, _, note = bench_memory.orbit(tmp_path, 60)
+    assert more < len(held) >> 20
+    assert (tmp_path / "orbit60.txt").read_text().splitlines()[-2].startswith("60\t")
+    with pytest.raises(subprocess.CalledProcessError):
+        bench_memory.peak("orbit", "no such system")
 
 
 def test_the_page_is_what_the_record_says():
