@@ -331,7 +331,7 @@ GROUPS = {
     bench_analysis.PROCESSES: "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors.",
     bench_memory.GROUP: (
         "No peer; memory at its peak, relative to the first line of each block. Orbits and results are written as\n"
-        "they come. An orbit remembers terms of its sequences between n/2 and n; of the memory of a batch 128 MB are \n"
+        "they come. An orbit remembers terms of its sequences between n/2 and n; of the memory of a batch 128 MB are\n"
         "SQLite's for pages of the database (a batch of a million tasks took 191 MB)."
     ),
     bench_analysis.GROUP: (
