@@ -18,7 +18,7 @@ import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 import kahanmaps.maps.orbits.relations.somos as somos
-from kahanmaps import Orbit
+from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
@@ -406,6 +406,16 @@ def test_points_that_are_not_wanted_are_left_out(name):
     assert [points[n] for n in at] == [expected[n] for n in at]
     assert all(point in (None, right) for point, right in zip(points, expected, strict=True))
     assert (None in points) == (name != "clebsch_first_flow")
+
+
+def test_where_every_kth_point_is_wanted_others_are_left_out():
+    given = load("euler_top").map, START[:3], "3/11"
+    whole, found = orbit(*given, steps=85), orbit(*given, steps=85, every=40)
+    points, expected = list(found), list(whole)
+    assert [point.step for point in points if found.wanted(point.step)] == [0, 40, 80]
+    assert len(points) < 40
+    assert all(point == expected[point.step] for point in points)
+    assert found.end == whole.end
 
 
 def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_out(monkeypatch):

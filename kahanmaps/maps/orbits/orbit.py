@@ -82,7 +82,7 @@ def orbit(
             number field.
         method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
         backward: step by the inverse map.
-        every: float orbits deliver only multiples of it; `wanted` tells for all.
+        every: multiples of it are wanted; others are left out where that is quicker, as `wanted` tells.
         max_digits: the digit budget in exact arithmetic (200,000 unless given).
         hamiltonian, member: what is known of a quadratic system, so that its normal form need not be searched.
         normal_form: the normal form itself, or why there is none; looked for where it pays unless given.
@@ -156,6 +156,10 @@ class _Asked(NamedTuple):
     max_digits: int
     kernel: str | None
 
+    def wants(self, step: int) -> bool:
+        """Whether this step is one that was asked for."""
+        return step in self.at if self.at is not None else step % self.every == 0
+
     def by(self, method: str, normal_form: SystemNormalForm | None, numbers: Arithmetic) -> Any:
         """The iterator over them by a method, in an arithmetic."""
         if numbers.kind == "float":
@@ -170,7 +174,7 @@ class _Asked(NamedTuple):
         if method == "doubling" and normal_form is not None:
             return Iterates(over, self.start, self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
-        wanted = None if self.at is None else self.at.__contains__
+        wanted = self.wants if self.at is not None or self.every > 1 else None
         return Orbit(over, self.start, self.steps, normal_form=normal, wanted=wanted, **limits)
 
 
@@ -205,8 +209,7 @@ class Trajectory:
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
-        at = self._asked.at
-        return step in at if at is not None else step % self._asked.every == 0
+        return self._asked.wants(step)
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
