@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import accumulate, chain
+from operator import mul
 
-from flint import fmpq, fmpz
+from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
@@ -41,11 +43,6 @@ class _Row:
     fixed: fmpz
     dividing: tuple[int, ...]  # the planes whose h the form divides
 
-    def over(self, scaled: dict[int, list[fmpz]], product: fmpz) -> tuple[fmpz, fmpz]:
-        """Numerator and denominator, from U_i and V_i times the other W of the support, and the product of all."""
-        above = sum((_at(form, scaled[i]) for i, form in zip(self.support, self.forms, strict=True)), fmpz(0))
-        return above, self.below * product
-
 
 class Assembly:
     """How points are put together from triples: for blocks and, for each, the rows of x = sum of R (u, v)."""
@@ -61,15 +58,22 @@ class Assembly:
             for r in range(self.dim)
         ]
         self.fixed = radical(*(row.fixed for row in self.rows))
-        # By so many bits numerators may be longer than the products of the triples they are made of.
-        below = fmpz(1)
+        # The numbers of the rows with the same support, and the integers of their forms.
+        self.by_support: dict[tuple[int, ...], tuple[list[int], fmpz_mat]] = {}
+        for support in dict.fromkeys(row.support for row in self.rows):
+            numbers = [k for k, row in enumerate(self.rows) if row.support == support]
+            forms = [list(chain(*self.rows[k].forms)) for k in numbers]
+            self.by_support[support] = numbers, fmpz_mat(len(forms), len(forms[0]), list(chain(*forms)))
+        self.below = reduce(fmpz.lcm, (row.below for row in self.rows), fmpz(1))
+        zeros = [[fmpz(0)] * len(matrix[0]) for matrix in matrices]
+        whole = []
         for row in self.rows:
-            below = below.lcm(row.below)
-        largest = max(
-            (abs(entry) * (below // row.below) for row in self.rows for form in row.forms for entry in form),
-            default=fmpz(1),
-        )
-        self.excess = int(max(below.bit_length(), (self.dim * largest).bit_length()))
+            known, factor = dict(zip(row.support, row.forms, strict=True)), self.below // row.below
+            whole += [entry * factor for i, zero in enumerate(zeros) for entry in known.get(i, zero)]
+        self.forms = fmpz_mat(self.dim, len(whole) // self.dim, whole)  # of all rows, over one denominator
+        # By so many bits numerators may be longer than the products of the triples they are made of.
+        largest = max(map(abs, whole))
+        self.excess = int(max(self.below.bit_length(), (self.dim * largest).bit_length()))
         self.excess += sum(block.slack for block in blocks)
 
 
@@ -152,19 +156,8 @@ class PlanesPoint:
 
     def common(self) -> tuple[list[fmpz], fmpz]:
         """Numerators of all coordinates over one denominator; what the W_i have in common is left in both."""
-        below = fmpz(1)
-        for row in self._assembly.rows:
-            below = below.lcm(row.below)
-        everything = tuple(range(len(self.triples)))
-        scaled, product = _scaled([(above, W) for above, W, _ in self._fractions], everything)
-        numerators = []
-        for row in self._assembly.rows:
-            factor = below // row.below
-            total = fmpz(0)
-            for i, form in zip(row.support, row.forms, strict=True):
-                total += _at([entry * factor for entry in form], scaled[i])
-            numerators.append(total)
-        return numerators, below * product
+        column, product = _scaled([(above, W) for above, W, _ in self._fractions])
+        return (self._assembly.forms * column).entries(), self._assembly.below * product
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced, denominators positive."""
@@ -174,15 +167,10 @@ class PlanesPoint:
             suspects = suspects * primes
         modulus = (self._assembly.fixed * suspects) ** _POWER
         residues = [([entry % modulus for entry in above], W % modulus) for above, W in planes]
-        sets: dict[tuple[int, ...], tuple[dict[int, list[fmpz]], fmpz]] = {}
-        small: dict[tuple[int, ...], tuple[dict[int, list[fmpz]], fmpz]] = {}
+        whole, small = self._fractions_of(planes), self._fractions_of(residues)
         divisors: dict[tuple[int, ...], fmpz] = {}
         pairs = []
-        for row in self._assembly.rows:
-            if row.support not in sets:
-                sets[row.support] = _scaled(planes, row.support)
-                small[row.support] = _scaled(residues, row.support)
-            above, below = row.over(*sets[row.support])
+        for row, (above, below), rest in zip(self._assembly.rows, whole, small, strict=True):
             if above == 0:
                 pairs.append((above, fmpz(1)))
                 continue
@@ -194,7 +182,7 @@ class PlanesPoint:
                 above, below = divide_exactly((above, below), common)
                 common = _common_part(above, below, modulus)
             else:
-                common = _common_part(*row.over(*small[row.support]), modulus)
+                common = _common_part(*rest, modulus)
             power = modulus
             while common != 1:
                 above, below = above // common, below // common
@@ -205,6 +193,16 @@ class PlanesPoint:
             pairs.append((above, below) if below > 0 else (-above, -below))
         return pairs
 
+    def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
+        """Numerator and denominator of each coordinate, from numerators and W of the planes, or residues of these."""
+        found: dict[int, tuple[fmpz, fmpz]] = {}
+        rows = self._assembly.rows
+        for support, (numbers, forms) in self._assembly.by_support.items():
+            column, product = _scaled([planes[i] for i in support])
+            above = (forms * column).entries()
+            found |= {k: (entry, rows[k].below * product) for k, entry in zip(numbers, above, strict=True)}
+        return [found[k] for k in range(len(rows))]
+
     def _divisor(self, i: int, form: Sequence[fmpz], known: dict[tuple[int, ...], fmpz]) -> fmpz:
         """gcd(alpha U + beta V, W) but for fixed primes, where alpha U + beta V divides h: one gcd for all rows."""
         common = content(form)
@@ -212,7 +210,7 @@ class PlanesPoint:
         key = (i, *map(int, primitive))
         if key not in known:
             above, below, _ = self._fractions[i]
-            known[key] = _at(primitive, above).gcd(below)
+            known[key] = sum(map(mul, primitive, above), fmpz(0)).gcd(below)
         return known[key]
 
     def rationals(self) -> tuple[fmpq, ...]:
@@ -220,26 +218,13 @@ class PlanesPoint:
         return tuple(fmpq(above, below) for above, below in self.lowest_terms())
 
 
-def _at(form: Sequence[fmpz], values: Sequence[fmpz]) -> fmpz:
-    return sum((c * value for c, value in zip(form, values, strict=True) if c != 0), fmpz(0))
-
-
-def _scaled(
-    planes: Sequence[tuple[Sequence[fmpz], fmpz]], support: tuple[int, ...]
-) -> tuple[dict[int, list[fmpz]], fmpz]:
-    """U_i and V_i times the other W of the support, and the product of all."""
-    # Products of all but one, from both ends.
-    count = len(support)
-    left, right = [fmpz(1)], [fmpz(1)]
-    for i in support:
-        left.append(left[-1] * planes[i][1])
-    for i in reversed(support[1:]):
-        right.append(right[-1] * planes[i][1])
-    scaled = {}
-    for k, i in enumerate(support):
-        others = left[k] * right[count - 1 - k]
-        scaled[i] = [entry * others for entry in planes[i][0]]
-    return scaled, left[-1]
+def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
+    """The numerators of planes, each times the W of the others, in one column; and the product of all W."""
+    *before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
+    behind = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
+    others = (some * more for some, more in zip(before, behind, strict=True))
+    column = [entry * other for (above, _), other in zip(planes, others, strict=True) for entry in above]
+    return fmpz_mat(len(column), 1, column), product
 
 
 def _common_part(above: fmpz, below: fmpz, modulus: fmpz) -> fmpz:
