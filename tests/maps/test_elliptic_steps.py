@@ -369,8 +369,8 @@ def test_no_term_is_found_twice(monkeypatch):
     map_over = over("euler_top")
     steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
     calls = []
-    real = somos.without
-    monkeypatch.setattr(somos, "without", lambda *given: calls.append(given) or real(*given))
+    real = somos.taken_apart
+    monkeypatch.setattr(somos, "taken_apart", lambda *given: calls.append(given) or real(*given))
     for number in range(6, 101):
         assert steps.step([], number) is not None
     assert len(calls) <= 2 * 101

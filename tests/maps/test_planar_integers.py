@@ -9,9 +9,9 @@ from itertools import islice
 from math import gcd
 
 import pytest
-from flint import fmpq, fmpz
+from flint import fmpq
 from helpers import points, rationals
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import STARTS, by_gcds, integer_block, over_starts, planar_system, reduced
 
@@ -19,7 +19,7 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planar_integers
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.maps.normal_form.planar_integers import IntegerBlock, common_part, divide_exactly
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 
 GENERAL = integer_block(*STARTS["three real roots, irrational"])
 
@@ -98,21 +98,6 @@ def test_without_the_bad_primes_triples_are_not_primitive(name, monkeypatch):
 
 # The parts.
 
-long_integers = st.integers(-(10**40), 10**40)
-
-
-@given(
-    quotient=long_integers,
-    divisor=st.integers(2, 2**60),
-    remainder=st.integers(1, 2**60),
-    sign=st.sampled_from([1, -1]),
-)
-def test_a_division_that_is_not_exact_raises(quotient, divisor, remainder, sign):
-    assume(remainder % divisor != 0)
-    with pytest.raises(ArithmeticError, match="please report"):
-        divide_exactly([fmpz(divisor), fmpz(quotient * divisor + remainder)], fmpz(sign * divisor))
-
-
 # The plane itself, over any numbers.
 
 
@@ -162,21 +147,3 @@ def test_the_discriminant_is_the_product_of_the_squared_differences_of_roots(r, 
     )
     differences = [p[0] * q[1] - p[1] * q[0] for p, q in ((r, s), (s, t), (t, r))]
     assert PlanarBlock(*cubic).discriminant == (differences[0] * differences[1] * differences[2]) ** 2
-
-
-@given(
-    numbers=st.lists(st.integers(-(10**6), 10**6), min_size=1, max_size=3),
-    shared=st.lists(st.sampled_from([2, 3, 5, 7]), max_size=12),
-    power=st.sampled_from([2, 6, 30, 9 * 125]),
-)
-def test_what_numbers_have_in_common_in_some_primes(numbers, shared, power):
-    assume(any(numbers))
-    product = 1
-    for prime in shared:
-        product *= prime
-    common = gcd(*(product * number for number in numbers))
-    expected = 1
-    for prime in (2, 3, 5):
-        while power % prime == 0 and common % (expected * prime) == 0:
-            expected *= prime
-    assert common_part([fmpz(product * number) for number in numbers], fmpz(power)) == expected

@@ -8,7 +8,8 @@ from flint import fmpq, fmpz
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from kahanmaps.maps.orbits.relations.somos import Terms, around, first_terms, without
+from kahanmaps.algebra.integers import taken_apart
+from kahanmaps.maps.orbits.relations.somos import Terms, around, first_terms
 
 rational = st.fractions(min_value=-9, max_value=9, max_denominator=9).filter(bool)
 rational = rational.map(lambda x: fmpq(x.numerator, x.denominator))
@@ -52,7 +53,7 @@ def test_terms_and_what_is_left_out_of_them(H, y, z):
     scales = []
     for terms, exact in ((multiples, W), (sequence, U)):
         scale = {n: exact[n] / terms.integer(n) for n in range(1, 41)}
-        assert all(without(x.p, primes)[0] in (1, -1) and without(x.q, primes)[0] == 1 for x in scale.values())
+        assert all(taken_apart(x.p, primes)[0] in (1, -1) and taken_apart(x.q, primes)[0] == 1 for x in scale.values())
         assert all(primes.gcd(terms.integer(n)) == 1 for n in range(1, 41))
         assert all(terms.part(n) == scale[n + 1] * scale[n - 1] / scale[n] ** 2 for n in range(2, 39))
         scales.append(scale)
@@ -90,12 +91,3 @@ def test_what_is_forgotten_is_found_again():
     for n in range(200):
         terms.forget(n)
     assert [terms.integer(n) for n in range(1, 80)] == before
-
-
-@given(st.integers(-(10**9), 10**9).filter(bool), st.integers(1, 10**6))
-def test_primes_are_taken_away_with_all_their_powers(value, primes):
-    left, taken = without(fmpz(value), fmpz(primes))
-    assert left * taken == value
-    assert taken > 0
-    assert fmpz(primes).gcd(left) == 1
-    assert (fmpz(primes) ** 30) % taken == 0

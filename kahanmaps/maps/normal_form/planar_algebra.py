@@ -19,8 +19,9 @@ from typing import Any
 from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
+from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, radical, taken_apart, without
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.planar_integers import SMALL_PRIMES, LevelBlock, bad_part, common_part, radical, without
+from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
 _SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
 _LEAST = arb(2) ** -50  # of the lengths at the roots, against the greatest
@@ -104,7 +105,7 @@ class AlgebraBlock(LevelBlock):
         cofactor, norm = _adjugate(W)
         above = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
         content = reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
-        rest, part = bad_part(content, self.bad)
+        rest, part = taken_apart(content, self.bad**3)
         common = common_part([norm.p, *above], self.bad**4 * part)  # taken out once rather than from every coordinate
         return [entry // common for entry in above], norm.p // common, rest
 
@@ -154,7 +155,7 @@ class ShortElements:
     """Values of tau functions over K: elements of Z[t] with short coefficients, each times a scale in K."""
 
     def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
-        self._algebra, self._bad, self._power = algebra, bad, bad**3
+        self._algebra, self._power = algebra, bad**3
         found: Any = algebra.chi.complex_roots()
         # Balls: roots may be beyond the range of doubles.
         self._powers = [[root**k for k in range(algebra.degree)] for root, _ in found if not root.imag < 0]
@@ -242,7 +243,7 @@ class ShortElements:
         for signs in _signs(degree):
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
             short = self._algebra.convert(fmpq_poly(row))
-            if without(self._algebra.norm(short).p, self._bad) in (1, -1):
+            if without(self._algebra.norm(short).p, self._power) in (1, -1):
                 return short * fmpq(below, part)
         return None if below == 1 else self._algebra.convert(below)
 

@@ -19,11 +19,10 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
+from kahanmaps.algebra.integers import common_part, content, divide_exactly, radical, taken_apart, without
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 IntegerTriple = tuple[fmpz, fmpz, fmpz]
-
-_LOW = (fmpz(1) << 64) - 1
 
 
 class LevelBlock:
@@ -87,9 +86,14 @@ class IntegerBlock(LevelBlock):
         return radical(6 * self.block.discriminant, self.level.q)
 
     @cached_property
+    def power(self) -> fmpz:
+        """A power of `bad` with its primes mostly as often as they are in numbers."""
+        return self.bad**3
+
+    @cached_property
     def numbers(self) -> Integers:
         """How values of tau functions are kept."""
-        return Integers(self.bad)
+        return Integers(self.power)
 
     @property
     def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
@@ -160,21 +164,21 @@ class IntegerBlock(LevelBlock):
             if raw[2] == 0:
                 return
             if by_rule and previous[2] != 0:
-                image = strip(divide_exactly(raw, without(previous[2], self.bad)), self.bad)
+                image = strip(divide_exactly(raw, without(previous[2], self.power)), self.power)
             else:  # after a pole the previous point is at infinity
                 image = primitive(raw)
             previous, point = point, image
 
 
 class Integers:
-    """Values of tau functions over Q: integers prime to the primes of `bad`, each times a rational scale."""
+    """Values of tau functions over Q: integers prime to the primes of `power`, each times a rational scale."""
 
-    def __init__(self, bad: fmpz) -> None:
-        self._bad = bad
+    def __init__(self, power: fmpz) -> None:
+        self._power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
         """A value that is integral but for `bad`, not zero: integer and scale."""
-        integer, part = bad_part(value.p, self._bad)
+        integer, part = taken_apart(value.p, self._power)
         return integer, fmpq(part, value.q)
 
     def divisor(self, value: fmpz) -> fmpz:
@@ -186,7 +190,7 @@ class Integers:
         raw = (s.p * t.q) * left - (t.p * s.q) * right
         if divisor is not None:
             raw = divide_exactly([raw], divisor)[0]
-        value, part = bad_part(raw, self._bad)
+        value, part = taken_apart(raw, self._power)
         return value, fmpq(part, s.q * t.q)
 
     def lifts(self, points: Sequence[Triple]) -> list[IntegerTriple]:
@@ -205,7 +209,7 @@ class Integers:
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
-        return strip(raw, self._bad, divisor)
+        return strip(raw, self._power, divisor)
 
 
 def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
@@ -215,16 +219,6 @@ def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
     return [((U * below).p, (V * below).p, (W * below).p) for U, V, W in points]
 
 
-def content(integers: Sequence[fmpz]) -> fmpz:
-    """The greatest common divisor of integers."""
-    common = fmpz(0)
-    for entry in integers:
-        common = common.gcd(entry)
-        if common == 1:
-            break
-    return common
-
-
 def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
     """The triple over its content."""
     common = content(triple)
@@ -232,99 +226,10 @@ def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
     return (U, V, W) if common <= 1 else (U // common, V // common, W // common)
 
 
-def without(number: fmpz, bad: fmpz) -> fmpz:
-    """The largest divisor of a number, not zero, that is coprime to `bad`."""
-    return bad_part(number, bad)[0]
+def strip(triple: Sequence[fmpz], power: fmpz, divisor: fmpz | int = 1) -> IntegerTriple:
+    """The triple without the common factors that its entries have in the primes of `power`; and divided by `divisor`.
 
-
-def bad_part(number: fmpz, bad: fmpz) -> tuple[fmpz, fmpz]:
-    """The number as (coprime to `bad`) times (only primes of `bad`); zero as (0, 1)."""
-    part, power = fmpz(1), bad * bad * bad
-    if number == 0:
-        return number, part
-    while (common := power.gcd(number % power)) != 1:
-        number = number // common
-        part = part * common
-        if is_all(common, power):
-            break
-        power = power * power  # a prime may be there to a high power
-    return number, part
-
-
-def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
-    """The common factor of numbers, not all of them zero, that is made of the primes of `power`, which is to be > 0."""
-    while True:
-        common = power
-        for number in numbers:
-            common = common.gcd(number % common)
-        if common == 1 or is_all(common, power):
-            return common
-        power = power * power
-
-
-def strip(triple: Sequence[fmpz], bad: fmpz, divisor: fmpz | None = None, power: fmpz | None = None) -> IntegerTriple:
-    """The triple without the common factors that its entries have in the primes of `bad`; and divided by `divisor`.
-
-    The divisor has to divide all entries and to be coprime to `bad`. `power` is a power of `bad` to begin with.
+    The divisor has to divide all entries and to have none of these primes.
     """
-    U, V, W = triple
-    power = bad * bad * bad if power is None else power
-    common = power.gcd(W % power)
-    if common != 1:
-        common = common.gcd(U % power)
-    if common != 1:
-        common = common.gcd(V % power)
-    if common != 1 or divisor is not None:
-        U, V, W = divide_exactly((U, V, W), common if divisor is None else common * divisor)
-    return (U, V, W) if common == 1 or is_all(common, power) else strip((U, V, W), bad, None, power * power)
-
-
-def is_all(common: fmpz, power: fmpz) -> bool:
-    """Whether a common divisor with `power` is all there is: no prime is in it as often as in `power`."""
-    rest = power // common
-    while common != 1:
-        shared = common.gcd(rest)
-        if shared == 1:
-            return False
-        common = common // shared
-    return True
-
-
-def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
-    """values / divisor. Raises ArithmeticError where a remainder shows in the lowest 64 bits."""
-    if divisor == 1:
-        return list(values)
-    quotients = [value // divisor for value in values]
-    low = divisor & _LOW
-    for value, quotient in zip(values, quotients, strict=True):
-        if ((quotient & _LOW) * low - value) & _LOW != 0:
-            raise ArithmeticError("a division that should be exact left a remainder: please report this")
-    return quotients
-
-
-def radical(*numbers: fmpz) -> fmpz:
-    """An integer with the primes of these numbers (not zero), small ones once, others to low powers."""
-    product = fmpz(1)
-    for number in numbers:
-        if number == 0:
-            raise ArithmeticError("zero has no radical: please report this")
-        rest = abs(number)
-        for prime in SMALL_PRIMES:
-            if rest % prime == 0:
-                if product % prime != 0:
-                    product = product * prime
-                while rest % prime == 0:
-                    rest = rest // prime
-        if rest > 1:
-            rest = without(rest, product) if product > 1 else rest
-            # A perfect power counts once.
-            for exponent in (2, 3, 5):
-                root = rest.root(exponent)
-                while rest > 1 and root**exponent == rest:
-                    rest = root
-                    root = rest.root(exponent)
-            product = product * rest
-    return product
-
-
-SMALL_PRIMES = tuple(n for n in range(2, 100) if all(n % k for k in range(2, int(n**0.5) + 1)))
+    U, V, W = divide_exactly(triple, common_part(triple[::-1], power) * divisor)
+    return U, V, W

@@ -17,15 +17,10 @@ from operator import mul
 
 from flint import fmpq, fmpz, fmpz_mat
 
+from kahanmaps.algebra.integers import content, divide_exactly, is_all, radical
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
-from kahanmaps.maps.normal_form.planar_integers import (
-    IntegerBlock,
-    content,
-    divide_exactly,
-    is_all,
-    radical,
-)
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 
 Block = IntegerBlock | AlgebraBlock
 

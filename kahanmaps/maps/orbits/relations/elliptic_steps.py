@@ -11,6 +11,7 @@ from functools import reduce
 
 from flint import fmpz, fmpz_mat
 
+from kahanmaps.algebra.integers import common_part
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
@@ -111,12 +112,10 @@ class Coordinates:
         values: list[fmpz] = (self._forms * fmpz_mat(len(column), 1, column)).entries()
         if values[-1] == 0:
             raise ZeroDivisionError
-        common = self._primes.gcd(values[-1] % self._primes)
-        while common != 1:
-            common = reduce(lambda g, value: g if g == 1 else g.gcd(value % g), values, common)
-            values = [value // common for value in values]
-            common = common.gcd(values[-1] % common)
-        return [-value for value in values] if values[-1] < 0 else values
+        common = common_part(values[::-1], self._primes)
+        if values[-1] < 0:
+            common = -common
+        return values if common == 1 else [value // common for value in values]
 
     def forget(self, n: int) -> None:
         """Keep no long terms of numbers below n."""

@@ -13,6 +13,8 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
+from kahanmaps.algebra.integers import taken_apart
+
 _DIRECT = 8  # up to here quotients of s(n) are found from s(n) itself, then from those at n/2
 
 
@@ -74,9 +76,9 @@ class Terms:
         self._parts: dict[int, fmpq] = {}
         self._ratios: dict[int, fmpq] = {}
         for n, term in enumerate(first, start=1):
-            if term == 0 or without(term.q, primes)[0] != 1:
+            if term == 0 or taken_apart(term.q, primes)[0] != 1:
                 raise ArithmeticError("the first terms are to have inverses outside the set of primes")
-            self._integers[n], part = without(term.p, primes)
+            self._integers[n], part = taken_apart(term.p, primes)
             self._first[n] = fmpq(part, term.q)
 
     def integer(self, n: int) -> fmpz:
@@ -92,7 +94,7 @@ class Terms:
             total = a.p * (below // a.q) * outer * W_square - b.p * (below // b.q) * square * W_outer
             if total == 0:
                 raise ArithmeticError("a term is 0")
-            self._integers[n], part = without(total, self._primes)
+            self._integers[n], part = taken_apart(total, self._primes)
             self._scales[n] = fmpq(part, below) if low == 1 else fmpq(part, below) / self._second
             if n > _DIRECT + 1:
                 self._order.append(n)
@@ -148,13 +150,3 @@ class Terms:
         if n not in table:
             self.integer(n)
         return table[n]
-
-
-def without(value: fmpz, primes: fmpz) -> tuple[fmpz, fmpz]:
-    """An integer that is not 0 without the primes that divide the other, and what has been taken away, positive."""
-    taken = fmpz(1)
-    common = primes.gcd(value % primes)
-    while common != 1:
-        value, taken = value // common, taken * common
-        common = common.gcd(value % common)
-    return value, taken
