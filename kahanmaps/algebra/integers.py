@@ -6,15 +6,27 @@ Numbers are long, and what they have of given primes is short: it is found from 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from flint import fmpz
+from flint import fmpq, fmpz
 
 SMALL_PRIMES = tuple(n for n in range(2, 100) if all(n % k for k in range(2, int(n**0.5) + 1)))
 _LOW = (fmpz(1) << 64) - 1
 
 
-def content(integers: Sequence[fmpz]) -> fmpz:
+def over_one(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
+    """The numerators of rational numbers over their least common denominator, and that.
+
+    >>> over_one([fmpq(1, 2), fmpq(-2, 3), fmpq(5)])
+    ([3, -4, 30], 6)
+    """
+    pairs, below = [(number.p, number.q) for number in numbers], fmpz(1)
+    for _, q in pairs:
+        below = below.lcm(q)
+    return [p * (below // q) for p, q in pairs], below
+
+
+def content(integers: Iterable[fmpz]) -> fmpz:
     """The greatest common divisor of integers."""
     common = fmpz(0)
     for entry in integers:

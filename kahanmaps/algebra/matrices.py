@@ -14,6 +14,7 @@ from typing import Any, Self
 from flint import acb_mat, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import Field, operand
+from kahanmaps.algebra.integers import content, over_one
 from kahanmaps.errors import PrecisionLost, SingularMatrix
 
 
@@ -90,18 +91,13 @@ def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
 
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
     """The coprime integers proportional to a rational vector, the first that is not zero positive."""
-    below = fmpz(1)
-    for entry in vector:
-        below = below.lcm(entry.q)
-    integers = [entry.p * (below // entry.q) for entry in vector]
-    content = fmpz(0)
-    for integer in integers:
-        content = content.gcd(integer)
-    if content == 0:
+    integers, _ = over_one(vector)
+    common = content(integers)
+    if common == 0:
         return tuple(integers)
     if next(integer for integer in integers if integer != 0) < 0:
-        content = -content
-    return tuple(integer // content for integer in integers)
+        common = -common
+    return tuple(integer // common for integer in integers)
 
 
 class EntryMatrix(ABC):
@@ -193,12 +189,7 @@ class EntryMatrix(ABC):
 
 def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
     """The matrix with each row multiplied by its own denominator: same rank, same null space, smaller than by one."""
-    rows = []
-    for row in matrix.tolist():
-        below = fmpz(1)
-        for entry in row:
-            below = below.lcm(entry.q)
-        rows.append([entry.p * (below // entry.q) for entry in row])
+    rows = [over_one(row)[0] for row in matrix.tolist()]
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 
 

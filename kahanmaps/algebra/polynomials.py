@@ -12,6 +12,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
+from kahanmaps.algebra.integers import over_one
 from kahanmaps.errors import InputError, quoted
 
 
@@ -82,10 +83,7 @@ def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
 
 def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
     """The least positive integer whose product with `polynomial` has integer coefficients."""
-    common = fmpz(1)
-    for coefficient in polynomial.coeffs():
-        common = common.lcm(coefficient.q)
-    return common
+    return over_one(polynomial.coeffs())[1]
 
 
 def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
@@ -95,11 +93,8 @@ def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
     >>> digits_of([x/3, 1000*y])
     4
     """
-    coefficients = [coefficient for polynomial in polynomials for _, coefficient in polynomial.terms()]
-    below = fmpz(1)
-    for coefficient in coefficients:
-        below = below.lcm(coefficient.q)
-    longest = max([below, *(coefficient.p * (below // coefficient.q) for coefficient in coefficients)], key=abs)
+    integers, below = over_one(coefficient for polynomial in polynomials for coefficient in polynomial.coeffs())
+    longest = max([below, *integers], key=abs)
     return int(longest.bit_length() * 0.30103) + 1
 
 
@@ -172,11 +167,9 @@ def _evaluate_rational(polynomial: fmpq_mpoly, point: Sequence[fmpq]) -> fmpq:
     top = degree(polynomial)
     if top <= 0:
         return polynomial.leading_coefficient() if top == 0 else fmpq(0)
-    W = fmpz(1)
-    for entry in point:
-        W = W.lcm(entry.q)
+    X, W = over_one(point)
     below = common_denominator(polynomial)
-    powers = [[fmpz(1), entry.p * (W // entry.q)] for entry in point]
+    powers = [[fmpz(1), entry] for entry in X]
     powers_of_W = [fmpz(1), W]
     total = fmpz(0)
     for monomial, coefficient in polynomial.terms():

@@ -18,7 +18,7 @@ from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.analyses.beside import CAN_FORK, Beside, outcome
+from kahanmaps.laboratory.analyses.beside import CAN_FORK, Beside, outcome, with_answers
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
@@ -127,9 +127,9 @@ def analyze(
         seed: of everything random.
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
-        parts: the analyses to do, in this order; the verdict rests on these.
-        processes: 1, or 2: then forked copies of this process do some of the analyses, where there is a second
-            processor (on Linux only; what runs in other threads should bear a fork).
+        parts: the analyses to do, in this order but for those that need later ones; the verdict rests on these.
+        processes: 1, or more: then up to two forked copies of this process do some of the analyses, where there is a
+            second processor (on Linux only; what runs in other threads should bear a fork).
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -169,19 +169,24 @@ def analyze(
             ready = [part for part in left if not set(part.needs).intersection(found.pending)]
             chosen = [part for part in ready if part.is_apart and can_fork]
             if chosen:
-                beside.append(stack.enter_context(Beside(run, chosen)))
+                beside.append(Beside(run, chosen))
+                stack.callback(beside[-1].end)
+                beside[-1].start()
             elif ready:
                 chosen = ready[:1]
                 progress(chosen[0].name)
                 take(chosen[0], *outcome(run, chosen[0]))
-            left = [part for part in left if part not in chosen]
-            waiting = [one for one in beside if one.waiting]
-            if not (ready or any(one.has_answered for one in waiting)):
-                progress(waiting[0].waiting[0].name)
-                take(*waiting[0].next())
-            for one in waiting:
-                while one.has_answered:
+            for part in chosen:
+                left.remove(part)
+            if not (ready or any(one.waiting for one in beside)):
+                raise ValueError(f"these parts need each other: {', '.join(part.name for part in left)}")
+            if not ready:
+                progress(next(one.waiting[0].name for one in beside if one.waiting))
+            answered = with_answers(beside, 0 if ready else None)
+            while answered:
+                for one in answered:
                     take(*one.next())
+                answered = with_answers(beside, 0)
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")

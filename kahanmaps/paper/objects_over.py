@@ -16,7 +16,7 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_poly, fmpz, nmod_poly
+from flint import fmpq, fmpq_mat, fmpq_poly, nmod_poly
 
 from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.chance import random_prime_field
@@ -322,7 +322,7 @@ def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
     K = CC(bits)
     chi = chi_of(member.A)
     with K.working():
-        enclosures: Any = (chi * _common_denominator(chi.coeffs())).numer().complex_roots()
+        enclosures: Any = chi.numer().complex_roots()
         return tuple(K.convert(root) for root, _ in enclosures)
 
 
@@ -360,7 +360,7 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
     chi = chi_of(member.A)
     if rational_roots(member) is None:
         # d root is an algebraic integer, d the common denominator of chi; Cauchy bounds the root in every embedding.
-        below = _common_denominator(chi.coeffs())
+        below = chi.denom()
         largest = below * (2 + max(abs(chi[k]) for k in range(member.m)))
         root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(below)
     else:
@@ -445,10 +445,3 @@ def _matrices_by_factor(member: FamilyMember, K: Field) -> tuple[Any, ...] | Non
     if member.is_generic:
         return None
     return tuple(K.convert_matrix(associate.B) for associate in list(member.associated())[1:])
-
-
-def _common_denominator(numbers: Sequence[fmpq]) -> fmpz:
-    below = fmpz(1)
-    for number in numbers:
-        below = below.lcm(number.q)
-    return below

@@ -23,6 +23,7 @@ from kahanmaps.laboratory.analyses.beside import CAN_FORK
 from kahanmaps.laboratory.analyses.part import Of, Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 needs_fork = pytest.mark.skipif(not CAN_FORK, reason="a second process is for Linux")
 
@@ -136,6 +137,50 @@ def test_an_interrupt_is_for_the_first_process() -> None:
 
 
 @needs_fork
+def test_an_interrupt_while_a_process_is_made_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    fork = os.fork
+
+    def interrupted() -> int:
+        made = fork()
+        if made:
+            os.kill(os.getpid(), signal.SIGINT)
+        return made
+
+    monkeypatch.setattr("os.fork", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        analyze(load("harmonic"), parts=[apart("first", lambda *_, **__: time.sleep(60))], processes=2)
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@needs_fork
+def test_the_answer_that_comes_first_is_taken_first() -> None:
+    def slow(*_: Any, **__: Any) -> int:
+        time.sleep(3)
+        return 0
+
+    parts = [
+        apart("slow", slow),
+        replace(apart("here", where), is_apart=False),
+        replace(apart("quick", where), needs=("here",)),
+        replace(apart("last", lambda run, **_: run.found["slow"]), is_apart=False, needs=("quick",)),
+    ]
+    found = analyze(load("harmonic"), parts=parts, processes=2)
+    assert (found["slow"], found["last"]) == (0, None)
+    assert len({found["here"], found["quick"]}) == 2
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_parts_given_twice_are_done_twice_and_those_in_a_circle_are_refused(processes: int) -> None:
+    part = replace(apart("first", where), is_apart=False)
+    assert analyze(load("harmonic"), parts=[part, part], processes=processes)["first"] == os.getpid()
+    assert not analyze(load("harmonic"), parts=[apart("first", where)] * 2, processes=processes).pending
+    second = replace(part, name="second", needs=("first",))
+    with pytest.raises(ValueError, match="need each other: first, second"):
+        analyze(load("harmonic"), parts=[replace(part, needs=("second",)), second], processes=processes)
+
+
+@needs_fork
 def test_the_second_process_ends_with_the_first_and_with_its_analysis() -> None:
     def sleeping(*_: Any, **__: Any) -> int:
         time.sleep(60)
@@ -219,6 +264,29 @@ def test_parts_that_are_apart_read_what_they_need_and_are_read_by_those_that_nee
     ):
         kept = analyze(load(name), parts=parts)
         assert [part.name for part in checked if part.to_json(kept) != part.to_json(whole(name))] == []
+        assert [str(kept[one.result]) for one in checked] == [str(whole(name)[one.result]) for one in checked]
+
+
+def test_the_flow_of_a_polarised_map_is_part_of_the_report() -> None:
+    found = whole("duffing_polarised")
+    assert dict(found.sections)["the flow"]
+    assert [line for line in found.skipped if "flow" in line or "limit" in line] == []
+
+
+def test_without_integrals_there_is_nothing_of_the_flow() -> None:
+    parts = [part for part in ANALYSES if part.result in ("flow", "densities")]
+    found = analyze(load("euler_top"), parts=parts)
+    assert (found.flow, found.skipped) == (None, [])
+
+
+def test_integrals_of_members_are_counted_where_the_flow_is_looked_at() -> None:
+    def none(run: Run, **_: Any) -> Any:
+        found = find_integrals(run.bare)
+        return replace(found, integrals=(), profile=replace(found.profile, nullities=()), by_theorems=0)
+
+    parts = [replace(part, look=none) if part.name == "integrals" else part for part in ANALYSES]
+    parts = [part for part in parts if part.result in ("hamiltonian", "normal_form", "integrals", "flow")]
+    assert analyze(load("paper_m2"), parts=parts).flow.without_limit == 2
 
 
 @needs_fork

@@ -14,7 +14,7 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
-from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
+from kahanmaps.laboratory.preserve.limit.limits import flow_and_map, with_limit
 
 THREE_LINES = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["3*x*(x+2*y) + 6*x*y", "-(y*(x+2*y) + 3*x*y)"]')
 
@@ -152,6 +152,49 @@ def test_the_density_of_the_map_tends_to_one_of_the_flow():
         assert flow_and_map(search, densities).density.text == phi
         assert find_densities(load(name), flow=True).densities[0].text == phi
     assert flow_and_map(integrals_of("lorenz")).density is None
+
+
+def densities_of(found, *texts):
+    """A search that has found these densities of the map, on nobody's word."""
+    names = [*found.map_search.file.variables, "eps"]
+    model = find_densities(found.map_search.file)
+    [one, *_] = model.densities
+    return replace(model, densities=tuple(replace(one, function=parse_rational_function(t, names)) for t in texts))
+
+
+def test_the_limit_of_a_density_takes_the_place_of_a_density_of_the_flow():
+    found = beside("euler_top")
+    kept = "(x1^2 - x3^2 + 2)"  # any function of integrals of the flow
+    assert (found.density.text, found.density_search.densities[0].text) == ("1", "1")
+    # The first limit that the flow keeps: x1 is not kept.
+    given = densities_of(found, "x1 + eps", f"{kept}*(3 + eps*x1)", "7 + eps")
+    changed = with_limit(found, given)
+    assert (changed.density.text, changed.density_search) == ("x1^2 - x3^2 + 2", None)
+    assert str(changed.density.verdict) == "proved"
+    assert flow_and_map(found.map_search, given).density.text == changed.density.text
+    for without in (densities_of(found, "x1 + eps"), None):
+        assert with_limit(found, without) == found
+
+
+def test_factors_of_densities_are_darboux_polynomials_of_the_flow():
+    found = flow_and_map(integrals_of("riccati"))  # x' = x^2 + x - 1
+    assert found.density.text == "x^2 + x - 1"
+    assert [str(P) for P in found.polynomials] == ["x^2 + x - 1"]
+    bare = replace(found, polynomials=())
+    same = densities_of(found, "x^2 + x - 1 + eps*x")
+    assert [str(P) for P in with_limit(bare, same).polynomials] == ["x^2 + x - 1"]
+    other = replace(found, polynomials=tuple(P**2 for P in found.polynomials))
+    assert with_limit(other, same).polynomials == (*other.polynomials, *found.polynomials)
+
+
+def test_a_limit_of_a_density_may_have_symbols():
+    search = integrals_of("euler_top", "a1", "a2", "a3")
+    found = flow_and_map(search)
+    names = ["x1", "x2", "x3", "a1", "a2", "a3", "eps"]
+    model = find_densities(load("euler_top"))
+    phi = parse_rational_function("a3*x2^2 - a2*x3^2 + eps", names)
+    given = replace(model, densities=(replace(model.densities[0], function=phi),))
+    assert with_limit(found, given).density.text == "x3^2*a2 - x2^2*a3"
 
 
 def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():

@@ -5,6 +5,7 @@ orbits lie on elliptic curves, also on several in turn, and nowhere else; what i
 """
 
 from functools import reduce
+from io import StringIO
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -20,6 +21,7 @@ import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 import kahanmaps.maps.orbits.relations.somos as somos
 from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.errors import InputError
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
@@ -411,11 +413,31 @@ def test_points_that_are_not_wanted_are_left_out(name):
 def test_where_every_kth_point_is_wanted_others_are_left_out():
     given = load("euler_top").map, START[:3], "3/11"
     whole, found = orbit(*given, steps=85), orbit(*given, steps=85, every=40)
+    told: list[int] = []
+    found.write(StringIO(), "text", told=told.append)
+    assert len(told) < 40
     points, expected = list(found), list(whole)
-    assert [point.step for point in points if found.wanted(point.step)] == [0, 40, 80]
-    assert len(points) < 40
-    assert all(point == expected[point.step] for point in points)
+    assert [point.step for point in points] == [0, 40, 80]
+    assert points == [expected[point.step] for point in points] == [found[k] for k in range(3)]
     assert found.end == whole.end
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:200"])
+@pytest.mark.parametrize("asked", [{"steps": 7, "every": 3}, {"at": [3, 6]}, {"at": []}])
+def test_points_of_an_orbit_are_those_asked_for_in_every_arithmetic(arithmetic, asked):
+    found = orbit(load("euler_top").map, START[:3], "3/11", arithmetic=arithmetic, **asked)
+    steps = asked.get("at", [0, 3, 6])
+    assert [point.step for point in found] == [row["step"] for row in found.rows()] == steps
+    assert len(found) == len(list(found)) == len(steps)
+    stream = StringIO()
+    found.write(stream, "csv")
+    assert [line.split(",")[0] for line in stream.getvalue().splitlines()[1:]] == list(map(str, steps))
+
+
+@pytest.mark.parametrize("every", [0, -2, 2.5, "3", True])
+def test_every_is_a_positive_integer(every):
+    with pytest.raises(InputError, match="every"):
+        orbit(load("euler_top").map, START[:3], "3/11", steps=7, every=every)
 
 
 def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_out(monkeypatch):

@@ -11,7 +11,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from multiprocessing.connection import Connection, Pipe
+from multiprocessing.connection import Connection, Pipe, wait
 from typing import Any
 
 import kahanmaps.algebra.written.pickles  # noqa: F401
@@ -33,46 +33,49 @@ def outcome(run: Run, part: Part) -> tuple[Any, str]:
 
 
 class Beside:
-    """The parts that another process does, in their order, inside a `with` block, whose end is its end."""
+    """The parts that another process does, in their order, from `start` to `end`, which is to be called in any case."""
 
     def __init__(self, run: Run, parts: Sequence[Part]) -> None:
         self.waiting = list(parts)
         self._run = run
         self._process: int | None = None
+        self.answers, self._theirs = Pipe(duplex=False)
 
-    def __enter__(self) -> Beside:
-        self._answers, theirs = Pipe(duplex=False)
-        if self.waiting:
-            parent, held = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-            with suppress(OSError):  # no memory for one more process, or too many: then there are no answers
-                self._process = os.fork()
-            if self._process == 0:
-                self._answers.close()
-                _work(parent, self._run, self.waiting, theirs)
-            signal.pthread_sigmask(signal.SIG_SETMASK, held)  # only now Ctrl-C meets a process that is known
-        theirs.close()
-        return self
-
-    @property
-    def has_answered(self) -> bool:
-        """Whether something of the first one that is waiting has come."""
-        return bool(self.waiting) and self._answers.poll()
+    def start(self) -> None:
+        """Begin, or have no answers."""
+        parent, held = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        with suppress(OSError):  # no memory for one more process, or too many
+            self._process = os.fork()
+        if self._process == 0:
+            self.answers.close()
+            _work(parent, self._run, self.waiting, self._theirs)
+        self._theirs.close()
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)  # from here on Ctrl-C finds a process that `end` knows
 
     def next(self) -> tuple[Part, Any, str]:
         """The first one that is waiting and its outcome; where the process has ended early, it is done here."""
         part = self.waiting.pop(0)
         try:
-            found, reason = self._answers.recv()
+            found, reason = self.answers.recv()
         except (EOFError, OSError):  # killed, or it met an error, which it will meet here again
             found, reason = outcome(self._run, part)
         return part, found, reason
 
-    def __exit__(self, *_: object) -> None:
-        self._answers.close()
+    def end(self) -> None:
+        """The end of the process, if there is one."""
+        self.answers.close()
+        self._theirs.close()
         if self._process is not None:
             with suppress(ProcessLookupError, ChildProcessError):  # where SIGCHLD is ignored nobody waits for it
                 os.kill(self._process, signal.SIGKILL)
                 os.waitpid(self._process, 0)
+
+
+def with_answers(beside: Sequence[Beside], seconds: float | None) -> list[Beside]:
+    """Those that are waited for and have answered, or ended, after so many seconds at most."""
+    waiting = [one for one in beside if one.waiting]
+    answers = wait([one.answers for one in waiting], seconds) if waiting else []
+    return [one for one in waiting if one.answers in answers]
 
 
 def _work(parent: int, run: Run, parts: Sequence[Part], answers: Connection) -> None:

@@ -10,14 +10,14 @@ from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map, with_limit
 
 
-def integrals(run: Run, **budget: Any) -> FlowAndMap | None:
+def flow(run: Run, **budget: Any) -> FlowAndMap | None:
     """The limits of integrals for eps -> 0, and integrals and a density of the flow."""
     found = run.found
     return None if found.integrals is None else flow_and_map(found.integrals, known=found.integral_count, **budget)
 
 
-def densities(run: Run, **_: Any) -> FlowAndMap | None:
-    """The same with the limit of a density of the map."""
+def with_limit_of_density(run: Run, **_: Any) -> FlowAndMap | None:
+    """What was found of the flow, with the limit of a density of the map for its density, if that is one."""
     return None if run.found.flow is None else with_limit(run.found.flow, run.found.densities)
 
 

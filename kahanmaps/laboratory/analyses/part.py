@@ -46,9 +46,10 @@ class Part:
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
     slow_above: float = inf  # the dimension above which it comes last and gets a quarter of its share
-    needs: tuple[str, ...] = ()  # the parts that have to be gone through before
-    # Another process may do it, after those in `needs`: its result can be pickled, it reads nothing else but of parts
-    # that are apart and need the same, and only those that need it read what it found.
+    needs: tuple[str, ...] = ()  # names of the parts that are gone through before it, as far as they are to be done
+    # Another process may do it. Then its result can be pickled; of results of others `look` reads those that it needs
+    # and those of parts that are apart and need the same; and no `look` reads its result but of these and of parts that
+    # need it.
     is_apart: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 

@@ -1,4 +1,4 @@
-"""All analyses of the report, in the order in which they are done: each may use what those before it have found."""
+"""All analyses of the report, in the order in which one process does them: each may use what was found before."""
 
 from __future__ import annotations
 
@@ -79,24 +79,25 @@ ANALYSES = (
     Part("relations along orbits", integrals.relations, of=Of.EVERY, result="relations", json=integrals.relations_json),
     Part("densities", densities.densities, "measure", densities.statements, Of.EVERY, share=0.25),
     Part(
-        "integrals of the flow",
-        flow.integrals,
-        of=Of.MAPS_OVER_Q,
-        share=0.03,
-        result="flow",
-        needs=("the commuting family", "integrals"),
-        is_apart=True,
-        json=lambda _: {},
-    ),
-    Part(
         "the flow",
-        flow.densities,
+        flow.flow,
         "the flow",
         flow.statements,
         Of.MAPS_OVER_Q,
         share=0.03,
-        needs=("integrals of the flow", "densities"),
         result="flow",
+        reads=("the limit of a density",),
+        needs=("the commuting family", "integrals"),
+        is_apart=True,
+    ),
+    # Put into what was found of the flow: so densities are sought while the flow is looked at.
+    Part(
+        "the limit of a density",
+        flow.with_limit_of_density,
+        of=Of.EVERY,
+        result="flow",
+        needs=("the flow", "densities"),
+        json=lambda _: {},
     ),
     Part(
         "Poisson tensors",

@@ -19,7 +19,7 @@ from typing import Any
 from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
-from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, radical, taken_apart, without
+from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_one, radical, taken_apart, without
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
@@ -45,7 +45,7 @@ class AlgebraBlock(LevelBlock):
         if disc != 0:
             numbers.append(self.algebra.norm(disc).p)
         image = [self.algebra.norm(entry) for entry in self.lifts[2]]
-        numbers += [reduce(fmpz.gcd, [norm.p for norm in image], fmpz(0)), *(norm.q for norm in image)]
+        numbers += [content(norm.p for norm in image), *(norm.q for norm in image)]
         return radical(*numbers)
 
     @cached_property
@@ -98,14 +98,11 @@ class AlgebraBlock(LevelBlock):
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
-            above, below = [e for z in (U, V) for e in (z / W).coefficients], fmpz(1)
-            for entry in above:
-                below = below.lcm(entry.q)
-            return [(entry * below).p for entry in above], below, below
+            above, below = over_one(e for z in (U, V) for e in (z / W).coefficients)
+            return above, below, below
         cofactor, norm = _adjugate(W)
         above = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
-        content = reduce(fmpz.gcd, [entry.p for entry in cofactor.coefficients], fmpz(0))
-        rest, part = taken_apart(content, self.bad**3)
+        rest, part = taken_apart(content(entry.p for entry in cofactor.coefficients), self.bad**3)
         common = common_part([norm.p, *above], self.bad**4 * part)  # taken out once rather than from every coordinate
         return [entry // common for entry in above], norm.p // common, rest
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.integers import common_part, content, divide_exactly, radical, taken_apart, without
+from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical, taken_apart, without
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 IntegerTriple = tuple[fmpz, fmpz, fmpz]
@@ -66,18 +66,14 @@ class IntegerBlock(LevelBlock):
     """
 
     def __init__(self, cubic: Sequence[fmpq], eps: fmpq, u: fmpq, v: fmpq) -> None:
-        below = fmpz(1)
-        for coefficient in cubic:
-            below = below.lcm(coefficient.q)
-        integers = [(coefficient * below).p for coefficient in cubic]
+        integers, below = over_one(cubic)
         common = content(integers)
         if common == 0:
             common = fmpz(1)
         self.block = PlanarBlock(*(entry // common for entry in integers))
         self.scale: fmpq = 2 * eps * fmpq(common, below)
-        U, V = u * self.scale, v * self.scale
-        W = U.q.lcm(V.q)
-        self.start = primitive(((U * W).p, (V * W).p, W))
+        (U, V), W = over_one((u * self.scale, v * self.scale))
+        self.start = U, V, W
 
     @cached_property
     def bad(self) -> fmpz:
@@ -201,10 +197,7 @@ class Integers:
         self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
     ) -> IntegerTriple:
         """The primitive triple of the sum of scale times term times lift, which the divisor divides."""
-        below = fmpz(1)
-        for scale in scales:
-            below = below.lcm(scale.q)
-        factors = [(scale * below).p for scale in scales]
+        factors, _ = over_one(scales)
         raw = [
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
@@ -213,10 +206,8 @@ class Integers:
 
 
 def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
-    below = fmpz(1)
-    for entry in chain(*points):
-        below = below.lcm(entry.q)
-    return [((U * below).p, (V * below).p, (W * below).p) for U, V, W in points]
+    integers, _ = over_one(chain(*points))
+    return list(zip(integers[::3], integers[1::3], integers[2::3], strict=True))
 
 
 def primitive(triple: Sequence[fmpz]) -> IntegerTriple:

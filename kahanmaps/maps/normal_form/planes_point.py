@@ -17,7 +17,7 @@ from operator import mul
 
 from flint import fmpq, fmpz, fmpz_mat
 
-from kahanmaps.algebra.integers import content, divide_exactly, is_all, radical
+from kahanmaps.algebra.integers import content, divide_exactly, is_all, over_one, radical
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
@@ -74,10 +74,7 @@ class Assembly:
 
 def _row(blocks: Sequence[Block], forms: Sequence[Sequence[fmpq]]) -> _Row:
     support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
-    below = fmpz(1)
-    for i in support:
-        for entry in forms[i]:
-            below = below.lcm(entry.q)
+    _, below = over_one(chain(*forms))
     integers, factors, dividing = [], [below], []
     for i in support:
         form = tuple((entry * below).p for entry in forms[i])
@@ -124,13 +121,8 @@ class PlanesPoint:
         """
         if self._height is None:
             numerators, below = self.common()
-            common = below
-            for entry in numerators:
-                if common == 1:
-                    break
-                common = common.gcd(entry % common)  # large once, small from then on
             largest = max(map(abs, [*numerators, below]))
-            self._height = int((largest // abs(common)).bit_length())
+            self._height = int((largest // content([below, *numerators])).bit_length())
         return self._height
 
     def exceeding(self, limit: int) -> int:

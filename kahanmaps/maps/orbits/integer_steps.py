@@ -12,6 +12,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
+from kahanmaps.algebra.integers import content, over_one
 from kahanmaps.maps.orbits.constant_rows import ConstantRows
 from kahanmaps.maps.orbits.elimination import eliminated, is_the_solution
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -35,10 +36,7 @@ class IntegerSteps:
         entries = [fmpz(0)] * (n * (n + 1) * len(exponents))
         self._scale = fmpz(1)
         for i, row in enumerate(terms):
-            below = fmpz(1)
-            for entry in row:
-                for _, coefficient in entry:
-                    below = below.lcm(coefficient.q)
+            _, below = over_one(coefficient for entry in row for _, coefficient in entry)
             self._scale *= below
             for j, entry in enumerate(row):
                 for k, coefficient in entry:
@@ -194,11 +192,7 @@ def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None
     """The point in lowest terms; None where the denominator is 0."""
     if denominator == 0:
         return None
-    common = denominator  # of any sign: a gcd is positive
-    for numerator in numerators:
-        if common == 1:
-            break
-        common = common.gcd(numerator % common)
+    common = content((denominator, *numerators))
     if denominator < 0:
         common = -common
     return IntegerPoint(tuple(numerator // common for numerator in numerators), denominator // common)

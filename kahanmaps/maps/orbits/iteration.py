@@ -40,9 +40,9 @@ class OrbitEnd:
     """How an orbit ended.
 
     `status` is "completed", "periodic" (completed, and the start came back), "singular", "budget", "precision"
-    (balls too wide), "overflow" (machine floats) or "interrupted"; `steps` is the index of the last point
-    delivered. Modulo p a birational map need not be injective: an orbit may run into a cycle that its start is not on,
-    and is then "completed".
+    (balls too wide), "overflow" (machine floats) or "interrupted"; `steps` is the number of the last point, delivered
+    or left out as not wanted. Modulo p a birational map need not be injective: an orbit may run into a cycle that its
+    start is not on, and is then "completed".
     """
 
     status: str

@@ -82,7 +82,7 @@ def orbit(
             number field.
         method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
         backward: step by the inverse map.
-        every: multiples of it are wanted; others are left out where that is quicker, as `wanted` tells.
+        every: multiples of it alone are wanted.
         max_digits: the digit budget in exact arithmetic (200,000 unless given).
         hamiltonian, member: what is known of a quadratic system, so that its normal form need not be searched.
         normal_form: the normal form itself, or why there is none; looked for where it pays unless given.
@@ -105,6 +105,8 @@ def orbit(
     if (steps is None) == (at is None):
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
     require_steps(steps)
+    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+        raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
     start = _numbers(start, arithmetic)
     far = max(at, default=0) if at is not None else (steps or 0)
@@ -207,10 +209,6 @@ class Trajectory:
         relations = getattr(self.orbit, "relations", None)
         return self._why if relations is None else f"{self._why}; {relations}"
 
-    def wanted(self, step: int) -> bool:
-        """Whether this step is one that was asked for: others may come as well."""
-        return self._asked.wants(step)
-
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
         self.orbit.interrupt()
@@ -225,8 +223,8 @@ class Trajectory:
 
     @cached_property
     def points(self) -> list[OrbitPoint]:
-        """All points."""
-        return list(self._computed())
+        """All points that were asked for."""
+        return [point for point in self._computed() if self._asked.wants(point.step)]
 
     def __len__(self) -> int:
         return len(self.points)
@@ -312,9 +310,9 @@ class Trajectory:
         with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
             writer.header(self.header(name))
             try:
-                for point in self:
+                for point in self._known():
                     told(point.step)
-                    if self.wanted(point.step):
+                    if self._asked.wants(point.step):
                         writer.point(point.step, point.text, self.values(point))
                 end = self.end
             except OutputFull as full:
@@ -370,6 +368,10 @@ class Trajectory:
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # `list` asks for the length between here and the first point
+        yield from (point for point in self._known() if self._asked.wants(point.step))
+
+    def _known(self) -> Iterator[OrbitPoint]:
+        """The points that are kept, or all that are computed now, of which not all need be asked for."""
         yield from self.points if "points" in self.__dict__ else self._computed()
 
     def _computed(self) -> Iterator[OrbitPoint]:

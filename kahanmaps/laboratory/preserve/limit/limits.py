@@ -188,7 +188,8 @@ def flow_and_map(
 
     Args:
         search: the integrals of the map, for every eps.
-        densities: those of the map, if they are known.
+        densities: those of the map, if they are known: a limit of one of them is told rather than a density of the flow
+            that was sought.
         flow: the integrals of the flow; by default they are sought, up to a low degree, where the limits of those of
             the map are not all there can be.
         known: how many integrals the map is known to have, if that is more than `search` tells.
@@ -239,7 +240,7 @@ def flow_and_map(
 
 
 def with_limit(found: FlowAndMap, densities: DensitySearch | None) -> FlowAndMap:
-    """The same with the limit of a density of the map for the density of the flow, where it is one."""
+    """What was found, the limit of a density of the map in the place of the density if the flow keeps that limit."""
     search = found.map_search
     if densities is None or not isinstance(search.file.map, Kahan):
         return found
