@@ -166,7 +166,7 @@ class MapOver(ABC):
         for one in self.factors:
             with self.field.working():
                 try:
-                    image = tuple(solve(one.denominator_matrix(image), one.right_side(image)).entries())
+                    image = tuple(solve(*one.linear_system(image)).entries())
                 except SingularMatrix as error:
                     raise self._singular(x) from error
         return image
@@ -241,7 +241,7 @@ class ComposedMapOver(MapOver):
 class StepOver(MapOver):
     """A map over a field with an equation M(x) x~ = r(x).
 
-    It has to give `denominator_matrix` M(x), `right_side` r(x), `numerator_matrix`, `inverse` and `equation`.
+    It has to give `linear_system`, `denominator_matrix`, `numerator_matrix`, `inverse` and `equation`.
     """
 
     @property
@@ -253,8 +253,8 @@ class StepOver(MapOver):
         """The matrix M(x)."""
 
     @abstractmethod
-    def right_side(self, x: tuple[Any, ...]) -> Any:
-        """r(x), a column."""
+    def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
+        """M(x), and r(x) as a column."""
 
     @abstractmethod
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
@@ -327,11 +327,12 @@ class EquationMap(StepOver):
 
     def denominator_matrix(self, point: Sequence[Any]) -> Any:
         """The matrix M(x)."""
-        n = self.dim
-        return self.field.matrix(n, n, [entry for row in self._at(self.point(point)) for entry in row[:n]])
+        return self.linear_system(self.point(point))[0]
 
-    def right_side(self, x: tuple[Any, ...]) -> Any:
-        return self.field.column([-row[-1] for row in self._at(x)])
+    def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
+        rows, n = self._at(x), self.dim
+        matrix = self.field.matrix(n, n, [entry for row in rows for entry in row[:n]])
+        return matrix, self.field.column([-row[-1] for row in rows])
 
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
         """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~."""

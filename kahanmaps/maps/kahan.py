@@ -57,10 +57,11 @@ class KahanMapOver(StepOver):
         with self.field.working():
             return self._identity - self.local.jacobian(x) * self.eps
 
-    def right_side(self, x: tuple[Any, ...]) -> Any:
-        """(I + eps B) x + 2 eps c."""
+    def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
+        """I - eps f'(x) and (I + eps B) x + 2 eps c."""
         column = self.field.column(x)
-        return column + (self.local.B * column + self.local.c * self.field.convert(2)) * self.eps
+        side = column + (self.local.B * column + self.local.c * self.field.convert(2)) * self.eps
+        return self.denominator_matrix(x), side
 
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
         """The matrix I + eps f'(x~)."""

@@ -204,7 +204,7 @@ def test_kahan_maps_are_bilinear_maps_and_polarised_maps_of_degree_two(x, eps):
     for other in others:
         over = other.at(eps)
         assert over.denominator_matrix(x) == one.denominator_matrix(x)
-        assert over.right_side(x) == one.right_side(x)
+        assert over.linear_system(x) == one.linear_system(x)
         assert over.inverse.denominator_matrix(x) == one.inverse.denominator_matrix(x)
         assert over.numerator_matrix(x, x) == one.numerator_matrix(x, x)
 
