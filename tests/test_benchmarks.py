@@ -77,10 +77,9 @@ def test_longer_orbits_are_the_same_with_relations_and_in_normal_form(name, monk
     monkeypatch.setattr(bench_catalogue, "LONG_BITS", 5_000)
     file = load(name)
     normal = system_normal_form(file.system) if name == "paper_m2" else None
-    try:
-        rows = bench_catalogue._longer(name, file.map.at(bench_catalogue.EPS), normal, "matsolve on integers")
-    except work.Absent as reason:
-        pytest.skip(str(reason))
+    # PARI is not everywhere; FLINT's plain solve takes its place.
+    monkeypatch.setattr(bench_catalogue, "pari", lambda over, n, way: (1.0, bench_catalogue.plain(over, n), way))
+    rows = bench_catalogue._longer(name, file.map.at(bench_catalogue.EPS), normal, "plain")
     assert [one["group"] for one in rows] == [bench_catalogue.LONG] * 2
     assert rows[0]["work"].startswith(f"{name}, N = ")
     monkeypatch.setattr(bench_catalogue, "pari", lambda *_: (1.0, [], ""))

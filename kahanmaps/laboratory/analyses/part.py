@@ -47,9 +47,8 @@ class Part:
     reads: tuple[str, ...] = ()
     slow_above: float = inf  # the dimension above which it comes last and gets a quarter of its share
     needs: tuple[str, ...] = ()  # names of the parts that are gone through before it, as far as they are to be done
-    # Another process may do it. Then its result can be pickled; of results of others `look` reads those that it needs
-    # and those of parts that are apart and need the same; and no `look` reads its result but of these and of parts that
-    # need it.
+    # Another process may do it. Such parts with the same needs go together: they read what they need and each other,
+    # and are read by parts that need them. The result can be pickled.
     is_apart: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 
