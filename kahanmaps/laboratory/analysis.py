@@ -18,7 +18,7 @@ from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.analyses.beside import CAN_FORK, Beside, outcome, with_answers
+from kahanmaps.laboratory.analyses.beside import CAN_FORK, Beside, outcome, together
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
@@ -128,8 +128,8 @@ def analyze(
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
         parts: the analyses to do, in this order but for those that need later ones; the verdict rests on these.
-        processes: 1, or more: then up to two forked copies of this process do some of the analyses, where there is a
-            second processor (on Linux only; what runs in other threads should bear a fork).
+        processes: 1, or more: then a forked copy of this process does some of the analyses, where there is a second
+            processor (on Linux only; what runs in other threads should bear a fork).
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -163,30 +163,38 @@ def analyze(
         found.pending.remove(part.name)
         reached(found)
 
+    slow = {part.name for part in todo if run.dim > part.slow_above}
+
+    def unmet(part: Part) -> set[str]:
+        return set(part.needs).intersection(found.pending) - slow
+
     with ExitStack() as stack:
-        left, beside = list(todo), list[Beside]()
+        left, beside = list(todo), None
         while found.pending:
-            ready = [part for part in left if not set(part.needs).intersection(found.pending)]
-            chosen = [part for part in ready if part.is_apart and can_fork]
-            if chosen:
-                beside.append(Beside(run, chosen))
-                stack.callback(beside[-1].end)
-                beside[-1].start()
-            elif ready:
-                chosen = ready[:1]
-                progress(chosen[0].name)
-                take(chosen[0], *outcome(run, chosen[0]))
+            ready = [part for part in left if not unmet(part)]
+            if can_fork and len(ready) > 1 and not (beside and beside.waiting) and (apart := together(left, unmet)):
+                beside = Beside(run, apart)
+                stack.callback(beside.end)
+                beside.start()
+                for part in beside.waiting:
+                    left.remove(part)
+                ready = [part for part in left if not unmet(part)]
+            chosen: Sequence[Part] = ()
+            if ready:
+                chosen = [min(ready, key=lambda part: can_fork and part.is_apart)]
+                left.remove(chosen[0])
+            elif beside:
+                chosen = beside.claim()
             for part in chosen:
-                left.remove(part)
-            if not (ready or any(one.waiting for one in beside)):
-                raise ValueError(f"these parts need each other: {', '.join(part.name for part in left)}")
-            if not ready:
-                progress(next(one.waiting[0].name for one in beside if one.waiting))
-            answered = with_answers(beside, 0 if ready else None)
-            while answered:
-                for one in answered:
-                    take(*one.next())
-                answered = with_answers(beside, 0)
+                progress(part.name)
+                take(part, *outcome(run, part))
+            if not chosen:
+                if not (beside and beside.waiting):
+                    raise ValueError(f"these parts need each other: {', '.join(part.name for part in left)}")
+                progress(beside.waiting[0].name)
+                take(*beside.next())
+            while beside and beside.waiting and beside.answers.poll():
+                take(*beside.next())
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")

@@ -8,12 +8,17 @@ from kahanmaps.laboratory.analyses.integrals import listed
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
+from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities, with_factors
 
 
 def densities(run: Run, **budget: Any) -> DensitySearch:
     """One in closed form, and whether there are others."""
-    return find_densities(run.bare, **run.asked, integrals=run.integrals, **budget)
+    return find_densities(run.bare, **run.asked, integrals=(), **budget)
+
+
+def with_factors_of_integrals(run: Run, **_: Any) -> DensitySearch | None:
+    """What was found, or a product of powers of factors of the integrals."""
+    return None if run.found.densities is None else with_factors(run.found.densities, run.integrals)
 
 
 def statements(found: Findings) -> list[Statement]:

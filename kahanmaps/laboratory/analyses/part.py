@@ -42,13 +42,14 @@ class Part:
     title: str = ""
     statements: Callable[[Any], Sequence[Statement]] | None = None
     of: Of = Of.FIELDS
-    share: float = 0.1  # of the whole time
+    share: float = 0.1  # of the whole time; 0 for what is quick, and done where the time is over as well
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
-    slow_above: float = inf  # the dimension above which it comes last and gets a quarter of its share
+    # The dimension above which it comes last, gets a quarter of its share, and is not waited for by those that need it.
+    slow_above: float = inf
     needs: tuple[str, ...] = ()  # names of the parts that are gone through before it, as far as they are to be done
-    # Another process may do it. Such parts with the same needs go together: they read what they need and each other,
-    # and are read by parts that need them. The result can be pickled.
+    # Another process may do it: it reads nothing but what it needs, and is read by those that need it. The result can
+    # be pickled.
     is_apart: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 

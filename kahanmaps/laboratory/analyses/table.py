@@ -44,7 +44,7 @@ ANALYSES = (
         reads=("equivalent systems",),
     ),
     Part("equivalent systems", vector_field.equivalent, result="equivalent"),
-    # Degrees make use of singularities; but in more dimensions these are slow, and come last.
+    # Degrees make use of singularities; but in more dimensions these are slow, come last, and are not waited for.
     Part(
         "singularities",
         singularities.singularities,
@@ -64,6 +64,7 @@ ANALYSES = (
         Of.EVERY,
         share=0.25,
         reads=("heights",),
+        needs=("singularities",),
         is_apart=True,
     ),
     Part(
@@ -77,7 +78,25 @@ ANALYSES = (
     ),
     Part("invariant curves", integrals.curves, of=Of.MAPS_OVER_Q, result="pencil", json=integrals.curves_json),
     Part("relations along orbits", integrals.relations, of=Of.EVERY, result="relations", json=integrals.relations_json),
-    Part("densities", densities.densities, "measure", densities.statements, Of.EVERY, share=0.25),
+    Part(
+        "densities",
+        densities.densities,
+        "measure",
+        densities.statements,
+        Of.EVERY,
+        share=0.25,
+        reads=("integrals", "densities from integrals"),
+        is_apart=True,
+    ),
+    Part(
+        "densities from integrals",
+        densities.with_factors_of_integrals,
+        of=Of.EVERY,
+        share=0,
+        result="densities",
+        needs=("integrals", "densities"),
+        json=lambda _: {},
+    ),
     Part(
         "the flow",
         flow.flow,
@@ -90,13 +109,13 @@ ANALYSES = (
         needs=("the commuting family", "integrals"),
         is_apart=True,
     ),
-    # Put into what was found of the flow: so densities are sought while the flow is looked at.
     Part(
         "the limit of a density",
         flow.with_limit_of_density,
         of=Of.EVERY,
+        share=0,
         result="flow",
-        needs=("the flow", "densities"),
+        needs=("the flow", "densities from integrals"),
         json=lambda _: {},
     ),
     Part(

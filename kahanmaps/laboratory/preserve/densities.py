@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from math import comb, prod
 from typing import Any
@@ -90,6 +90,11 @@ class DensitySearch(Search):
     def none_there(self) -> bool:
         """Whether all that was asked for was tried, and nothing is a density: measured."""
         return not self.densities and not self.cut
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nothing was found of a map, so that factors of integrals may be tried."""
+        return not (self.densities or self.turning or self.flow)
 
     @property
     def reason(self) -> str:
@@ -182,31 +187,44 @@ def find_densities(
     require_time(seconds)
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
-    laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    densities, tried, cut, period = list[FoundDensity](), -1, laboratory.defect, None
+    laboratory, deadline = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True), time.monotonic() + seconds
+    if laboratory.defect:
+        return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
+    period = None if flow else _period(laboratory)
     product = turning = None
-    if not cut:
-        period = None if flow else _period(laboratory)
-        deadline = time.monotonic() + seconds
-        theorem, dim = _theorem(laboratory), laboratory.map.dim
-        if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
-            densities, tried = [theorem], theorem.degree(dim)
-        else:
-            progress("densities that are products")
-            product, turning = _products(laboratory, max_degree)
-            densities, tried, cut = _search(laboratory, product, max_degree, deadline, progress)
-            if densities and all(one.verdict is not Verdict.PROVED for one in densities):
-                densities = [*_product_of_variables(laboratory, max_degree), *densities]
-            if not densities and turning is None and not flow and time.monotonic() < deadline:
-                if integrals is None:
-                    left = deadline - time.monotonic()
-                    found = find_integrals(file, symbols=symbols, eps=eps, seconds=left, seed=seed, progress=progress)
-                    integrals = found.integrals
-                progress("densities that are products of factors of integrals")
-                product, turning = _products(laboratory, max_degree, integrals)
-                if product is not None:
-                    densities, tried = [product], product.degree(dim)
-    return DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
+    theorem, dim, cut = _theorem(laboratory), laboratory.map.dim, ""
+    if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
+        densities, tried = [theorem], theorem.degree(dim)
+    else:
+        progress("densities that are products")
+        product, turning = _products(laboratory, max_degree)
+        densities, tried, cut = _search(laboratory, product, max_degree, deadline, progress)
+        if densities and all(one.verdict is not Verdict.PROVED for one in densities):
+            densities = [*_product_of_variables(laboratory, max_degree), *densities]
+    found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
+    if found.is_open and time.monotonic() < deadline:
+        if integrals is None:
+            left = deadline - time.monotonic()
+            searched = find_integrals(file, symbols=symbols, eps=eps, seconds=left, seed=seed, progress=progress)
+            integrals = searched.integrals
+        progress("densities that are products of factors of integrals")
+        found = with_factors(found, integrals, max_degree)
+    return found
+
+
+def with_factors(
+    found: DensitySearch, integrals: Sequence[FoundIntegral], max_degree: int | None = None
+) -> DensitySearch:
+    """What was found or, if that is nothing, a product of powers of factors of integrals that is a density."""
+    if not (found.is_open and integrals):
+        return found
+    laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed, algebraic=True)
+    if laboratory.defect:
+        return found
+    product, turning = _products(laboratory, max_degree, integrals)
+    if product is None:
+        return replace(found, turning=turning)
+    return replace(found, densities=(product,), degree=product.degree(laboratory.map.dim), turning=turning)
 
 
 def _search(
