@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from flint import fmpz_mat, nmod_mat
+from flint import fmpz_mat, nmod, nmod_mat
 
 
-def matrix(rows: Sequence[Sequence[int]], prime: int) -> nmod_mat:
-    """The matrix modulo a prime with these rows of integers, at least one."""
+def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
+    """The matrix modulo a prime with these rows, at least one, of integers or of residues."""
+    if rows[0] and isinstance(rows[0][0], nmod):
+        return nmod_mat(rows, prime)
     return nmod_mat(fmpz_mat(rows), prime)  # in half the time that nmod_mat takes for integers of Python
 
 
@@ -18,7 +20,7 @@ def integers(A: nmod_mat) -> list[list[int]]:
     return [list(map(int, row)) for row in A.tolist()]
 
 
-def null_space(rows: Sequence[Sequence[int]], columns: int, prime: int) -> list[list[int]]:
+def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[list[int]]:
     """The canonical basis (reduced echelon form) of the vectors that all rows annihilate, modulo a prime."""
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
@@ -82,6 +84,6 @@ def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
     return [next(k for k, entry in enumerate(row) if entry) for row in rows]
 
 
-def rank(vectors: Sequence[Sequence[int]], prime: int) -> int:
+def rank(vectors: Sequence[Sequence[Any]], prime: int) -> int:
     """The rank of vectors modulo a prime."""
     return int(matrix(vectors, prime).rank()) if vectors else 0

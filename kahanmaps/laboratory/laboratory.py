@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 from flint import fmpq
@@ -31,6 +33,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
+from kahanmaps.laboratory.preserve.separated import Separated, separated
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
@@ -100,6 +103,7 @@ class Laboratory:
             self.field = self.map.of_field
             self.map = euler_map(self.field)
         self.flow = flow
+        self._too_long: dict[bool, int] = {}  # of integrals and of densities: how many terms the shortest one had
         if flow and (self.field is None or self.eps is not None):
             what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
             raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
@@ -203,13 +207,32 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Verdict, Evidence]:
-        """Whether the map, or the flow, keeps I or dx/phi, as identities.verdict_on has it; of a flow by expansion."""
+        """Whether the map, or the flow, keeps I or dx/phi, as identities.verdict_on has it; of a flow by expansion.
+
+        What is no shorter than what was too long to expand is not expanded.
+        """
         if self.field is not None and self.flow:
             kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
             evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
             return (Verdict.PROVED if kept else Verdict.REFUTED), evidence
         map_ = self.map if self.root is None else self.file.map
-        return verdict_on(map_, function, self.eps, self.seed, is_density=is_density, factor=factor)
+        told: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
+        separated = self._separated
+        terms = len(function.numerator) + len(function.denominator)
+        expands = separated is None and terms < self._too_long.get(is_density, math.inf)
+        verdict, evidence = verdict_on(map_, function, **told, factor=factor, expands=expands)
+        if verdict is Verdict.SUPPORTED and separated is not None:
+            given = separated.function(function), None if factor is None else separated.function(factor)
+            there, proof = verdict_on(separated.system, given[0], **told, factor=given[1])
+            if there is Verdict.PROVED:
+                return there, replace(proof, summary=f"{proof.summary}, in coordinates in which the planes separate")
+        elif verdict is Verdict.SUPPORTED and expands:
+            self._too_long[is_density] = terms
+        return verdict, evidence
+
+    @cached_property
+    def _separated(self) -> Separated | None:
+        return None if self.system is None or self.symbols else separated(self.system)
 
     def formulas(
         self,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
-from flint import nmod_poly
+from flint import nmod, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import rank
@@ -19,6 +19,7 @@ from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
+Values = Sequence[Any]  # as nmod, whose products take half the time of those of Python's integers; or as integers
 Exponent = tuple[int, ...]
 _TRIES = 60
 _NO_VALUE = "the map has no value at random points modulo a prime"
@@ -101,7 +102,7 @@ class ModularMap:
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
-    ) -> tuple[list[list[int]], Point, int | None]:
+    ) -> tuple[Sequence[Values], Point, int | None]:
         """The values of all monomials up to a degree along an orbit: a row a point; the first point; the period.
 
         A polynomial vanishes along the orbit if the `count` rows annihilate its coefficients. With a `support`, the
@@ -112,10 +113,10 @@ class ModularMap:
         layers = _layers(self.dim, degree) if support is None else _layers_of(self.dim, degree, support)
         return [_products(x, layers, self.prime) for x in points], points[0], period
 
-    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
+    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
         """The values of all monomials up to a degree at a point, and a step later; each times its number of `by`."""
-        p = self.prime
-        return monomial_values(x, degree, p, by[0]), monomial_values(image, degree, p, by[1])
+        layers, p = _layers(self.dim, degree), self.prime
+        return _products(x, layers, p, by[0]), _products(image, layers, p, by[1])
 
 
 @cache
@@ -152,15 +153,15 @@ def _layers(dim: int, degree: int) -> list[list[tuple[int, int]]]:
     return _layers_of(dim, degree, range(len(exponents_up_to(dim, degree))))
 
 
-def monomial_values(point: Point, degree: int, prime: int, factor: int = 1) -> list[int]:
-    """The values of all monomials of degree at most `degree` at a point modulo a prime, times a factor."""
-    return _products(point, _layers(len(point), degree), prime, factor)
+def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
+    """The values of all monomials of degree at most `degree` at a point modulo a prime."""
+    return list(map(int, _products(point, _layers(len(point), degree), prime)))
 
 
-def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> list[int]:
-    table = [factor]
+def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> Values:
+    x, table = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
     for layer in layers:
-        table += [table[place] * point[variable] % prime for variable, place in layer]
+        table += [table[place] * x[variable] for variable, place in layer]
     return table
 
 

@@ -56,7 +56,7 @@ def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
     ((x, image),) = map_.pairs(1)
     plain, weighed = map_.moved(x, image, 2), map_.moved(x, image, 2, (3, 5))
     for values, more, number in zip(plain, weighed, (3, 5), strict=True):
-        assert [number * value % PRIME for value in values] == [value % PRIME for value in more]
+        assert [number * int(value) % PRIME for value in values] == [int(value) % PRIME for value in more]
     assert plain[0] != plain[1]
 
 

@@ -103,7 +103,7 @@ ANALYSES = (
         "the flow",
         flow.statements,
         Of.MAPS_OVER_Q,
-        share=0.03,
+        share=0.06,
         result="flow",
         reads=("the limit of a density",),
         needs=("the commuting family", "integrals"),

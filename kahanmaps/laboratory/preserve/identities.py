@@ -33,6 +33,7 @@ def verdict_on(
     *,
     is_density: bool,
     factor: RationalFunction | None = None,
+    expands: bool = True,
 ) -> tuple[Verdict, Evidence]:
     """Whether I(x~) = I(x); of a density phi whether phi(x~) = det dPhi(x) phi(x), which says that dx/phi is invariant.
 
@@ -45,6 +46,7 @@ def verdict_on(
         seed: of the random points.
         is_density: whether the function is a phi.
         factor: c, a function of the same names, for I(x~) = c I(x) or c phi; None for 1.
+        expands: whether to try a proof where random points support it.
 
     Returns:
         The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
@@ -67,7 +69,7 @@ def verdict_on(
     """
     map_ = as_map(given)
     identity = _identity(map_, function, eps, is_density, factor)
-    return judged(identity, seed, expands=map_.dim <= MAX_DIMENSION)
+    return judged(identity, seed, expands=expands and map_.dim <= MAX_DIMENSION)
 
 
 def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verdict, Evidence]:

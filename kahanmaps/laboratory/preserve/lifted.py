@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, Values, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span_of_relations
 
@@ -71,7 +71,7 @@ class Lifted(ModularMap):
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
-    ) -> tuple[list[list[int]], Point, int | None]:
+    ) -> tuple[Sequence[Values], Point, int | None]:
         """The values along an orbit, as for other maps."""
         points, shift = self.orbit(count + self.lift.shift), self.lift.shift
         closed = len(points) < count + shift
@@ -80,7 +80,7 @@ class Lifted(ModularMap):
         chosen = rows if support is None else [[row[k] for k in support] for row in rows]
         return chosen, points[0], len(points) if closed else None
 
-    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
+    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
         """The values at a point, and those a step later; each times its number of `by`."""
         points = [x, image]
         while len(points) < self.lift.shift + 2:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 from flint import fmpq, fmpq_mat
 
+from kahanmaps.algebra.integers import over_one
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 12
@@ -43,12 +44,17 @@ def _walk(f: QuadraticSystem, sign: int, deadline: float) -> Iterator[fmpq_mat |
         table: dict[tuple[int, ...], fmpq] = {(i, j): f.B[i, j] for i in range(n) for j in range(n)}
     else:
         table = {(i, j, k): f.Q[i][j, k] for i in range(n) for j in range(n) for k in range(n)}
-    # The equations that contain a variable and no later one, each of them once.
-    equations = [[at for at in table if max(at) == last and at[1] <= at[-1]] for last in range(n)]
+    # The equations that contain a variable and no later one, each of them once; first those that fail most.
+    integers, _ = over_one(table.values())
+    numbers = dict(zip(table, map(int, integers), strict=True))
+    equations = [
+        sorted((at for at in table if max(at) == last and at[1] <= at[-1]), key=lambda at: numbers[at] == 0)
+        for last in range(n)
+    ]
 
     def fits(p: list[int], s: list[int]) -> bool:
         return all(
-            table[tuple(p[k] for k in at)] * math.prod(s[k] for k in at) == table[at] * sign
+            numbers[tuple(p[k] for k in at)] * math.prod(s[k] for k in at) == numbers[at] * sign
             for at in equations[len(p) - 1]
         )
 

@@ -21,6 +21,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
+    Values,
     exponents_up_to,
     monomial_tables,
     monomial_values,
@@ -92,7 +93,7 @@ class ModularFlow(ModularMap):
         here = monomial_values(x, self.degree, self.prime)
         return 1 + sum(c * here[k] for c, k in self._divergence), 1
 
-    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[list[int], list[int]]:
+    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
         """The values of all monomials P up to a degree, and of P + f . grad P; each times its number of `by`."""
         p = self.prime
         here = monomial_values(x, degree, p)
@@ -105,7 +106,7 @@ class ModularFlow(ModularMap):
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
-    ) -> tuple[list[list[int]], Point, int | None]:
+    ) -> tuple[Sequence[Values], Point, int | None]:
         """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
         start = self.random_point()
         rows = self.series(start, degree, count)
