@@ -224,7 +224,7 @@ class Laboratory:
         if verdict is Verdict.SUPPORTED and separated is not None:
             given = separated.function(function), None if factor is None else separated.function(factor)
             there, proof = verdict_on(separated.system, given[0], **told, factor=given[1])
-            if there is Verdict.PROVED:
+            if there is not Verdict.SUPPORTED:
                 return there, replace(proof, summary=f"{proof.summary}, in coordinates in which the planes separate")
         elif verdict is Verdict.SUPPORTED and expands:
             self._too_long[is_density] = terms

@@ -1,0 +1,84 @@
+"""Where the planes of a member separate, its identities are short; they are the same ones."""
+
+from functools import cache
+
+import pytest
+from flint import fmpq, fmpq_mat
+from helpers import points
+from hypothesis import given
+
+from kahanmaps import KahanMap
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.decide import Decision
+from kahanmaps.documents.catalog import load
+from kahanmaps.laboratory import laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve import identities
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.separated import separated
+
+PAPER = load("paper_m3").system
+THERE = separated(PAPER)
+
+
+@cache
+def integrals():
+    return find_integrals(load("paper_m3")).integrals
+
+
+@given(points(6))
+def test_the_map_is_the_same_in_both_coordinates(z):
+    def x(place):
+        return tuple((THERE.T * fmpq_mat(6, 1, list(place))).entries())
+
+    eps = fmpq(1, 7)
+    assert x(KahanMap(THERE.system, eps).step(z)) == KahanMap(PAPER, eps).step(x(z))
+
+
+@given(points(6))
+def test_a_function_has_the_same_values(z):
+    I = parse_rational_function("(x1^2*x4 - 3*x6 + eps)/(x2*x3 - x5 + 7)", [*load("paper_m3").variables, "eps"])
+    x = tuple((THERE.T * fmpq_mat(6, 1, list(z))).entries())
+    assert I.value(QQ, [*x, fmpq(2, 3)]) == THERE.function(I).value(QQ, [*z, fmpq(2, 3)])
+
+
+@pytest.mark.parametrize("name", ["paper_m3_irreducible", "clebsch_first_flow", "euler_top", "henon_heiles"])
+def test_without_planes_over_Q_there_are_no_such_coordinates(name):
+    assert separated(load(name).system) is None
+
+
+def test_integrals_of_members_are_proved_where_their_planes_separate():
+    assert [one.verdict for one in integrals()] == [Verdict.PROVED] * 3
+    assert all(one.evidence.summary.endswith("in coordinates in which the planes separate") for one in integrals())
+
+
+def test_what_is_not_preserved_is_refuted_there_too(monkeypatch):
+    lab, (I, *_) = Laboratory(load("paper_m3")), integrals()
+    x1 = I.function.numerator.context().gens()[0]
+    wrong = RationalFunction(I.function.numerator + x1, I.function.denominator)
+    assert lab.verdict_on(wrong)[0] is Verdict.REFUTED
+    # Even where random points let everything pass.
+    passed = Decision(Verdict.SUPPORTED, Evidence("random points over GF(p)", "held"))
+    monkeypatch.setattr(identities, "decide", lambda identity, seed: passed)
+    assert lab.verdict_on(wrong)[0] is Verdict.REFUTED
+    assert lab.verdict_on(I.function)[0] is Verdict.PROVED
+
+
+def test_what_is_no_shorter_than_what_was_too_long_is_not_expanded(monkeypatch):
+    tried = []
+
+    def judged(map_, function, eps, seed, *, is_density, factor, expands):
+        if expands:
+            tried.append((len(function.numerator), is_density))
+        return Verdict.SUPPORTED, Evidence("random points over GF(p)", "held")
+
+    monkeypatch.setattr(laboratory, "verdict_on", judged)
+    lab, names = Laboratory(load("euler_top")), [*load("euler_top").variables, "eps"]
+    two, three, four = (parse_rational_function("+".join(names[:k]), names) for k in (2, 3, 4))
+    for one in (three, four, three, two, four):
+        lab.verdict_on(one)
+    lab.verdict_on(four, is_density=True)
+    assert tried == [(3, False), (2, False), (4, True)]
