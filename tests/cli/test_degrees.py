@@ -5,7 +5,7 @@ def test_the_degrees_of_the_euler_top(kahanmaps):
     outcome = kahanmaps("degrees euler_top")
     assert (outcome.status, outcome.err) == (0, "")
     assert outcome.out.splitlines() == [
-        "# euler_top, generic eps, 2 random lines modulo primes of 63 bits: measured, not proved",
+        "# euler_top, generic eps, 2 random lines modulo primes of 61 bits: measured, not proved",
         "degrees\t1, 3, 9, 19, 33, 51, 73, 99, 129, 163, 201, 243",
         "growth\tquadratic growth, dynamical degree 1",
         "recurrence\ta(n) = 3*a(n-1)-3*a(n-2)+a(n-3) for n >= 3, explained by the singularities; 12 measured terms "

@@ -42,7 +42,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
       kahanmaps degrees henon_heiles -p c=-2..0:1/2 --terms 6
 
-    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
+    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 61 bits, two of
     each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
 
     The hypersurfaces that the map contracts are followed, and explain the degrees for all times: generating function,
@@ -89,7 +89,7 @@ def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
 
 
 def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
-    eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 63 bits"
+    eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 61 bits"
     at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
     tell(f"# {file.name}{at}, {lines}: measured, not proved")
     tell(found.text)

@@ -25,12 +25,13 @@ from typing import NoReturn
 
 from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
-from kahanmaps.algebra.chance import random_prime_field
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 _MINORS = 5  # the largest dimension in which minors are taken
-_MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^62
+_MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^60
 
 
 class Ended(StrEnum):
@@ -55,8 +56,8 @@ class Stopped(Exception):
 
 
 def reduced(map_: BirationalMap, eps: fmpq | None, rng: random.Random) -> MapOver:
-    """The map modulo a random prime of 63 bits, at a random eps where none is given. Raises BadPrime."""
-    field = random_prime_field(rng)
+    """The map modulo a random prime of 61 bits, at a random eps where none is given. Raises BadPrime."""
+    field = GF(random_prime(rng))
     return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
 
 
@@ -99,13 +100,12 @@ class Line:
         *above, below = equation.image(self._X, nmod_poly([0], self.prime), self._times)
         if below.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
-        mixed = (self._mixture([*above, below]) for _ in range(2))
-        common = next(mixed).gcd(next(mixed))
+        common = below.gcd(self._mixture(above))
         self._require_time()
-        curve = []
+        curve, t = [], nmod(self._rng.randrange(self.prime), self.prime)
         for entry in (*above, below):
-            quotient, rest = divmod(entry, common)
-            if not rest.is_zero():  # two mixtures with a factor that is not in all: once in about p
+            quotient = entry // common
+            if quotient(t) * common(t) != entry(t):  # a mixture with a factor that is not in all: once in about p
                 common = reduce(nmod_poly.gcd, above, below)
                 return [entry // common for entry in (*above, below)]
             curve.append(quotient)

@@ -254,7 +254,7 @@ def degree_growth(
     the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
     d_1, ..., d_max_terms. Stops in any case after about `seconds`, or before a degree above `max_degree`. `patterns`
     are those of the singularities, which are followed here, for `steps` steps, where they are not given. Unless
-    `enclosed` is false, exponential growth in the plane is proved. Modulo random primes of 63 bits, so the answer is
+    `enclosed` is false, exponential growth in the plane is proved. Modulo random primes of 61 bits, so the answer is
     measured and not proved, but for the bounds of the dynamical degree of planar maps; the same for the same `seed`,
     except for where the time ends it. Raises InputError for wrong values.
 

@@ -10,9 +10,9 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
-from kahanmaps.algebra.chance import random_prime_field
-from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.algebra.fields import GF, QQ, Field, PrimeField
 from kahanmaps.algebra.modular_matrices import rank
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
@@ -165,7 +165,7 @@ class Scanned:
     ) -> tuple[PrimeField, Any, list[Any]] | None:
         """A field GF(p), eps and the symbols of a random member on a component."""
         for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
-            field = random_prime_field(rng)
+            field = GF(random_prime(rng))
             try:
                 values = point_on(equations, len(self.names), field, rng)
                 if values is None:

@@ -13,10 +13,10 @@ from typing import Any
 
 from flint import fmpq, nmod_poly
 
-from kahanmaps.algebra.chance import random_prime_field
-from kahanmaps.algebra.fields import PrimeField
+from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import evaluate, gradient
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
@@ -188,7 +188,7 @@ def outcome_of(
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.is_over:
             break
-        field = random_prime_field(rng)
+        field = GF(random_prime(rng))
         try:
             equations = tracking.equations(map_, eps, field)
             start = _point_on(one.form, field, rng)
@@ -225,7 +225,7 @@ def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limit
     """As `unwritten`, with the poles and infinity: without any polynomial."""
     found = _at_random(map_, eps, rng, limits, True) + _at_random(map_, eps, rng, limits, False)
     for _ in range(_TRIES):
-        field = random_prime_field(rng)
+        field = GF(random_prime(rng))
         try:
             equations = map_.at(eps, field).equations
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
@@ -246,7 +246,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     for line in range(4 * _LINES):
         if limits.is_over or (line >= _LINES and set(degrees) <= {key[0] for key in found}):
             break
-        field = random_prime_field(rng)
+        field = GF(random_prime(rng))
         try:
             here = map_.at(eps, field)
             equations, inverses = here.equations, here.inverse.equations[::-1]
