@@ -396,6 +396,8 @@ def test_parts_that_are_apart_read_what_they_need_and_are_read_by_those_that_nee
         (without(together + readers), without(together + readers)),
     ):
         kept = analyze(load(name), parts=parts)
+        # What a reader adds to is not yet whole.
+        checked = [part for part in checked if part.result not in {one.result for one in readers}]
         assert [part.name for part in checked if part.to_json(kept) != part.to_json(whole(name))] == []
         assert [str(kept[one.result]) for one in checked] == [str(whole(name)[one.result]) for one in checked]
 

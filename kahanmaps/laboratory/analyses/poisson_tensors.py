@@ -8,7 +8,7 @@ from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson, with_brackets
 
 _DEGREES = {3: 3, 4: 2}  # of the tensors by dimension; in the plane they are densities
 
@@ -17,7 +17,12 @@ def poisson(run: Run, **budget: Any) -> PoissonSearch | None:
     """Those of low degree, in dimensions 3 and 4."""
     if run.dim not in _DEGREES:
         return None
-    return find_poisson(run.bare, _DEGREES[run.dim], integrals=run.integrals, **run.asked, **budget)
+    return find_poisson(run.bare, _DEGREES[run.dim], integrals=(), **run.asked, **budget)
+
+
+def with_brackets_of_integrals(run: Run, seconds: float, **_: Any) -> PoissonSearch | None:
+    """Those that were found, with their Casimirs and the integrals in involution."""
+    return None if run.found.poisson is None else with_brackets(run.found.poisson, run.integrals, seconds)
 
 
 def statements(found: Findings) -> list[Statement]:

@@ -245,12 +245,9 @@ def find_poisson(
         if not forms and denominator is None:
             forms, denominator, more = _over_a_density(laboratory, degree, deadline)
             reason = "" if forms else reason + more
-        if forms and integrals is None:
-            progress("integrals, for their brackets")
-            integrals = _integrals(laboratory, symbols, deadline, seed)
         for k, tensor in enumerate(forms, 1):
             progress(f"verifying tensor {k} of {len(forms)}")
-            one = _judged(laboratory, tensor, integrals or (), deadline)
+            one = _judged(laboratory, tensor, deadline)
             found += [one] if one is not None else []
         if len(found) < len(forms):
             reason = "a tensor that was found modulo primes did not pass as an identity"
@@ -260,8 +257,21 @@ def find_poisson(
     if cut:
         cut = f"{cut}: such tensors have too many coefficients"
         reason = f"{reason}; {cut}" if reason and not found else cut
-    pencil, known = _verdict_on_pencil(laboratory, found, deadline), tuple(integrals or ())
-    return PoissonSearch(*laboratory.asked, tuple(found), known, degree, denominator, pencil, reason)
+    pencil = _verdict_on_pencil(laboratory, found, deadline)
+    search = PoissonSearch(*laboratory.asked, tuple(found), (), degree, denominator, pencil, reason)
+    if found and integrals is None:
+        progress("integrals, for their brackets")
+        integrals = _integrals(laboratory, symbols, deadline, seed)
+    return with_brackets(search, integrals or (), max(0.0, deadline - time.monotonic()))
+
+
+def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], seconds: float) -> PoissonSearch:
+    """The tensors with what is known of their brackets with integrals: Casimirs, and integrals in involution."""
+    tensors, deadline = found.tensors, time.monotonic() + seconds
+    if tensors and integrals:
+        laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed)
+        tensors = tuple(_with_brackets(laboratory, one, integrals, deadline) for one in tensors)
+    return replace(found, tensors=tensors, integrals=tuple(integrals))
 
 
 def _in_names_of(laboratory: Laboratory, function: RationalFunction) -> RationalFunction:
@@ -462,21 +472,33 @@ def _factor(map_: ModularMap, denominator: RationalFunction | None, x: Sequence[
     return int(value)
 
 
-def _judged(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
-) -> FoundTensor | None:
+def _judged(laboratory: Laboratory, tensor: GivenTensor, deadline: float) -> FoundTensor | None:
     """The tensor with its verdicts; None where it is refuted."""
-    eps = laboratory.eps
+    eps, map_ = laboratory.eps, laboratory.maps[0]
     law = transformation_identity(laboratory.map, tensor, eps)
     # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
     verdict, evidence = _verdict(laboratory, law, deadline if tensor.dim <= MAX_DIMENSION else 0.0)
     if not verdict.holds:
         return None
     jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, eps), deadline)
-    map_ = laboratory.maps[0]
+    P = _at(tensor, map_, map_.random_point())
+    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
+    return FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P)
+
+
+def _at(tensor: GivenTensor, map_: ModularMap, x: Sequence[int]) -> Any:
+    """The matrix of a tensor at a point modulo a prime."""
+    field = GF(map_.prime)
+    return tensor.value(field, field.convert(map_.eps), tuple(field.convert(c) for c in (*x, *map_.values)))
+
+
+def _with_brackets(
+    laboratory: Laboratory, found: FoundTensor, integrals: Sequence[FoundIntegral], deadline: float
+) -> FoundTensor:
+    """The tensor with its Casimirs, and with the integrals that are in involution."""
+    tensor, map_ = found.tensor, laboratory.maps[0]
     field, there = GF(map_.prime), Independent(map_)  # the gradients of Casimirs
-    x, at = tuple(field.convert(c) for c in (*there.point, *map_.values)), field.convert(map_.eps)
-    P = tensor.value(field, at, x)
+    P = _at(tensor, map_, there.point)
     rows = [there.gradient(one.function) for one in integrals]
     casimirs: list[str] = []
 
@@ -486,10 +508,9 @@ def _judged(
             casimirs.append(name)
             there.add(row)
 
-    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
     for one, row in zip(integrals, rows, strict=True):
         add_casimir(one.name, one.function, row)
-    most = min(tensor.dim - rank_of_P, rank(rows, map_.prime))
+    most = min(tensor.dim - found.rank, rank(rows, map_.prime))
     if len(there.rows) < most and len(integrals) <= _MOST_INTEGRALS and time.monotonic() < deadline:
         for name, function in casimir_candidates(laboratory, tensor, integrals, deadline):
             row = there.gradient(function)
@@ -498,12 +519,10 @@ def _judged(
     chosen = [integrals[k] for k in _in_involution(field, P, rows)]
     involution = None
     if chosen:
-        involution = _verdict(
-            laboratory, _brackets(laboratory, tensor, [one.function for one in chosen], False), deadline
-        )[0]
+        functions = [one.function for one in chosen]
+        involution, _ = _verdict(laboratory, _brackets(laboratory, tensor, functions, False), deadline)
     names = tuple(one.name for one in chosen)
-    found = (verdict, evidence, jacobi, jacobi_evidence, rank_of_P, tuple(casimirs), names, involution)
-    return FoundTensor("P", tensor, *found)
+    return replace(found, casimirs=tuple(casimirs), in_involution=names, involution=involution)
 
 
 def _in_involution(field: Field, P: Any, rows: Sequence[Sequence[Any]]) -> tuple[int, ...]:
