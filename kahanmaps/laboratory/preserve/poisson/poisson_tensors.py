@@ -19,7 +19,7 @@ from itertools import combinations
 from math import comb
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq_mpoly, nmod
 
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.modular_matrices import null_space, rank
@@ -40,7 +40,6 @@ from kahanmaps.laboratory.modular_points import (
     ModularMap,
     NoPoint,
     exponents_up_to,
-    monomial_values,
     product_of,
     slopes,
 )
@@ -443,15 +442,12 @@ def tensor_space(
     by_pair = [sum(p == q for _, q, _ in unknowns) for p in range(len(pairs))]
     rows = []
     for x, image in map_.pairs(max(by_pair, default=0) + _SPARE):
-        slope = map_.map.jacobian(x).tolist()
-        J = [[int(entry) for entry in row] for row in slope]
-        here, there = (monomial_values(point, degree, prime) for point in (x, image))
+        J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
         before, after = (_factor(map_, denominator, point) for point in (x, image))
+        here, there = map_.moved(x, image, degree, (after, before))
         for row, (i, j) in enumerate(pairs):
-            minors = [(J[i][a] * J[j][b] - J[i][b] * J[j][a]) * after % prime for a, b in pairs]
-            rows.append(
-                [(minors[p] * here[m] - (before * there[m] if p == row else 0)) % prime for _, p, m in unknowns]
-            )
+            minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
+            rows.append([minors[p] * here[m] - there[m] if p == row else minors[p] * here[m] for _, p, m in unknowns])
     vectors = []
     for solution in null_space(rows, len(unknowns), prime):
         vector = [0] * length
