@@ -114,8 +114,9 @@ class DensitySearch(Search):
         """That there are more than the one that is shown; empty where there are not."""
         if len(self.densities) < 2:
             return ""
-        number = counted(len(self.densities) - 1, "further polynomial")
-        return f"phi times any integral is a density again: so are {number}, which --json lists"
+        others = len(self.densities) - 1
+        so = f"so {'is' if others == 1 else 'are'} {counted(others, 'further polynomial')}"
+        return f"phi times any integral is a density again: {so}, which --json lists"
 
     @property
     def note(self) -> str:
