@@ -38,6 +38,12 @@ class Analysis(Findings, Printed):
 
     parts: tuple[Part, ...] = ANALYSES
 
+    def stop(self, reason: str) -> None:
+        """No pending part is gone through any more."""
+        named = {part.name for part in self.parts if not part.adds}
+        self.skipped += [f"{part}: {reason}" for part in self.pending if part in named]
+        self.pending.clear()
+
     @property
     def conclusion(self) -> Conclusion:
         """The verdict; integrability and the number of integrals are told apart."""
@@ -155,10 +161,10 @@ def analyze(
     skipped: dict[str, str] = {}
 
     def take(part: Part, result: Any, reason: str) -> None:
-        if reason:
+        if reason and not part.adds:
             skipped[part.name] = f"{part.name}: {reason}"
             found.skipped = [skipped[one.name] for one in todo if one.name in skipped]
-        else:
+        elif not reason:
             found[part.result] = result
         found.pending.remove(part.name)
         reached(found)
@@ -195,7 +201,7 @@ def analyze(
                 take(*beside.next())
             while beside and beside.waiting and beside.answers.poll():
                 take(*beside.next())
-    if others := ", ".join(part.name for part in parts if not run.applies(part)):
+    if others := ", ".join(part.name for part in parts if not (run.applies(part) or part.adds)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")
         else:

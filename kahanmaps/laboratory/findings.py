@@ -66,11 +66,6 @@ class Findings:
         else:
             self.further[result] = value
 
-    def stop(self, reason: str) -> None:
-        """No pending part is gone through any more."""
-        self.skipped += [f"{part}: {reason}" for part in self.pending]
-        self.pending.clear()
-
     @property
     def dim(self) -> int:
         """The dimension of the phase space."""

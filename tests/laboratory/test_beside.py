@@ -184,6 +184,23 @@ def test_long_answers_keep_nobody_waiting(done: Signal) -> None:
     assert found["second"] != os.getpid()
 
 
+def test_very_many_parts_are_all_done() -> None:
+    parts = [apart(f"part {k}", where) for k in range(300)]
+    found = analyze(load("harmonic"), parts=parts, processes=2)
+    assert all(found[part.name] for part in parts)
+    assert not found.pending
+
+
+@needs_fork
+def test_an_error_where_the_copy_begins_ends_the_copy_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(parent: int) -> None:
+        raise SystemExit(1)
+
+    monkeypatch.setattr(beside, "end_with_parent", failing)
+    found = analyze(load("harmonic"), parts=[apart("first", where), here("second")], processes=2)
+    assert found["first"] == found["second"] == os.getpid()
+
+
 def test_what_comes_last_is_not_waited_for() -> None:
     def seen(run: Run, **_: Any) -> Any:
         return run.found["first"]

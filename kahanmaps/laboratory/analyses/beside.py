@@ -20,6 +20,7 @@ from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.processes import end_with_parent
 
 CAN_FORK = sys.platform == "linux"  # elsewhere a copy of a process need not be one that works
+_MOST = 256  # lists: their numbers are bytes
 _ANSWERS = 1 << 20  # bytes, as long as Linux has a pipe for anybody; what is found is seldom longer than a tenth of it
 
 
@@ -40,12 +41,13 @@ class Beside:
     """
 
     def __init__(self, run: Run, parts: Sequence[Sequence[Part]]) -> None:
-        self.waiting = [part for some in parts for part in some]
-        self._run, self._parts, self._all = run, parts, tuple(self.waiting)
+        self._run, self._parts = run, parts[:_MOST]
+        self._all = [part for some in self._parts for part in some]
+        self.waiting = list(self._all)
         self._process: int | None = None
         self.answers, self._theirs = Pipe(duplex=False)
         self._numbers, numbers = os.pipe()  # of the lists that nobody has begun with
-        os.write(numbers, bytes(range(len(parts))))
+        os.write(numbers, bytes(range(len(self._parts))))
         os.close(numbers)
 
     def start(self) -> None:
@@ -54,14 +56,18 @@ class Beside:
 
         with suppress(PermissionError):  # it may be that a user has too many long pipes: then answers wait to be taken
             fcntl(self._theirs.fileno(), F_SETPIPE_SZ, _ANSWERS)
-        parent, held = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        with suppress(OSError):  # no memory for one more process, or too many
-            self._process = os.fork()
-        if self._process == 0:
-            self.answers.close()
-            self._work(parent)
+        parent, held = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        try:
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            with suppress(OSError):  # no memory for one more process, or too many
+                self._process = os.fork()
+            if self._process == 0:
+                self._work(parent)
+        finally:
+            if self._process == 0:
+                os._exit(0)  # nothing of the parent's, such as its buffers, is this one's to end
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)  # from here on Ctrl-C finds a process that `end` knows
         self._theirs.close()
-        signal.pthread_sigmask(signal.SIG_SETMASK, held)  # from here on Ctrl-C finds a process that `end` knows
 
     def claim(self) -> Sequence[Part]:
         """Parts that nobody has begun with, for this process; none where there are none."""
@@ -98,18 +104,16 @@ class Beside:
                 os.waitpid(self._process, 0)
 
     def _work(self, parent: int) -> None:
-        """Do parts in this process, which is the copy, and end it. Ctrl-C, still held back, is for the parent."""
-        try:
-            end_with_parent(parent)
-            self._run.progress = lambda _: None
-            while parts := self._next_parts():
-                for part in parts:
-                    found, reason = outcome(self._run, part)
-                    if not reason:
-                        self._run.found[part.result] = found
-                    self._theirs.send((self._all.index(part), found, reason))
-        finally:
-            os._exit(0)  # nothing of the parent's, such as its buffers, is this one's to end
+        """Do parts in this process, which is the copy. Ctrl-C, still held back, is for the parent."""
+        end_with_parent(parent)
+        self.answers.close()
+        self._run.progress = lambda _: None
+        while parts := self._next_parts():
+            for part in parts:
+                found, reason = outcome(self._run, part)
+                if not reason:
+                    self._run.found[part.result] = found
+                self._theirs.send((self._all.index(part), found, reason))
 
 
 def together(parts: Sequence[Part], unmet: Callable[[Part], set[str]]) -> list[list[Part]]:

@@ -45,12 +45,14 @@ class Part:
     share: float = 0.1  # of the whole time; 0 for what is quick, and done where the time is over as well
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
-    # The dimension above which it comes last, gets a quarter of its share, and is not waited for by those that need it.
+    # The dimension above which it comes last and gets a quarter of its share. Those that need it do not wait for it
+    # then, and are not to look at it.
     slow_above: float = inf
     needs: tuple[str, ...] = ()  # names of the parts that are gone through before it, as far as they are to be done
     # Another process may do it: it reads nothing but what it needs, and is read by those that need it. The result can
     # be pickled.
     is_apart: bool = False
+    adds: bool = False  # to the result of a part that it needs; where it is not done, nothing is said of that
     json: Callable[[Any], dict[str, Any]] | None = None
 
     def __post_init__(self) -> None:
@@ -58,6 +60,8 @@ class Part:
 
     def to_json(self, found: Findings) -> dict[str, Any]:
         """What it says in JSON."""
+        if self.adds:
+            return {}
         return {self.result: plain(found[self.result])} if self.json is None else self.json(found)
 
 

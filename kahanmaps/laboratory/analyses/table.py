@@ -105,7 +105,7 @@ ANALYSES = (
         share=0,
         result="densities",
         needs=("integrals", "densities"),
-        json=lambda _: {},
+        adds=True,
     ),
     Part(
         "the flow",
@@ -126,7 +126,7 @@ ANALYSES = (
         share=0,
         result="flow",
         needs=("the flow", "densities from integrals"),
-        json=lambda _: {},
+        adds=True,
     ),
     Part(
         "brackets of integrals",
@@ -134,7 +134,7 @@ ANALYSES = (
         of=Of.MAPS_OVER_Q,
         result="poisson",
         needs=("integrals", "Poisson tensors"),
-        json=lambda _: {},
+        adds=True,
     ),
     Part("heights", growth.heights, of=Of.EVERY, share=0.08, is_apart=True),
     Part("symmetries", symmetries.symmetries, "symmetry", symmetries.statements, is_apart=True),

@@ -118,7 +118,7 @@ class Scanned:
     def degrees_on(
         self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, most: int = 1 << 20
     ) -> Degrees | None:
-        """The degrees of a random member on a component modulo a random prime of 63 bits; None where none is found.
+        """The degrees of a random member on a component modulo a random prime of 61 bits; None where none is found.
 
         On one line; -1 where the iterate exists nowhere. `expected` says how many, and about how large; they end before
         one above `most`.

@@ -179,7 +179,7 @@ def _rows(equation: Equation, monomials: Sequence[nmod_poly], known: int) -> lis
     ]
 
 
-@lru_cache(128)
+@lru_cache(32)
 def _spread(equation: Equation, known: int) -> list[nmod_poly]:
     """For each monomial its coefficients in the entries of L, `known` places apart."""
     n, prime = equation.dim, equation.over.characteristic
