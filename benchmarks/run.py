@@ -328,7 +328,10 @@ GROUPS = {
         "the lines alone, which is what the peers do, modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does\n"
         "itself up to dimension 5; in dimension 6 it takes power series."
     ),
-    bench_analysis.PROCESSES: "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors.",
+    bench_analysis.PROCESSES: (
+        "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors. How fast these are, which may\n"
+        "change by the hour, a product of long numbers tells."
+    ),
     bench_memory.GROUP: (
         "No peer; memory at its peak, relative to the first line of each block. Orbits and results are written as\n"
         "they come. An orbit remembers terms of its sequences between n/2 and n; of the memory of a batch 128 MB are\n"
