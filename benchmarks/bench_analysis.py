@@ -87,7 +87,8 @@ def whole_processes(names: list[str]) -> list[Row]:
     """Each the best of three; and a product of long numbers, which tells how fast the machine is."""
     number = fmpz(3) ** _POWER
     took, _ = timed(lambda: [number * (number + k) for k in range(1000)])
-    rows = [row(PROCESSES, f"a product of {number.bit_length():,} bits by FLINT", COMMAND, took, None, f"{took:.2g} ms")]
+    what = f"a product of {number.bit_length():,} bits by FLINT"
+    rows = [row(PROCESSES, what, COMMAND, took, None, f"{took:.2g} ms")]
     for name in names:
         took, processors = min(process(name) for _ in range(3))
         what, note = f"{name}, dimension {load(name).dim}", f"{took:.2g} s, of the processors {processors:.2g} s"

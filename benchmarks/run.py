@@ -329,8 +329,8 @@ GROUPS = {
         "itself up to dimension 5; in dimension 6 it takes power series."
     ),
     bench_analysis.PROCESSES: (
-        "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors. How fast these are, which may\n"
-        "change by the hour, a product of long numbers tells."
+        "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors. How fast these are,\n"
+        "which may change by the hour, a product of long numbers tells."
     ),
     bench_memory.GROUP: (
         "No peer; memory at its peak, relative to the first line of each block. Orbits and results are written as\n"
