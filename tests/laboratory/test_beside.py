@@ -321,6 +321,8 @@ def test_parts_given_twice_are_done_twice_and_those_in_a_circle_are_refused(proc
     part = replace(apart("first", where), is_apart=False)
     assert analyze(load("harmonic"), parts=[part, part], processes=processes)["first"] == os.getpid()
     assert not analyze(load("harmonic"), parts=[apart("first", where)] * 2, processes=processes).pending
+    after = replace(apart("after", where), needs=("first",))
+    assert not analyze(load("harmonic"), parts=[apart("first", where)] * 2 + [after], processes=processes).pending
     second = replace(part, name="second", needs=("first",))
     with pytest.raises(ValueError, match="need each other: first, second"):
         analyze(load("harmonic"), parts=[replace(part, needs=("second",)), second], processes=processes)

@@ -127,7 +127,7 @@ def together(parts: Sequence[Part], unmet: Callable[[Part], set[str]]) -> list[l
         if part.is_apart and not before:
             found.append([part])
         elif part.is_apart:
-            for some in found:
-                if before.issubset(one.name for one in some):
-                    some.append(part)
+            with_it = next((some for some in found if before.issubset(one.name for one in some)), None)
+            if with_it is not None:
+                with_it.append(part)
     return found

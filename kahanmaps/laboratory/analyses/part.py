@@ -49,8 +49,7 @@ class Part:
     # then, and are not to look at it.
     slow_above: float = inf
     needs: tuple[str, ...] = ()  # names of the parts that are gone through before it, as far as they are to be done
-    # Another process may do it: it reads nothing but what it needs, and is read by those that need it. The result can
-    # be pickled.
+    # Another process may do it: it reads, and is read, through `needs` alone, and what it finds can be pickled.
     is_apart: bool = False
     adds: bool = False  # to the result of a part that it needs; where it is not done, nothing is said of that
     json: Callable[[Any], dict[str, Any]] | None = None
