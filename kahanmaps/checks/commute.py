@@ -11,7 +11,7 @@ from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
-from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
@@ -54,6 +54,24 @@ def commutativity(
     )
 
 
+def _require_another_than_identity(file: SystemFile, letter: str, map_: BirationalMap, eps: Any, seed: int) -> None:
+    """Raise InputError for the identity, as the Kahan map of f = 0 is: that it commutes says nothing of another map.
+
+    It is recognized at random points, as the identity x~ = x of rational functions, with an error below 2^-100.
+    """
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
+        return map_.at(eps_value, field).step(point), point
+
+    told: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
+    if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **told), seed).verdict is Verdict.SUPPORTED:
+        at = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
+        raise InputError(
+            f"found {file.labelled(letter)}, whose map is the identity{at}, expected another: "
+            "the identity commutes with every map"
+        )
+
+
 def check_commute(
     file: SystemFile, other: SystemFile | None = None, settings: Settings | None = None, eps2: fmpq | None = None
 ) -> Report:
@@ -61,7 +79,8 @@ def check_commute(
 
     `eps2` is the step of the second map where it differs (then `settings.eps` has to be given). For a family member the
     maps of H_0 and H_1, grad H_1 = A grad H_0, are the control: they do not commute in general, and a check that finds
-    them commuting would be worthless. Raises InputError where there is nothing to compare.
+    them commuting would be worthless. Raises InputError where there is nothing to compare, and where one of the maps is
+    the identity at the parameters and the eps in force.
     """
     settings = settings or Settings()
     if other is None:
@@ -96,6 +115,9 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
         notes.append(f"{note}; the evidence below is stated for eps")
+    _require_another_than_identity(file, "f", f, settings.eps, settings.seed)
+    at_g = None if settings.eps is None else settings.eps * ratio
+    _require_another_than_identity(other, "g", g, at_g, settings.seed)
     proof = None
     if is_same_step and as_they_are and file.member is not None and other.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, other.member)
@@ -119,6 +141,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
 
 
 def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) -> Report:
+    _require_another_than_identity(file, "f_0", file.map, settings.eps, settings.seed)
     count = len(member.factors)
     notes = []
     associates = theorems.listed_associates(member)

@@ -11,6 +11,7 @@ from flint import fmpq
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.polynomials import linear_combinations
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claimed import claimed_function, claimed_functions, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
@@ -24,9 +25,9 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.invariants.integrals import (
     ClaimedIntegral,
     CommutantIntegral,
+    ImageFunction,
     ModifiedHamiltonian,
     PaperIntegral,
-    constancy,
     is_constant,
 )
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
@@ -128,15 +129,15 @@ def check_integrals(file: SystemFile, settings: Settings | Any = None, extra: Ma
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
             "or give --integral 'NAME=EXPRESSION', in Python extra=\"EXPRESSION\""
         )
-    for integral, _, _ in candidates:
-        if isinstance(integral, ModifiedHamiltonian):
-            integral.condition = _constant(integral, settings)
     claimed = [integral.subject for integral, _, _ in candidates]
     orbit = run_orbit(file.map, settings, claimed, file.member is not None)
     findings = []
     tried = _TRIED if file.dim <= 16 else _TRIED_IN_HIGH_DIMENSION
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
+        if _is_constant(integral, settings):
+            findings.append(_no_integral(integral, settings, source))
+            continue
         if proof is not None and k >= tried and file.dim > 16:
             claim = f"{integral.name} is conserved"
             findings.append(Finding(claim, Verdict.PROVED, proof, formula=integral.formula, source=source))
@@ -153,36 +154,53 @@ def check_integrals(file: SystemFile, settings: Settings | Any = None, extra: Ma
             )
         )
     notes = []
-    if any(not any(e.method == "exact orbit" for e in finding.also) for finding in findings):
+    proved = [finding for finding in findings if finding.verdict is Verdict.PROVED]
+    if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved):
         notes.append(f"of the proved integrals the first {tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())
     return Report("integrals", tuple(findings), context, notes, ended_early=settings.cut_short(orbit))
 
 
-def _constant(integral: ModifiedHamiltonian, settings: Settings) -> str:
-    """That the modified H is a constant where it is one, as that of 3 q^2 + p^2 is at eps = 1/2; otherwise "".
+def _no_integral(integral: PhaseFunction, settings: Settings, source: str) -> Finding:
+    """What is said of a constant in the place of an integral; it does not count where nobody claimed it."""
+    at = "" if settings.eps is None else f" at eps = {settings.eps}"
+    reason = Evidence("constant", f"it is a constant{at}: every map conserves constants, so this is no integral")
+    claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
+    is_claimed = isinstance(integral, ClaimedIntegral)
+    return Finding(claim, Verdict.UNDECIDED, reason, formula=integral.formula, source=source, applies=is_claimed)
 
-    For a homogeneous cubic H it begins with H and is none. Equal values at points mean little; expanded it is exact.
+
+def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
+    """Whether an integral is a constant at the eps in force, as the modified H of 3 q^2 + p^2 is at eps = 1/2; exact.
+
+    False also where that is too long to expand.
     """
+    if isinstance(integral, ClaimedIntegral):
+        return integral.is_constant
+    if not isinstance(integral, ImageFunction):
+        return False
     H = integral.hamiltonian
-    if (H.is_homogeneous and not H.H.is_zero()) or H.dim > MAX_DIMENSION:
-        return ""
+    if isinstance(integral, CommutantIntegral):  # it begins with -2 x^T J C f, and C f = 0 makes C (x~ - x) = 0
+        return all(f.is_zero() for f in linear_combinations(integral.matrix, H.system.rhs))
+    if H.is_homogeneous or H.dim > MAX_DIMENSION:
+        return H.H.is_zero()  # it begins with a multiple of H
+    # Equal values at two points mean little; expanded it is exact.
     rng = random.Random(f"constant {seed_for(settings.seed, integral.subject, settings.eps)}")
     field = random_prime_field(rng)
     try:
         eps = field.random(rng) if settings.eps is None else field.convert(settings.eps)
         first, second = (integral.value(field, eps, tuple(field.random(rng) for _ in range(H.dim))) for _ in range(2))
     except (BadPrime, SingularMatrix, SingularStep):
-        return ""
+        return False
     if not field.equal(first, second):
-        return ""
+        return False
     functions = FunctionField([*H.system.variables, "eps"])
     *point, symbol = functions.variables
     try:
         value = integral.value(functions, symbol if settings.eps is None else settings.eps, tuple(point))
     except BudgetExceeded:
-        return ""
-    return constancy(settings.eps) if is_constant(value.above, value.below, H.dim) else ""
+        return False
+    return is_constant(value.above, value.below, H.dim)
 
 
 def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:

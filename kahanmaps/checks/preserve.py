@@ -27,11 +27,14 @@ from kahanmaps.invariants.poisson import (
     HamiltonianTensor,
     PoissonTensor,
     jacobi_defects,
+    tensor_condition,
     transformation_sides,
 )
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, KahanMap, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+_NO_TENSOR = "the map seems to have no value, or the tensor or a denominator to vanish identically"
 
 
 def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunction, eps: fmpq | None) -> Identity:
@@ -141,7 +144,8 @@ def transformation_identity(map_: BirationalMap, tensor: PoissonTensor, eps: fmp
         labels = ("(I + eps f'(x~)) P(x) (I + eps f'(x~))^T", "(I - eps f'(x)) P(x~) (I - eps f'(x))^T")
     labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
     subject, dim = (map_.subject, tensor.subject), n + len(map_.symbols)
-    return Identity(dim, sides, eps, *labels, entries, has_eps=map_.has_eps or tensor.has_eps, subject=subject)
+    has_eps = map_.has_eps or tensor.has_eps
+    return Identity(dim, sides, eps, *labels, entries, has_eps=has_eps, no_value=_NO_TENSOR, subject=subject)
 
 
 def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
@@ -156,18 +160,20 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
         f"triple ({i + 1},{j + 1},{k + 1})" for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)
     )
     labels, dim = ("the cyclic sum", "what it should be"), n + len(tensor.symbols)
-    return Identity(dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, subject=tensor.subject)
+    subject = tensor.subject
+    return Identity(dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, no_value=_NO_TENSOR, subject=subject)
 
 
 def check_poisson(file: SystemFile, settings: Settings | Any = None, extra: GivenTensor | Any = None) -> Report:
     """Is `extra`, or without it Pi(x) = J - eps^2 f'(x)^2 J, a Poisson tensor that the map preserves?
 
     `extra` is a tensor or a matrix of formulas, in the place of the settings if there are none. Raises InputError for
-    systems without a Hamiltonian where no tensor is given, and for a tensor of another dimension.
+    systems without a Hamiltonian where no tensor is given, for a tensor of another dimension, and for one that is
+    identically zero at the parameters and the eps in force.
     """
     settings, extra = settings_and_claim(settings, extra)
     extra = claimed_tensor(file, extra)
-    proof, source = None, ""
+    proof, source, condition = None, "", ""
     tensor: PoissonTensor
     if extra is not None:
         if extra.dim != file.dim:
@@ -175,7 +181,7 @@ def check_poisson(file: SystemFile, settings: Settings | Any = None, extra: Give
         for row in extra.rows:
             for entry in row:
                 file.require_claim("an entry of a tensor", entry)
-        tensor = extra
+        tensor, condition = extra, tensor_condition(extra, settings.eps)
     elif file.hamiltonian is not None:
         tensor = HamiltonianTensor(file.hamiltonian)
         proof = theorems.poisson_tensor_invariant(file.hamiltonian, file.member)
@@ -188,9 +194,9 @@ def check_poisson(file: SystemFile, settings: Settings | Any = None, extra: Give
             "expected a file of kind [hamiltonian] or [family], or a tensor: --tensor FILE, in Python its rows"
         )
     orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
-    name = tensor.name
+    name, where = tensor.name, f", {condition}" if condition else ""
     law = judge(
-        f"the {'Kahan ' * isinstance(file.map, Kahan)}map is Poisson for {name}",
+        f"the {'Kahan ' * isinstance(file.map, Kahan)}map is Poisson for {name}{where}",
         transformation_identity(file.map, tensor, settings.eps),
         settings,
         proof,
@@ -199,7 +205,7 @@ def check_poisson(file: SystemFile, settings: Settings | Any = None, extra: Give
         source=source,
     )
     jacobi = judge(
-        f"{name} is a Poisson tensor",
+        f"{name} is a Poisson tensor{where}",
         jacobi_identity(tensor, settings.eps),  # of x alone: an orbit would add nothing
         settings,
         proof,

@@ -75,26 +75,28 @@ def at_eps(
     return (above, below) if root is None else (root.remainder(above, k), root.remainder(below, k))
 
 
-def where(dim: int, *polynomials: fmpq_mpoly) -> str:
+def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
     """For which symbols and eps none of the polynomials is identically 0, in words; empty where it is so for all.
 
     Args:
         dim: the dimension; variables of the polynomials beyond so many are symbols, or eps, which is not 0.
-        polynomials: none of them 0.
+        polynomials: none of them 0. The entries of a sequence count as one: they are not to be 0 all together.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y, a, b, eps = ring(["x", "y", "a", "b", "eps"]).gens()
-    >>> where(2, a*x + b*y), where(2, (10*eps - 1)*eps*x, a*y), where(2, a*x + eps)
-    ('where a, b are not all 0', 'where 10*eps - 1 is not 0 and a is not 0', '')
+    >>> where(2, a*x + b*y), where(2, (10*eps - 1)*eps*x, a*y), where(2, a*x + eps), where(1, [a*x, b*x])
+    ('where a, b are not all 0', 'where 10*eps - 1 is not 0 and a is not 0', '', 'where a, b are not all 0')
     """
-    found = list(dict.fromkeys(filter(None, (_not_zero(polynomial, dim) for polynomial in polynomials))))
+    groups = [[one] if isinstance(one, fmpq_mpoly) else one for one in polynomials]
+    found = list(dict.fromkeys(filter(None, (_not_all_zero(group, dim) for group in groups))))
     text = f"where {' and '.join(found)}" if found else ""
     return text if len(text) <= _LONGEST_CONDITION else "where it has a value and is not identically 0"
 
 
-def _not_zero(polynomial: fmpq_mpoly, dim: int) -> str:
-    names = names_of(polynomial)
-    found = [_without_eps(c) if "eps" in names[dim:] else c for c in coefficients_in(polynomial, dim)]
+def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
+    names = names_of(polynomials[0])
+    coefficients = [c for polynomial in polynomials for c in coefficients_in(polynomial, dim)]
+    found = [_without_eps(c) if "eps" in names[dim:] else c for c in coefficients]
     symbols = {name for c in found for name in names if name not in c.unused_gens()}
     if len(symbols) == 1:
         # In one symbol the common zeros are those of the greatest common divisor.

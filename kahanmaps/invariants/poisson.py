@@ -24,6 +24,7 @@ from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
 from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
 from kahanmaps.errors import InputError, quoted
+from kahanmaps.invariants.phase_functions import at_eps, where
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
@@ -219,17 +220,47 @@ class GivenTensor(PoissonTensor):
         return field.matrix(n, n, entries)
 
 
+def tensor_condition(tensor: GivenTensor, eps: fmpq | None) -> str:
+    """The hypothesis that P is a tensor other than 0, of which every law for tensors holds for no reason.
+
+    Args:
+        tensor: P, a matrix of functions of the variables, symbols and eps.
+        eps: an exact number, or None for every eps.
+
+    Returns:
+        For which symbols and eps P has values and is not identically 0, in words; empty where it is so for all of them.
+
+    Raises:
+        InputError: where P is identically 0, at that eps if it is given.
+
+    >>> for entry in ("(10*eps - 1)*x", "x/(10*eps - 1)", "x + 10*eps - 1"):
+    ...     print([tensor_condition(GivenTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"]), None)])
+    ['where 10*eps - 1 is not 0']
+    ['where 10*eps - 1 is not 0']
+    ['']
+    """
+    entries = [at_eps(entry, eps) for entry in tensor.brackets.values()]
+    numerators = [above for above, _ in entries if not above.is_zero()]
+    if any(below.is_zero() for _, below in entries):
+        return ""  # then P has no values, of which the verdict tells
+    if not numerators:
+        which = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
+        raise InputError(f"found the tensor {which}, expected one that is not zero: every map preserves 0")
+    return where(tensor.dim, numerators, *(below for _, below in entries))
+
+
 def transformation_sides(
     map_: MapOver, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
 ) -> tuple[Any, Any] | None:
-    """Both sides of the transformation law above, at x = `point` and x~ = `image`; None at a pole of the tensor.
+    """Both sides of the transformation law above, at x = `point` and x~ = `image`.
 
-    `values` are those of the symbols. Of a map with several factors it is the law of the last one, for what the others
+    None at a pole of the tensor, and where it is 0 at both points: 0 = 0 says nothing of a map. `values` are those of
+    the symbols. Of a map with several factors it is the law of the last one, for what the others
     make of P(x).
     """
     field, eps = map_.field, map_.eps
     here, there = (tensor.value(field, eps, (*place, *values)) for place in (point, image))
-    if here is None or there is None:
+    if here is None or there is None or (_is_zero(field, here) and _is_zero(field, there)):
         return None
     *before, (last, at) = map_.stages(point)
     for one, x in before:
@@ -244,11 +275,11 @@ def transformation_sides(
 def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequence[Any]) -> list[Any] | None:
     """sum over l of P_il d_l P_jk + cyclic in i, j, k, for all i < j < k: zero when P is a Poisson tensor.
 
-    None at a pole.
+    None at a pole, and where P is 0: there the sum is 0 whatever P is elsewhere.
     """
     n = tensor.dim
     P = tensor.value(field, eps, point)
-    if P is None:
+    if P is None or _is_zero(field, P):
         return None
     with field.working():
         # along[i][j, k] = sum_l P_il d_l P_jk, the derivative of P_jk along row i of P.
@@ -259,3 +290,7 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
             for j in range(i + 1, n)
             for k in range(j + 1, n)
         ]
+
+
+def _is_zero(field: Field, matrix: Any) -> bool:
+    return all(field.is_zero(entry) for entry in matrix.entries())

@@ -21,18 +21,20 @@ from check_helpers import (
     verdicts,
     verify_commute_witness,
 )
-from flint import fmpq, fmpq_poly
+from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
-from hypothesis import given
+from hypothesis import assume, given
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks import commute, judge, theorems
 from kahanmaps.checks import settings as settings_module
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
@@ -184,6 +186,7 @@ def test_one_member_at_the_same_and_at_the_opposite_step_is_proved(eps2):
 
 @given(systems(dims=(2,)), systems(dims=(2,)), points(2, rationals(9)))
 def test_the_verdict_on_a_random_pair_agrees_with_an_independent_computation(f, g, x):
+    assume(any(f.rhs) and any(g.rhs))
     found = only(pair(f, g))
     if found.verdict is REFUTED:
         verify_commute_witness(found.witness, f, g)
@@ -236,10 +239,43 @@ def test_linear_systems_with_commuting_matrices_are_supported():
     assert only(pair(f, g)).verdict is SUPPORTED
 
 
-def test_the_zero_system_commutes_with_everything():
-    zero = system_of("x y", "0", "0")
-    assert only(pair(LOTKA_VOLTERRA, zero)).verdict is PROVED
-    assert only(pair(zero, zero)).verdict is PROVED
+def map_of(*image):
+    return parse_system(f'variables = ["x", "y"]\n[map]\nimage = {list(image)}\n', "inline")
+
+
+ZERO = System("x' = 0; y' = 0")
+AT_A_TENTH = System("x' = (10*eps - 1)*(x + y); y' = (10*eps - 1)*x^2")  # 0 at eps = 1/10
+
+
+@pytest.mark.parametrize(
+    ("f", "g", "eps", "message"),
+    [
+        ("lotka_volterra", ZERO, None, "found g: .*whose map is the identity, expected another"),
+        (ZERO, "lotka_volterra", "1/3", "found f: .*whose map is the identity, expected another"),
+        ("lotka_volterra", AT_A_TENTH, "1/10", "found g = inline, whose map is the identity at eps = 1/10"),
+        (AT_A_TENTH, "lotka_volterra", "1/10", "found f = inline, whose map is the identity at eps = 1/10"),
+        (System("x' = a*x; y' = a*y^2", a=0), "lotka_volterra", None, "whose map is the identity"),
+        (map_of("x", "y"), "lotka_volterra", "1/10", "found f = inline, whose map is the identity, expected"),
+        (map_of("x + (10*eps - 1)*y^2", "y"), "lotka_volterra", "1/10", "whose map is the identity at eps = 1/10"),
+    ],
+)
+def test_the_identity_is_no_map_that_commutes_with_another(f, g, eps, message):
+    files = [load(one) if isinstance(one, str) else one for one in (f, g)]
+    with pytest.raises(InputError, match=message):
+        check_commute(*files, Settings(eps=eps, steps=2))
+
+
+def test_a_map_that_is_the_identity_at_another_eps_is_compared():
+    assert check_commute(load("lotka_volterra"), AT_A_TENTH, Settings(eps="1/9", steps=2)).verdict is REFUTED
+    assert check_commute(AT_A_TENTH, AT_A_TENTH, Settings(steps=2)).verdict.holds  # at every eps but one
+    with pytest.raises(InputError, match="identity at eps = 1/10"):
+        check_commute(load("lotka_volterra"), AT_A_TENTH, Settings(eps="1/9", steps=2), eps2="1/10")
+
+
+def test_a_member_of_the_family_with_the_cubic_0_has_no_maps_that_commute():
+    member = FamilyMember(fmpq_mat(2, 2, [1, 0, 0, 1]), parse_polynomial("0", ["q", "p"]))
+    with pytest.raises(InputError, match="whose map is the identity"):
+        check_commute(SystemFile.from_member(member), None, QUICK)
 
 
 # What is told

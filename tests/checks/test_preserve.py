@@ -34,7 +34,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_poly
 from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.written.text import parse_rational_function
@@ -46,7 +46,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.invariants.poisson import GivenTensor, tensor_condition
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -232,6 +232,7 @@ def test_without_the_theorem_the_tensor_of_a_generic_member_is_supported(member,
 
 @given(hamiltonians(dims=(2,)))
 def test_in_dimension_two_the_tensor_is_proved_for_every_h(hamiltonian):
+    assume(any(entry != 0 for entry in hamiltonian.J.entries()))
     assert verdicts(check_poisson(file(hamiltonian), QUICK)) == [PROVED, PROVED]
 
 
@@ -249,6 +250,7 @@ def test_the_tensor_of_a_generic_hamiltonian_in_dimension_four_is_refuted():
 
 @given(hamiltonians(dims=(3,)))
 def test_in_dimension_three_the_tensor_is_supported_without_a_theorem(hamiltonian):
+    assume(any(entry != 0 for entry in hamiltonian.J.entries()))
     # J has rank 2: the phase space is made of planes, on each of which dimension 2 applies.
     assert verdicts(check_poisson(file(hamiltonian), QUICK)) == [SUPPORTED, SUPPORTED]
 
@@ -351,3 +353,58 @@ def test_a_proof_of_something_false_is_contradicted_by_the_computation(monkeypat
     monkeypatch.setattr(preserve.theorems, "poisson_tensor_invariant", lambda hamiltonian, member: false)
     with pytest.raises(Contradiction, match="a theorem that does not apply"):
         check_poisson(file(GENERIC), QUICK)
+
+
+# Tensors that are 0
+
+
+@pytest.mark.parametrize(
+    ("entry", "eps", "message"),
+    [
+        ("0", None, "found the tensor P = 0, expected one that is not zero: every map preserves 0"),
+        ("(10*eps - 1)*(x + y^7)", "1/10", "which is identically 0 at eps = 1/10, expected one that is not zero"),
+        ("a*x", None, "found the tensor P = 0"),
+        ("x*(a + 10*eps - 1)", "1/10", "identically 0 at eps = 1/10"),
+    ],
+)
+def test_a_tensor_that_is_0_at_the_eps_and_parameters_in_force_is_wrong_use(entry, eps, message, tmp_path):
+    rows, how = [["0", entry], [f"-({entry})", "0"]], Settings(eps=eps, steps=1)
+    file = parse_system('variables = ["x", "y"]\n[parameters]\na = "0"\n[system]\nrhs = ["x*(1 - y)", "y*(x - 1)"]\n')
+    with pytest.raises(InputError, match=message):
+        check_poisson(file, how, rows)
+    path = tmp_path / "p.toml"
+    path.write_text(f'[poisson]\ntensor = [["0", "{entry}"], ["-({entry})", "0"]]\n')
+    with pytest.raises(InputError, match=message):
+        check_poisson(file, how, GivenTensor.read(path, file.variables, file.parameters))
+
+
+@pytest.mark.parametrize(
+    ("entry", "eps", "condition", "verdict"),
+    [
+        ("(10*eps - 1)*x*y", None, ", where 10*eps - 1 is not 0", SUPPORTED),
+        ("(10*eps - 1)*x*y", "1/9", "", SUPPORTED),
+        ("(10*eps - 1)*(x + y^7)", "1/9", "", REFUTED),
+        ("x*y/(10*eps - 1)", None, ", where 10*eps - 1 is not 0", SUPPORTED),
+        ("x*y/(10*eps - 1)", "1/10", "", UNDECIDED),  # no values
+    ],
+)
+def test_the_claim_says_where_a_tensor_is_not_0(entry, eps, condition, verdict):
+    rows = [["0", entry], [f"-({entry})", "0"]]
+    law, jacobi = check_poisson(file_of(LOTKA_VOLTERRA), Settings(eps=eps, steps=1), rows).findings
+    assert (law.claim, law.verdict) == (f"the Kahan map is Poisson for P{condition}", verdict)
+    assert jacobi.claim == f"P is a Poisson tensor{condition}"
+
+
+def test_a_tensor_is_0_only_where_all_its_entries_are():
+    rows = [["0", "(eps - 1)*z", "eps*(eps - 2)*y"], ["-(eps - 1)*z", "0", "0"], ["-eps*(eps - 2)*y", "0", "0"]]
+    tensor = GivenTensor.from_text(rows, ["x", "y", "z"])
+    assert tensor_condition(tensor, None) == ""
+    assert [tensor_condition(tensor, fmpq(eps)) for eps in (1, 2)] == ["", ""]
+
+
+def test_of_the_tensor_0_of_a_hamiltonian_system_nothing_is_proved():
+    zero = hamiltonian_of("x y", "x^3", [["0", "0"], ["0", "0"]])
+    assert verdicts(check_poisson(SystemFile.from_hamiltonian(zero), QUICK)) == [UNDECIDED, UNDECIDED]
+    saddle = SystemFile.from_hamiltonian(hamiltonian_of("q p", "q*p"))  # Pi = (1 - eps^2) J
+    assert verdicts(check_poisson(saddle, Settings(eps=1, steps=1))) == [UNDECIDED, UNDECIDED]
+    assert verdicts(check_poisson(saddle, Settings(eps=2, steps=1))) == [PROVED, PROVED]
