@@ -153,6 +153,7 @@ def analyze(
     laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work
     total = seconds if seconds is not None else _SECONDS.get(file.dim, _MOST_SECONDS)
     found = Analysis(file, laboratory.eps, total, seed, laboratory.free_symbols, parts=tuple(parts))
+    found.defect = laboratory.defect if file.is_quadratic else ""
     run = Run(found, laboratory, symbols, progress)
     todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
     found.pending = [part.name for part in todo]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
@@ -92,6 +93,9 @@ def _nowhere_defined(facts: _Facts) -> _Verdict | None:
 def _linear(facts: _Facts) -> _Verdict | None:
     if not facts.is_linear:
         return None
+    eps, B = facts.found.eps, facts.found.file.system.B
+    if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
+        return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Known.PROVED)
     closes = facts.closes and f"; {facts.closes}"
     sentence = f"The system is linear, and so is its Kahan map; {facts.integrals}{closes}."
     return _Verdict("linear", sentence, ground=Known.PROVED)
@@ -102,6 +106,13 @@ def _contradictory(facts: _Facts) -> _Verdict | None:
         return None
     sentence = f"The findings do not agree: {'; '.join(said)}. {_capital(facts.integrals)}."
     return _Verdict("undecided", sentence, ground=None)
+
+
+def _not_birational(facts: _Facts) -> _Verdict | None:
+    """What degrees and closed orbits mean is known of birational maps; a constant map needs no theorem."""
+    if not facts.found.defect or facts.growth is Growth.ZERO:
+        return None
+    return _Verdict("undecided", f"{_capital(facts.found.defect)}; {facts.phrase}.", ground=None)
 
 
 def _linearisable(facts: _Facts) -> _Verdict | None:
@@ -168,8 +179,8 @@ def _undecided(facts: _Facts) -> _Verdict:
 
 # The stronger ones first: what is proved before what is measured.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
-    *(_nowhere_defined, _linear, _contradictory, _linearisable, _of_positive_entropy, _on_curves, _by_growth),
-    _undecided,
+    *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
+    *(_on_curves, _by_growth, _undecided),
 )
 
 

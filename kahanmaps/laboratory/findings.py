@@ -35,6 +35,7 @@ class Findings:
     seconds: float
     seed: int
     symbols: tuple[str, ...] = ()
+    defect: str = ""  # why the Kahan map at this eps is not birational; empty where it is, and for other maps
     fixed_points: FixedPointSearch | None = None
     equivalent: Equivalence | None = None  # a system of the catalogue
     integrals: IntegralSearch | None = None

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 from helpers import EULER_TOP, LORENZ, random_point, systems
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,9 +13,12 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
 from kahanmaps.documents.files import read_system
+from kahanmaps.errors import SingularStep
+from kahanmaps.laboratory.preserve.darboux import affine_functions
 from kahanmaps.laboratory.preserve.darboux.affine_functions import (
     affine_darboux,
     affine_integrals,
+    under_map,
 )
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -134,3 +137,68 @@ def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
             assert after * (1 - fmpq(1, 7) * evaluate(d.cofactor, QQ, x)) == before * (
                 1 + fmpq(1, 7) * evaluate(d.cofactor, QQ, image)
             )
+
+
+# At a named eps
+
+LOTKA_VOLTERRA = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
+CHAIN = QuadraticSystem.from_text(["x", "y", "z"], ["x*(2 + y)", "y*(1 + x - z)", "z*(y - 3)"])
+
+
+def images_of(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> list[tuple[fmpq, ...] | None]:
+    """The images of points of the line or plane function = 0, None for one that has none."""
+    n = system.dim
+    slopes = [fmpq(function[tuple(int(i == j) for i in range(n))]) for j in range(n)]
+    k = next(j for j in range(n) if slopes[j] != 0)
+    images: list[tuple[fmpq, ...] | None] = []
+    for number in range(2, 8):
+        x = [fmpq(number**2 + 3 * j + 1, number + j) for j in range(n)]
+        x[k] -= evaluate(function, QQ, x) / slopes[k]
+        assert evaluate(function, QQ, x) == 0
+        try:
+            images.append(KahanMap(system, eps).step(x))
+        except SingularStep:
+            images.append(None)
+    return images
+
+
+@pytest.mark.parametrize(
+    "eps", [fmpq(p, q) for p, q in ((1, 1), (-1, 1), (1, 2), (-1, 2), (1, 3), (-1, 3), (1, 5), (7, 1))]
+)
+@pytest.mark.parametrize("system", [LOTKA_VOLTERRA, CHAIN], ids=["plane", "space"])
+@pytest.mark.parametrize("scales", [(1, 1, 1), (10**6, 1, fmpq(1, 7)), (-3, 10**5, 2)], ids=str)
+def test_what_the_map_makes_of_a_hyperplane_is_seen_at_its_points(system, eps, scales):
+    n = system.dim
+    D = fmpq_mat(n, n, [scales[i] if i == j else 0 for i in range(n) for j in range(n)])
+    system = system.composed(D.inv(), [fmpq(0)] * n).transformed(D)
+    for one in affine_darboux(system).functions:
+        fate, images = under_map(system, one.function, eps), images_of(system, one.function, eps)
+        images = [image for image in images if image is not None]
+        if fate == "undefined":
+            assert images == []
+            continue
+        assert len(images) > n
+        assert all(evaluate(one.function, QQ, list(image)) == 0 for image in images)
+        differences = [[a - b for a, b in zip(image, images[0], strict=True)] for image in images[1:]]
+        spanned = rank(QQ, fmpq_mat(differences))
+        assert spanned == n - 1 if fate == "invariant" else spanned < n - 1
+
+
+@pytest.mark.parametrize(
+    ("system", "eps", "expected"),
+    [
+        (LOTKA_VOLTERRA, fmpq(1), ["contracted", "undefined"]),
+        (LOTKA_VOLTERRA, fmpq(2), ["invariant", "invariant"]),
+        (CHAIN, fmpq(1, 2), ["invariant", "undefined", "invariant"]),  # on y = 0 x' = 2 x and z' = -3 z
+        (CHAIN, fmpq(1, 3), ["invariant", "contracted", "invariant"]),
+    ],
+)
+def test_known_fates(system, eps, expected):
+    assert [under_map(system, one.function, eps) for one in affine_darboux(system).functions] == expected
+
+
+def test_a_determinant_that_is_too_long_decides_nothing(monkeypatch):
+    monkeypatch.setattr(affine_functions, "_BUDGET", 0)
+    x, y = LOTKA_VOLTERRA.rhs[0].context().gens()
+    assert [under_map(LOTKA_VOLTERRA, function, fmpq(1)) for function in (x, y)] == ["undecided", "undecided"]
+    assert under_map(LOTKA_VOLTERRA, x, fmpq(2)) == "invariant"  # shown by a point

@@ -134,6 +134,101 @@ def test_where_the_map_has_no_value():
     assert found.conclusion.sentence.startswith("The map is nowhere defined")
 
 
+def lines_of(found, title):
+    return [line.text for name, lines in found.sections if name == title for line in lines]
+
+
+QUICK_PARTS = [
+    part for part in ANALYSES if part.name in ("the commuting family", "a larger algebra", "fixed points", "symmetries")
+]
+
+
+@pytest.mark.parametrize(
+    ("eps", "expected"),
+    [
+        (None, ["the lines x = 0 and y = 0 are invariant, for flow and map"]),
+        ("1/2", ["the lines x = 0 and y = 0 are invariant, for flow and map"]),
+        (
+            "1",
+            [
+                "the line x = 0 is invariant for the flow; at eps = 1 the map contracts it: "
+                "det(I + eps f'(x)) is 0 there",
+                "the line y = 0 is invariant for the flow; at eps = 1 the map has no value on it: "
+                "det(I - eps f'(x)) is 0 there",
+            ],
+        ),
+    ],
+)
+def test_what_is_said_of_hyperplanes_holds_at_the_eps_in_force(eps, expected):
+    found = analyze(load("lotka_volterra"), eps=eps, parts=QUICK_PARTS)
+    assert [line for line in lines_of(found, "structure") if "invariant" in line] == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "eps", "expected"),
+    [
+        (load("lotka_volterra"), None, "flow and map have the same fixed points;"),
+        (load("lotka_volterra"), "1/2", "flow and map have the same fixed points;"),
+        (
+            load("lotka_volterra"),
+            "1",
+            "flow and map have the same fixed points where det(I - eps f'(x)) is not 0; "
+            "at eps = 1 it is 0 at the fixed point (0, 0), where the map has no value;",
+        ),
+        (
+            system("x y", "x", "-y"),
+            "1",
+            "at eps = 1 det(I - eps f'(x)) is 0 at all of them: the map has no value there",
+        ),
+        (
+            system("x y", "x*y", "x^2"),  # the line (0, y), eigenvalues 0 and y
+            None,
+            "flow and map have the same fixed points where det(I - eps f'(x)) is not 0; an eigenvalue",
+        ),
+    ],
+)
+def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expected):
+    found = analyze(given, eps=eps, parts=QUICK_PARTS)
+    assert lines_of(found, "vector field")[-1].startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("rhs", "eps", "defect"),
+    [
+        (("x", "-y"), "1", "at eps = 1 the map has no value anywhere: det(I - eps f'(x)) is identically 0"),
+        (("x", "-y"), "1/2", ""),
+        (
+            ("x^2 - 1/4", "x*y + y^2"),
+            "1",
+            "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all images",
+        ),
+        (("x^2 - 1/4", "x*y + y^2"), "1/2", ""),
+    ],
+)
+def test_of_a_map_that_is_not_birational_symmetries_and_hyperplanes_are_those_of_the_flow(rhs, eps, defect):
+    found = analyze(system("x y", *rhs), eps=eps, parts=QUICK_PARTS)
+    assert found.defect == defect
+    assert (f"of the vector field only: {defect}" in lines_of(found, "symmetry")) == bool(defect)
+    (planes,) = [line for line in lines_of(found, "structure") if line.startswith("the lines")]
+    assert planes.endswith("are invariant for the flow" if defect else "are invariant, for flow and map")
+    algebra = [line for line in lines_of(found, "structure") if "over K" in line]
+    assert all(("inherits" in line) == (not defect) for line in algebra)
+
+
+@pytest.mark.parametrize(("eps", "kind"), [("1", "singular"), ("1/2", "linear"), (None, "linear")])
+def test_a_linear_system_has_a_linear_map_where_it_has_one(eps, kind):
+    found = analyze(system("x y", "x", "-y"), eps=eps, parts=QUICK_PARTS)
+    assert found.conclusion.kind == kind
+
+
+def test_degrees_of_a_map_that_is_not_birational_mean_nothing():
+    parts = [part for part in ANALYSES if part.name == "degrees"]
+    found = analyze(system("x y", "x^2 - 1/4", "x*y + y^2"), eps=1, parts=parts)
+    assert found.conclusion.kind == "undecided"
+    assert found.conclusion.sentence.startswith("At eps = 1 the map is not invertible")
+    assert analyze(system("x y", "x^2 - 1/4", "x*y + y^2"), eps=2, parts=parts).conclusion.kind != "undecided"
+
+
 def test_where_an_iterate_is_constant():
     found = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
     assert found.conclusion.sentence == (

@@ -8,6 +8,7 @@ from flint import fmpq, fmpq_mat
 from kahanmaps import KahanMap, System
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -42,6 +43,41 @@ def test_fixed_points_and_eigenvalues(f, texts):
     assert (len(told), search.undecided) == (len(texts), "")
     for text, wanted in zip(told, texts, strict=True):
         assert wanted in text
+
+
+# An equilibrium with the eigenvalue 1/eps is no fixed point of the map at eps.
+@pytest.mark.parametrize(
+    ("f", "eps", "expected"),
+    [
+        (system("x y", "x*(1 - y)", "y*(x - 1)"), "1", [False, True]),
+        (system("x y", "x*(1 - y)", "y*(x - 1)"), "-1", [False, True]),
+        (system("x y", "x*(1 - y)", "y*(x - 1)"), "1/2", [True, True]),
+        (system("x y", "x*(1 - y)", "y*(x - 1)"), None, [True, True]),
+        (system("x", "x^2 - 2"), "1/3", [True]),
+        (system("x", "x^2 - 1/4"), "1", [True, False]),
+        (system("x y", "x^2 - 2", "y"), "1", [False]),  # (x, 0) with x^2 = 2, eigenvalues 2 x and 1
+        (system("x y", "x^2 - 2", "y*(x - 1)"), "1", [True]),
+        (system("x y", "x^2 - 2", "y + x"), "2", [True]),
+        (system("x y", "x*y", "x^2 - 2*x"), "1/2", [False, None]),  # det is 0 at one point of the line (0, y)
+        (system("x y", "x*y", "x^2 - 2*x"), None, [True, None]),
+        (system("x y", "y", "0"), None, [True]),
+        (system("x y", "x*y", "y"), "1", [False]),  # f' has the eigenvalue 1 on the whole line
+        (system("x y", "x*y", "y"), "1/2", [True]),
+    ],
+)
+def test_where_an_equilibrium_is_a_fixed_point_of_the_map(f, eps, expected):
+    eps = None if eps is None else fmpq(*map(int, eps.split("/")))
+    found = fixed_points(f).found
+    assert [one.are_fixed_by_map(eps) for one in found] == expected
+    for one, is_fixed in zip(found, expected, strict=True):
+        if eps is None or one.equations or one.dimension:
+            continue
+        x = [value.leading_coefficient() if value else fmpq(0) for value in one.coordinates]
+        if is_fixed:
+            assert list(KahanMap(f, eps).step(x)) == x
+        else:
+            with pytest.raises(SingularStep):
+                KahanMap(f, eps).step(x)
 
 
 def test_too_many_equations_are_told():

@@ -14,7 +14,7 @@ from kahanmaps.family.tensor import TensorStructure, tensor_structure
 from kahanmaps.laboratory.analyses.part import Run
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
-from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, under_map
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     MAX_DIMENSION,
     ConstantStructures,
@@ -67,18 +67,13 @@ def statements(found: Findings) -> list[Statement]:
         lines.append(Statement(Known.PROVED, f"Hamiltonian with {kind}, H = {H}"))
     elif structures is not None and structures.proved:
         lines.append(Statement(Known.PROVED, f"not Hamiltonian with a constant J: {structures.reason}"))
-    darboux = affine_darboux(found.file.system) if found.file.is_quadratic else None
-    if darboux is not None and darboux.functions:
-        planes = [f"{format_polynomial(one.function)} = 0" for one in darboux.functions]
-        kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
-        are = f"the {kind} {planes[0]} is" if len(planes) == 1 else f"the {kind}s {_enumerated(planes)} are"
-        lines.append(Statement(Known.PROVED, f"{are} invariant, for flow and map"))
+    lines += _hyperplanes(found)
     if found.normal_form is not None and found.normal_form.text:
         text = f"belongs to the commuting family: {found.normal_form.text}{_coordinates(found, found.normal_form.T)}"
         lines.append(Statement(Known.PROVED, text))
     if found.tensor is not None:
-        text = "the map is that over K, and inherits what it has (docs/beyond.md)"
-        lines.append(Statement(Known.PROVED, f"{found.tensor.text}: {text}"))
+        text = "" if found.defect else ": the map is that over K, and inherits what it has (docs/beyond.md)"
+        lines.append(Statement(Known.PROVED, f"{found.tensor.text}{text}"))
     if isinstance(found.normal_form, SystemNormalForm):
         form = found.normal_form.form
         lines.append(
@@ -88,6 +83,34 @@ def statements(found: Findings) -> list[Statement]:
                 "a block for each root t",
             )
         )
+    return lines
+
+
+def _hyperplanes(found: Findings) -> list[Statement]:
+    """Those that the flow keeps, by what becomes of them under the map at the eps in force."""
+    if not found.file.is_quadratic:
+        return []
+    system, eps = found.file.system, found.eps
+    fates: dict[str, list[str]] = {}
+    for one in affine_darboux(system).functions:
+        fate = "not birational" if found.defect else "invariant"
+        if eps is not None and not found.defect:
+            fate = under_map(system, one.function, eps)
+        fates.setdefault(fate, []).append(f"{format_polynomial(one.function)} = 0")
+    kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
+    lines = []
+    for fate, planes in fates.items():
+        are, it = f"the {kind} {planes[0]} is", "it"
+        if len(planes) > 1:
+            are, it = f"the {kind}s {_enumerated(planes)} are", "them"
+        of_map = {
+            "invariant": ", for flow and map",
+            "contracted": f" for the flow; at eps = {eps} the map contracts {it}: det(I + eps f'(x)) is 0 there",
+            "undefined": f" for the flow; at eps = {eps} the map has no value on {it}: det(I - eps f'(x)) is 0 there",
+            "undecided": f" for the flow; what the map makes of {it} at eps = {eps} would take too long to decide",
+            "not birational": " for the flow",
+        }
+        lines.append(Statement(Known.PROVED, f"{are} invariant{of_map[fate]}"))
     return lines
 
 

@@ -23,7 +23,7 @@ def statements(found: Findings) -> list[Statement]:
     if search is None:
         return []
     linear = len(search.infinitesimal)
-    lines = []
+    lines = [Statement(Known.NOTE, f"of the vector field only: {found.defect}")] if found.defect else []
     if linear > _FIELDS:
         lines.append(Statement(Known.PROVED, f"a Lie algebra of affine symmetries, of dimension {linear}"))
     else:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from flint import fmpq
+
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.analyses.part import Run
@@ -46,8 +48,20 @@ def statements(found: Findings) -> list[Statement]:
             Statement(Known.PROVED, "f = 0 has no solution, not over the complex numbers either: no fixed point")
         )
     else:
-        text = "flow and map have the same fixed points; an eigenvalue lambda of f' becomes the multiplier"
-        lines.append(Statement(Known.NOTE, f"{text} (1 + eps*lambda)/(1 - eps*lambda) of the map"))
+        lines.append(Statement(Known.NOTE, _of_the_map(search, found.eps)))
     if found.equivalent is not None:
         lines.append(Statement(Known.PROVED, found.equivalent.text))
     return lines
+
+
+def _of_the_map(search: FixedPointSearch, eps: fmpq | None) -> str:
+    """Which of the fixed points of the flow are fixed points of the map: those with det(I - eps f'(x)) not 0."""
+    known = [one.are_fixed_by_map(eps) for one in search.found]
+    lost = [one.where for one, is_fixed in zip(search.found, known, strict=True) if is_fixed is False]
+    if len(lost) == len(known):
+        return f"at eps = {eps} det(I - eps f'(x)) is 0 at all of them: the map has no value there"
+    where = "" if all(known) else " where det(I - eps f'(x)) is not 0"
+    if lost:
+        where += f"; at eps = {eps} it is 0 at the {', the '.join(lost)}, where the map has no value"
+    multiplier = "an eigenvalue lambda of f' becomes the multiplier (1 + eps*lambda)/(1 - eps*lambda) of the map"
+    return f"flow and map have the same fixed points{where}; {multiplier}"

@@ -1,8 +1,9 @@
 """The equilibria of a vector field, which are the fixed points of its Kahan map, and the eigenvalues there.
 
 Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x): where f(x) = 0 the map has the derivative (I - eps f')^{-1} (I + eps f'),
-and an eigenvalue lambda of f' becomes the multiplier (1 + eps lambda)/(1 - eps lambda). Everything is exact. Points
-that are not rational, and sets of positive dimension, are told by equations. Source: cmoq-2013.
+and an eigenvalue lambda of f' becomes the multiplier (1 + eps lambda)/(1 - eps lambda). Where det(I - eps f'(x)) = 0 an
+equilibrium is no fixed point: the equation does not determine its image. Everything is exact. Points that are not
+rational, and sets of positive dimension, are told by equations. Source: cmoq-2013.
 """
 
 from __future__ import annotations
@@ -62,6 +63,31 @@ class FixedPoints:
     def text(self) -> str:
         """Where it is, and the eigenvalues."""
         return f"{self.where}, eigenvalues of f': {self.eigenvalues_text} = 0"
+
+    def are_fixed_by_map(self, eps: fmpq | None) -> bool | None:
+        """Whether det(I - eps f') is not 0 at these points: True at all, False at none, None at some or not known.
+
+        Args:
+            eps: an exact number, or None for all but finitely many.
+
+        >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
+        >>> [one.are_fixed_by_map(fmpq(1)) for one in fixed_points(pendulum).found]
+        [False, True]
+        >>> line = fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "0"])).found[0]
+        >>> line.where, line.are_fixed_by_map(None)
+        ('line of fixed points (0, y)', None)
+        """
+        if eps is None:
+            # At one point few eps are zeros of det(I - eps f'); on a set of points with one polynomial as well.
+            alike = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
+            return True if alike else None
+        context = self.coordinates[0].context()
+        at_eps = self.eigenvalues.compose(context.constant(1 / eps), *context.gens(), ctx=context)
+        value = normal_form(at_eps, self.equations)
+        if value.is_constant():
+            return not value.is_zero()
+        common = groebner([*self.equations, value]) if self.equations else None
+        return True if common is not None and any(p.is_constant() for p in common) else None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -1,7 +1,8 @@
 """Affine functions that the flow of a quadratic system conserves, or keeps zero: exactly, over Q.
 
-The Kahan map inherits both. If v . f = 0, it conserves v . x. If l = v . x + w has l' = l L along the flow (an affine
-Darboux function: the hyperplane l = 0 is invariant; L is its affine cofactor), the defining equation gives
+The Kahan map inherits both, the second at each eps at which it is defined on the hyperplane (`under_map`). Where
+v . f = 0, it conserves v . x. If l = v . x + w has l' = l L along the flow (an affine Darboux function: the hyperplane
+l = 0 is invariant; L is its affine cofactor), the defining equation gives
 
     l(x~) (1 - eps L(x)) = l(x) (1 + eps L(x~)),
 
@@ -24,14 +25,17 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
-from kahanmaps.algebra.polynomials import degree, linear_combinations, primitive_part
+from kahanmaps.algebra.polynomials import degree, evaluate, linear_combinations, primitive_part
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver
 
 # The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
 MAX_EXTACTIC_DIMENSION = 12
 _LINE = 10**6  # the size of the integers that give a random line
+_BUDGET = 20_000_000  # products of terms, for a determinant on a hyperplane
 
 
 @dataclass(frozen=True)
@@ -254,6 +258,55 @@ def darboux_cofactor(system: PolynomialField, function: fmpq_mpoly) -> fmpq_mpol
     """
     quotient, remainder = divmod(system.derivative(function), function)
     return quotient if remainder.is_zero() else None
+
+
+def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
+    """What the Kahan map at eps makes of a hyperplane that the flow keeps; exact.
+
+    Args:
+        system: a quadratic system over Q, whose map at eps is birational.
+        function: an affine Darboux function l of the flow.
+        eps: an exact number, half the time step.
+
+    Returns:
+        "invariant" where det(I - eps f') and det(I + eps f') are not identically 0 on l = 0: the map of the system on
+        the hyperplane is birational then. "undefined" where the first one is 0 there, "contracted" where the second
+        one is: then the image of l = 0 is a smaller part of it. "undecided" where these are too long to expand.
+
+    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
+    >>> x, y = system.rhs[0].context().gens()
+    >>> [under_map(system, l, fmpq(eps)) for eps in (1, -1, 2) for l in (x, y)]
+    ['contracted', 'undefined', 'undefined', 'contracted', 'invariant', 'invariant']
+    """
+    for outcome, step in (("undefined", eps), ("contracted", -eps)):
+        vanishes = _determinant_vanishes_on(system, function, step)
+        if vanishes is not False:
+            return outcome if vanishes else "undecided"
+    return "invariant"
+
+
+def _determinant_vanishes_on(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> bool | None:
+    """Whether det(I - eps f'(x)) is identically 0 on the zero set of an affine function; None where it is too long."""
+    n, context = system.dim, function.context()
+    *slopes, _ = _coefficients(function)
+    k = next(i for i, slope in enumerate(slopes) if slope != 0)
+    place = list(context.gens())
+    place[k] = place[k] - function / slopes[k]
+    rng = random.Random("a point of the hyperplane")
+    free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
+    point = [evaluate(x, QQ, free) for x in place]
+    if Kahan(system).at(eps).determinant(point) != 0:  # at most points: then nothing is expanded
+        return False
+    field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
+    entries = [
+        Function(field, int(i == j) - f.derivative(j).compose(*place, ctx=context) * eps, one)
+        for i, f in enumerate(system.rhs)
+        for j in range(n)
+    ]
+    try:
+        return bool(FunctionMatrix(field, n, n, entries).det().above.is_zero())
+    except BudgetExceeded:
+        return None
 
 
 def _coefficients(function: fmpq_mpoly) -> list[fmpq]:
