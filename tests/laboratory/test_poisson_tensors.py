@@ -14,6 +14,7 @@ from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
+from kahanmaps.errors import InputError
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson import poisson_tensors
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
@@ -198,6 +199,16 @@ def test_a_pencil_is_one_of_at_least_two_tensors_and_of_not_too_many(monkeypatch
         found = find_poisson(load("euler_top"), 3, integrals=())
         assert (len(found.tensors), found.pencil) == (3, verdict)
     assert find_poisson(load("weierstrass"), integrals=()).pencil is None
+
+
+@pytest.mark.parametrize(
+    ("denominator", "eps"), [("0", None), ("x - x", "1/10"), ("(10*eps - 1)*x", "1/10"), ("x/(10*eps - 1)", "1/10")]
+)
+def test_a_denominator_that_is_0_at_the_eps_in_force_is_wrong_use(denominator, eps):
+    file = load("lotka_volterra")
+    function = parse_rational_function(denominator, (*file.variables, "eps"))
+    with pytest.raises(InputError, match="identically 0 or has no values.*expected a function that is not zero"):
+        find_poisson(file, 0, eps=eps, denominator=function)
 
 
 def test_a_denominator_divides_all_entries():

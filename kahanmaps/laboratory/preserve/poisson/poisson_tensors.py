@@ -32,7 +32,8 @@ from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError, KahanmapsError, counted
+from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
+from kahanmaps.invariants.phase_functions import at_eps
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import (
@@ -213,7 +214,8 @@ def find_poisson(
         tensors span is left out. Finding none up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols, eps = 0, a negative degree, less than no time.
+        InputError: for unknown symbols, eps = 0, a negative degree, less than no time, and a denominator that is
+            identically 0 at this eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = find_poisson(load("lotka_volterra"))
@@ -228,6 +230,12 @@ def find_poisson(
     pairs = dim * (dim - 1) // 2
     if denominator is not None:
         denominator = _in_names_of(laboratory, denominator)
+        if any(part.is_zero() for part in at_eps(denominator, laboratory.eps)):
+            at = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
+            raise InputError(
+                f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or has "
+                f"no values{at}, expected a function that is not zero"
+            )
     while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
     found: list[FoundTensor] = []
