@@ -20,6 +20,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
 from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
@@ -293,4 +294,5 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
 
 
 def _is_zero(field: Field, matrix: Any) -> bool:
-    return all(field.is_zero(entry) for entry in matrix.entries())
+    """Whether the matrix is 0; not over bounds, where the degrees of the laws, which are larger, stand for its own."""
+    return not isinstance(field, BoundField) and all(field.is_zero(entry) for entry in matrix.entries())

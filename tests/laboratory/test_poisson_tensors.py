@@ -207,7 +207,7 @@ def test_a_pencil_is_one_of_at_least_two_tensors_and_of_not_too_many(monkeypatch
 def test_a_denominator_that_is_0_at_the_eps_in_force_is_wrong_use(denominator, eps):
     file = load("lotka_volterra")
     function = parse_rational_function(denominator, (*file.variables, "eps"))
-    with pytest.raises(InputError, match="identically 0 or has no values.*expected a function that is not zero"):
+    with pytest.raises(InputError, match=r"identically 0 or has no values.*expected a function that is not zero"):
         find_poisson(file, 0, eps=eps, denominator=function)
 
 
