@@ -64,8 +64,8 @@ from kahanmaps.invariants.heights import height_growth as height_growth
 from kahanmaps.invariants.poisson import GivenTensor as GivenTensor
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as _analyze
-from kahanmaps.laboratory.finite.cycles import Census as Census
-from kahanmaps.laboratory.finite.cycles import cycle_census as _cycle_census
+from kahanmaps.laboratory.cycles import Census as Census
+from kahanmaps.laboratory.cycles import cycle_census as _cycle_census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
 from kahanmaps.laboratory.growth.degrees import degree_growth as _degree_growth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey as HeightSurvey

@@ -26,6 +26,7 @@ from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.invariants.phase_functions import where
 from kahanmaps.laboratory import analysis
 from kahanmaps.laboratory.analyses import growth
+from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.laboratory.growth import degrees
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import densities, hirota_kimura, search
@@ -50,7 +51,6 @@ from kahanmaps.maps.kahan import Kahan
 from kahanmaps.maps.orbits import iteration
 from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
-from kahanmaps.maps.residues.projective import ProjectiveMap
 from kahanmaps.paper.verifier import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -113,19 +113,8 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         lambda: refused(lambda: polarised_map([parse_polynomial("x^3", ["x", "eps"])])),
         "found the degree 3",
     ),
-    (
-        "maps.residues.projective.MAX_PRIME",
-        8,
-        lambda: refused(lambda: ProjectiveMap(EULER_TOP, 1, 7)),
-        "found the prime 7",
-    ),
-    (
-        "maps.residues.projective.MAX_DIMENSION",
-        3,
-        lambda: refused(lambda: ProjectiveMap(EULER_TOP, 1, 7)),
-        "found a map of dimension 3",
-    ),
-    ("maps.residues.projective.MAX_FACTORED", 3, lambda: str(ProjectiveMap(EULER_TOP, 1, 7).factor), "None"),
+    ("laboratory.cycles.MAX_PRIME", 8, lambda: refused(lambda: cycle_census(EULER_TOP, 1, 7)), "found the prime 7"),
+    ("laboratory.cycles.MAX_DIMENSION", 3, lambda: refused(lambda: cycle_census(EULER_TOP, 1, 7)), "of dimension 3"),
     (
         "maps.floats.lyapunov.MAX_NUMBERS",
         18,

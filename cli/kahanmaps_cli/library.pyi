@@ -107,11 +107,9 @@ from kahanmaps.invariants.growth import Growth as Growth
 from kahanmaps.invariants.phase_functions import PhaseFunction as PhaseFunction
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as analyze
-from kahanmaps.laboratory.finite.cycle_laws import Comparison as Comparison
-from kahanmaps.laboratory.finite.cycle_laws import compare as compare
-from kahanmaps.laboratory.finite.cycles import Census as Census
-from kahanmaps.laboratory.finite.cycles import cycle_census as cycle_census
-from kahanmaps.laboratory.finite.cycles import default_eps as default_eps
+from kahanmaps.laboratory.cycles import Census as Census
+from kahanmaps.laboratory.cycles import cycle_census as cycle_census
+from kahanmaps.laboratory.cycles import default_eps as default_eps
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
 from kahanmaps.laboratory.growth.degrees import degree_growth as degree_growth
 from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS
@@ -140,7 +138,6 @@ from kahanmaps.laboratory.singular.singularities import singularities as singula
 from kahanmaps.laboratory.singular.singularities import steps_by_default as steps_by_default
 from kahanmaps.laboratory.singular.singularities import symbolic_denominator as symbolic_denominator
 from kahanmaps.laboratory.symmetry.commuting_over import find_commuting as find_commuting
-from kahanmaps.laboratory.symmetry.reversors import find_reversor as find_reversor
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as linear_symmetries
 from kahanmaps.languages.convert import convert as convert
 from kahanmaps.maps.convention import CONVENTION as CONVENTION

@@ -12,7 +12,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
-from kahanmaps_cli.params import ExactNumber, Kind, NameValue, PointText, Seconds, Whole
+from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
 from kahanmaps_cli.screen.progress import say
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -46,48 +46,27 @@ class Renamed(click.Option):
 system_argument: Callable[[F], F] = click.argument("system", required=False, shell_complete=complete_system)
 
 
-def _parameter_option(kind: Kind, help_text: str) -> Callable[[F], F]:
-    return click.option(
-        "-p",
-        "--parameter",
-        "parameters",
-        type=kind,
-        multiple=True,
-        metavar="NAME=VALUE",
-        help=help_text,
-    )
-
-
-def _inline_options(parameter: Callable[[F], F]) -> Callable[[F], F]:
-    return stack(
-        click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
-        click.option(
-            "--rhs", multiple=True, metavar="EXPR", help="Inline system: a right-hand side, or \"x' = x*y; y' = -x\"."
-        ),
-        click.option("--image", multiple=True, metavar="EXPR", help="Inline map: a function for each variable."),
-        click.option("--inverse", multiple=True, metavar="EXPR", help="Inline map: a function of the inverse map."),
-        parameter,
-    )
-
-
-parameter_option: Callable[[F], F] = _parameter_option(
-    NameValue(),
-    "Set a parameter of the system: a=2/3, or a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and checks.",
+parameter_option: Callable[[F], F] = click.option(
+    "-p",
+    "--parameter",
+    "parameters",
+    type=NameValue(),
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set a parameter of the system: a=2/3, or a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and checks.",
 )
 
-inline_options: Callable[[F], F] = _inline_options(parameter_option)
+inline_options: Callable[[F], F] = stack(
+    click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
+    click.option(
+        "--rhs", multiple=True, metavar="EXPR", help="Inline system: a right-hand side, or \"x' = x*y; y' = -x\"."
+    ),
+    click.option("--image", multiple=True, metavar="EXPR", help="Inline map: a function for each variable."),
+    click.option("--inverse", multiple=True, metavar="EXPR", help="Inline map: a function of the inverse map."),
+    parameter_option,
+)
 
 system_options: Callable[[F], F] = stack(system_argument, inline_options)
-
-# For commands about one prime, where -p 101 is natural: values without a name come under the name "".
-system_or_prime_options: Callable[[F], F] = stack(
-    system_argument,
-    _inline_options(
-        _parameter_option(
-            NameValue(name_is_optional=True), "Set a parameter of the system; a number alone is the prime."
-        )
-    ),
-)
 
 _EPS_HELP = "The paper's epsilon, exact; the time step is 2 eps."
 _TIME_STEP_HELP = "The time step h = 2 eps, instead of --eps."

@@ -88,7 +88,8 @@ def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
         return left, right
     if name_is_optional and not equals and left:
         return "", left
-    raise InputError(f"found {quoted(text)}, expected NAME=VALUE")
+    hint = f" (the prime of cycles is --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
+    raise InputError(f"found {quoted(text)}, expected NAME=VALUE{hint}")
 
 
 def _read_steps(text: str) -> list[int]:

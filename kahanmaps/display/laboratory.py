@@ -21,7 +21,7 @@ from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
 from kahanmaps.displayed import html_form, text_form
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.finite.cycles import Census
+from kahanmaps.laboratory.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch
@@ -231,26 +231,20 @@ def _heights(found: HeightSurvey) -> Iterator[Line]:
 @lines_of.register
 def _census(census: Census) -> Iterator[Line]:
     """The counts, and the longest cycles."""
+    if not census.looked_at:
+        yield "points", census.points
+        yield "stopped", "by the clock, before the images of all points were known"
+        return
     yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}"
-    if census.is_undefined:
-        yield "map", "singular everywhere modulo this prime"
-    elif census.factor is None:
-        yield "map", f"forms of degree {census.degree}; a common factor was not looked for"
-    elif census.factor != "1":
-        yield "map", f"forms of degree {census.degree}, a common factor divided out"
-    yield "lost", census.lost
-    yield "falling", census.falling
+    yield "indeterminate", census.indeterminate
+    yield "pre-indeterminate", census.pre_indeterminate
     if census.complete:
-        yield "transient", census.transient
+        yield "preperiodic", census.preperiodic
     else:
-        yield "open", f"{census.open} after {census.steps} steps"
+        yield "open", f"{census.open} after {census.steps} steps" + (", stopped by the clock" if census.stopped else "")
     yield "periodic", census.periodic
     if census.cycles:
-        yield "cycles", f"{census.cycles}, longest {census.longest}, mean {census.mean:.2f}"
-        if census.at_infinity:
-            yield "at infinity", f"{sum(census.at_infinity.values())} of them"
-        if census.symmetric is not None:
-            yield "symmetric", f"{sum(census.symmetric.values())} of the others"
+        yield "cycles", f"{census.cycles}, longest {census.longest}"
     shown = list(census.lengths.items())[-_LENGTHS_SHOWN:]
     if shown:
         what = "length x cycles" if census.complete else "length x points"

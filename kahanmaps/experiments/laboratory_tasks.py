@@ -23,8 +23,7 @@ from kahanmaps.experiments.registry import Result, Whole, fields, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
-    from kahanmaps.laboratory.finite.cycle_laws import Comparison
-    from kahanmaps.laboratory.finite.cycles import Census
+    from kahanmaps.laboratory.cycles import Census
     from kahanmaps.laboratory.growth.degrees import DegreeGrowth
     from kahanmaps.laboratory.preserve.densities import DensitySearch
     from kahanmaps.laboratory.preserve.integrals import IntegralSearch
@@ -283,44 +282,25 @@ def cycles(
     eps: Any = None,
     samples: int | None = None,
     steps: int | None = None,
-    seconds: int = 60,
+    seconds: int | None = None,
     seed: int = 0,
     report: bool = False,
 ) -> Result:
-    """The cycles of the map over a finite field, and the laws that their lengths are compatible with."""
-    from kahanmaps.laboratory.finite.cycle_laws import LAWS, compare
-    from kahanmaps.laboratory.finite.cycles import cycle_census, default_eps
-    from kahanmaps.laboratory.symmetry.reversors import find_reversor
+    """The lengths of the cycles of the map over a finite field."""
+    from kahanmaps.laboratory.cycles import DEFAULT_STEPS, cycle_census, default_eps
 
     if steps is not None and samples is None:
-        raise InputError(f"found steps = {steps} without samples, expected both: whole graphs have no last step")
-    reversor = find_reversor(system.system) if system.is_quadratic else None
-    runs: list[tuple[Census, Comparison]] = []
-    for value in (1,) if not system.map.has_eps else default_eps(prime) if eps is None else (eps,):
-        census = cycle_census(
-            system.map,
-            value,
-            prime,
-            reversor=reversor,
-            samples=samples,
-            steps=steps,
-            seed=seed,
-            seconds=seconds,
-        )
-        runs.append((census, compare(census, seed)))
-    whole = all(census.complete for census, _ in runs)
-    stopped = any(census.stopped for census, _ in runs)
-    verdicts = {law: {found.verdict(law) for _, found in runs} for law in LAWS}
-    shares = [found.share_within for _, found in runs if found.share_within is not None]
+        raise InputError(f"found steps = {steps} without samples, expected both: only samples have a last step")
+    values = (1,) if not system.map.has_eps else default_eps(prime) if eps is None else (eps,)
+    limits: dict[str, Any] = {"samples": samples, "steps": steps or DEFAULT_STEPS, "seed": seed}
+    limits["seconds"] = None if seconds is None else seconds / len(values)
+    runs = [cycle_census(system.map, value, prime, **limits) for value in values]
+    stopped, whole = any(census.stopped for census in runs), all(census.complete for census in runs)
     return {
         "status": "time" if stopped else "complete" if whole else "sampled",
-        **{law.replace(" ", "_"): one.pop() if len(one) == 1 else "eps differ" for law, one in verdicts.items()},
-        "points": str(runs[0][0].points),  # may be longer than integers of databases
-        "bound": runs[0][1].bound,
-        "least_share_within_bound": min(shares, default=None),
-        "longest": max(census.longest for census, _ in runs),
-        "has_reversor": reversor is not None,
-        "runs": [_census(census, found, report) for census, found in runs],
+        "points": str(runs[0].points),  # may be longer than integers of databases
+        "longest": max(census.longest for census in runs),
+        "runs": [_census(census, report) for census in runs],
     }
 
 
@@ -420,19 +400,14 @@ def _hypersurfaces(run: SingularityRun) -> list[Result]:
     ]
 
 
-def _census(census: Census, found: Comparison, lengths: bool) -> Result:
+def _census(census: Census, lengths: bool) -> Result:
     result: Result = {
         "eps": format_number(census.eps),
-        **fields(census, "looked_at", "lost", "falling", "transient", "open", "periodic", "cycles", "longest", "mean"),
-        "share_within_bound": found.share_within,
-        "distance": found.distance,
-        "critical_distance": found.critical,
-        "compatible": list(found.compatible),
-        "not_compatible": list(found.refused),
+        **fields(census, "looked_at", "indeterminate", "pre_indeterminate", "preperiodic", "open", "periodic"),
+        **fields(census, "cycles", "longest"),
     }
     if lengths:
         result["lengths"] = [list(pair) for pair in census.lengths.items()]
-        result["reasons"] = dict(found.reasons)
     return result
 
 

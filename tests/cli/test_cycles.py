@@ -1,7 +1,7 @@
 """kahanmaps cycles: the counts as text and JSON, several primes and eps, and wrong use."""
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.finite.cycles import cycle_census
+from kahanmaps.laboratory.cycles import cycle_census
 
 
 def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
@@ -9,10 +9,9 @@ def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
     assert outcome.status == 0
     census = cycle_census(load("weierstrass").system, "1/10", 31)
     assert outcome.out.count("# p = 31, eps = ") == 2
-    assert f"lost\t{census.lost}\nfalling\t{census.falling}\n" in outcome.out
-    assert f"periodic\t{census.periodic}\ncycles\t{census.cycles}, longest {census.longest}" in outcome.out
-    assert "reversing symmetry\t1,0;0,-1\n" in outcome.out
-    assert "\n# compatible in all 2 runs with: integrable bound\n" in outcome.out
+    counts = f"indeterminate\t{census.indeterminate}\npre-indeterminate\t{census.pre_indeterminate}\n"
+    assert f"{counts}preperiodic\t0\nperiodic\t{census.periodic}\n" in outcome.out
+    assert f"cycles\t{census.cycles}, longest {census.longest}\n" in outcome.out
 
 
 def test_samples(kahanmaps):
@@ -23,15 +22,22 @@ def test_samples(kahanmaps):
     assert found == kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
 
 
-def test_an_inline_system_and_a_reversor(kahanmaps):
-    inline = "cycles --vars x,y --rhs y --rhs '6*x^2 - 2' --prime 31 --eps 1/7"
-    assert kahanmaps(inline, "--reversor '1,0;0,-1'").out == kahanmaps(inline).out
+def test_no_law_refuses_an_integrable_map_that_exchanges_levels(kahanmaps):
+    first = "(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)"
+    outcome = kahanmaps(f"cycles --vars x,y --image '{first}; (x^2-y)/(x^2*y+1)' --prime 47")
+    assert "longest 114" in outcome.out
+    assert "compatible" not in outcome.out
 
 
-def test_a_prime_may_stand_behind_p_as_parameters_do(kahanmaps):
-    short = kahanmaps("cycles weierstrass -p 31 --json").json
-    long = kahanmaps("cycles weierstrass --prime 31 --json").json
-    assert short == long
-    both = kahanmaps("cycles euler_top -p a1=2 -p 11 --prime 13 --json").json
-    assert both["primes"] == [13, 11]
-    assert both["document"] == kahanmaps("cycles euler_top -p a1=2 --prime 13 --json").json["document"]
+def test_the_time_is_that_of_all_runs_and_what_was_stopped_says_so(kahanmaps):
+    outcome = kahanmaps("cycles paper_m3_irreducible --prime 31 --samples 5 --prime 11 --seconds 0.001")
+    assert outcome.status == 3
+    assert outcome.out.count("stopped by the clock") == 4
+    outcome = kahanmaps("cycles paper_m3_irreducible --prime 11 --seconds 0.001 --json")
+    assert [(run["stopped"], run["looked_at"]) for run in outcome.json["runs"]] == [(True, 0)] * 2
+
+
+def test_p_is_a_parameter_and_a_prime_is_told_how_to_be_typed(kahanmaps):
+    outcome = kahanmaps("cycles weierstrass -p 31")
+    assert outcome.status == 2
+    assert "found '31', expected NAME=VALUE (the prime of cycles is --prime 31)" in outcome.err

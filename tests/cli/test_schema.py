@@ -12,7 +12,6 @@ from kahanmaps.checks.table import CHECKS
 from kahanmaps.documents.structured_facts import GROWTHS, VERDICTS
 from kahanmaps.experiments.results.records import KEPT
 from kahanmaps.invariants.growth import OF_DEGREES, OF_HEIGHTS
-from kahanmaps.laboratory.finite.cycle_laws import LAWS
 from kahanmaps.maps.normal_form.periods import Kind
 from kahanmaps_cli.main import cli
 from kahanmaps_cli.schema_files import ALIASES, schema, schema_titles
@@ -98,8 +97,6 @@ def test_further_words_are_those_of_the_code():
     planes = schema("period")["properties"]["planes"]["items"]["properties"]
     assert planes["kind"]["enum"] == [kind.name.lower() for kind in Kind]
     assert schema("batch-run")["$defs"]["outcome"]["enum"] == [str(outcome) for outcome in KEPT]
-    runs = schema("cycles")["properties"]["runs"]["items"]["properties"]
-    assert runs["compatible"]["items"]["enum"] == list(LAWS)
     facts = schema("system-file")["$defs"]["catalog_section"]["properties"]
     assert facts["growth"]["enum"] == list(GROWTHS)
     assert facts["verdict"]["enum"] == list(VERDICTS)

@@ -1,0 +1,249 @@
+"""Cycles of a map on projective space over GF(p): how many there are of each length.
+
+All points of P^n(GF(p)) where they are few enough, else random ones. Every count is exact, for one prime and one eps.
+
+The lengths are compared with no bound. That of Hasse and Weil, p + 1 + 2 sqrt p, is one for a cycle on an irreducible
+curve of genus 1 that the map sends to itself. Levels of integrals may have several components, and the map may exchange
+levels, so integrable maps have longer cycles as well. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.written.plain import all_fields
+from kahanmaps.displayed import Printed
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+MAX_POINTS = 2_000_000  # of a whole space, up to dimension 6; half as many with each further dimension
+MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
+MAX_DIMENSION = 12  # the minors of a point are 2^(n + 1) arrays
+MAX_FACTORED = 6  # the dimension up to which the forms of the map are computed
+DEFAULT_SAMPLES, MAX_SAMPLES, DEFAULT_STEPS = 500, 100_000, 10_000
+DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3", "5", "4", "6")
+
+
+@dataclass(frozen=True)
+class Census(Printed):
+    """What becomes of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
+
+    `lengths` is the number of cycles by length if all points were looked at (`complete`), else the number of sampled
+    points that came back, by the step at which they did. A point is `indeterminate` where the map is not defined,
+    `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
+    it, and `open` if none of this was seen in `steps` steps (samples only). Where the clock `stopped` the work before
+    the images of all points were known, no point counts as looked at.
+    """
+
+    prime: int
+    eps: fmpq
+    dim: int
+    points: int
+    complete: bool = False
+    stopped: bool = False
+    looked_at: int = 0
+    indeterminate: int = 0
+    pre_indeterminate: int = 0
+    preperiodic: int = 0
+    open: int = 0
+    steps: int = 0
+    lengths: Mapping[int, int] = field(default_factory=dict)
+
+    @property
+    def periodic(self) -> int:
+        """The number of points, among those looked at, that lie on cycles."""
+        return sum(length * n if self.complete else n for length, n in self.lengths.items())
+
+    @property
+    def cycles(self) -> int | None:
+        """The number of cycles; None unless all points were looked at."""
+        return sum(self.lengths.values()) if self.complete else None
+
+    @property
+    def longest(self) -> int:
+        """The length of the longest cycle seen, 0 if there is none."""
+        return max(self.lengths, default=0)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return all_fields(self)
+
+    def rows(self) -> list[dict[str, int]]:
+        """A row for each length: the number of cycles, or of sampled points; for pandas.DataFrame and the like."""
+        return [{"length": length, "count": count} for length, count in self.lengths.items()]
+
+
+def cycle_census(
+    given: QuadraticSystem | BirationalMap,
+    eps: Any,
+    prime: int,
+    *,
+    samples: int | None = None,
+    steps: int = DEFAULT_STEPS,
+    seed: int = 0,
+    seconds: float | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Census:
+    """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
+
+    A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
+    looked at up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
+    points to follow (500 in larger spaces), for at most `steps` steps each. After `seconds` the work stops and says so.
+    Of a composition each map is applied in turn: a point is indeterminate where one of them is not defined. Above
+    dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
+    Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
+
+    >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
+    >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
+    (993, 3, 613, 377, 21)
+    """
+    exact_eps, map_ = rational(eps), as_map(given)
+    if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
+        raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
+    space = _ProjectiveMap(map_, exact_eps, prime, None if seconds is None else time.monotonic() + seconds)
+    census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
+    if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
+        return _of_all_points(space, census, progress)
+    random_seed = seed_for(seed, map_.subject, exact_eps, prime)
+    return _of_samples(space, census, samples or DEFAULT_SAMPLES, steps, random_seed, progress)
+
+
+def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[str], None]) -> Census:
+    import numpy as np
+
+    p, count = census.prime, census.points
+    # The code of a point is its coordinates as digits. As the last one that is not 0 is 1, codes are p^m ... 2 p^m - 1.
+    codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
+    places = p ** np.arange(census.dim + 1)
+    image = np.full(count + 1, count)  # `count` stands for no point
+    try:
+        for low in range(0, count, space.portion):
+            progress(f"p = {p}: the images of {low} of {count} points")
+            found = places @ space.images(codes[low : low + space.portion] // places[:, None] % p)
+            image[low : low + len(found)] = np.where(found > 0, np.searchsorted(codes, found), count)
+    except TimeoutError:
+        return replace(census, stopped=True)
+    last = image
+    for _ in range(count.bit_length()):  # doubles the number of steps, until all orbits are on their cycles
+        last = last[last]
+    cyclic = np.setdiff1d(last, [count])
+    lengths: Counter[int] = Counter()
+    following, is_seen = image.tolist(), bytearray(count)
+    for point in cyclic.tolist():
+        length = 0
+        while not is_seen[point]:
+            is_seen[point] = 1
+            point = following[point]
+            length += 1
+        lengths[length] += length > 0
+    lost, ended = (int((points[:count] == count).sum()) for points in (image, last))
+    kinds = dict[str, Any](indeterminate=lost, pre_indeterminate=ended - lost, preperiodic=count - ended - len(cyclic))
+    return replace(census, complete=True, looked_at=count, lengths=dict(sorted((+lengths).items())), **kinds)
+
+
+def _of_samples(
+    space: _ProjectiveMap, census: Census, samples: int, steps: int, seed: int, progress: Callable[[str], None]
+) -> Census:
+    import numpy as np
+
+    drawn = np.random.default_rng(seed).integers(0, census.prime, (census.dim + 1, 2 * samples + 20))
+    start = points = space.normalized(drawn[:, drawn.any(axis=0)][:, :samples])
+    looked_at, lengths, lost, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
+    try:
+        while done < steps and start.shape[1]:
+            progress(f"p = {census.prime}: step {done} of at most {steps}")
+            portions = range(0, points.shape[1], space.portion)
+            points = np.hstack([space.images(points[:, low : low + space.portion]) for low in portions])
+            is_lost, is_back = ~points.any(axis=0), (points == start).all(axis=0)
+            lost[done > 0] += int(is_lost.sum())
+            done += 1
+            if is_back.any():
+                lengths[done] = int(is_back.sum())
+            goes_on = ~(is_lost | is_back)
+            points, start = points[:, goes_on], start[:, goes_on]
+    except TimeoutError:
+        stopped = True
+    kinds = dict[str, Any](indeterminate=lost[0], pre_indeterminate=lost[1], open=start.shape[1])
+    return replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths, **kinds)
+
+
+class _ProjectiveMap:
+    """A map at one eps on P^n over GF(p); points are columns of n + 1 residues, the last that is not 0 being 1."""
+
+    def __init__(self, map_: BirationalMap, eps: fmpq, prime: int, deadline: float | None) -> None:
+        if not 2 < prime < MAX_PRIME or map_.dim > MAX_DIMENSION:  # modulo 2 every Kahan map is the identity
+            expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
+            raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
+        self.prime, self.deadline = prime, deadline
+        self.portion = 1 << max(8, 18 - map_.dim)  # points at a time: their minors should stay in the cache
+        # Of each map of a composition the forms of its image, or a matrix of forms whose minors they are, as terms.
+        self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
+        for factor in map_.at(eps, GF(prime)).factors:
+            matrix, by_minors = factor.equation.polynomials(), False
+            if factor.equation.explicit is not None:
+                matrix = factor.equation.explicit.polynomials()
+            elif map_.dim <= MAX_FACTORED and not (reduced := homogeneous_map(factor)).factor.is_constant():
+                matrix = [reduced.forms]
+            else:
+                by_minors = True
+            terms = [[[(tuple(map(int, m)), int(c)) for m, c in form.terms()] for form in row] for row in matrix]
+            self.maps.append((by_minors, terms))
+
+    def images(self, X: Any) -> Any:
+        """The images of at most `portion` points; columns of zeros where there is none. Raises TimeoutError."""
+        if self.deadline is not None and time.monotonic() > self.deadline:
+            raise TimeoutError
+        p = self.prime
+        for by_minors, matrix in self.maps:
+            powers: dict[tuple[int, ...], Any] = {}
+            for exponents in {exponents for row in matrix for form in row for exponents, _ in form}:
+                monomial = X[0] ** 0
+                for coordinate, exponent in zip(X, exponents, strict=True):
+                    for _ in range(exponent):
+                        monomial = monomial * coordinate % p
+                powers[exponents] = monomial
+            rows = [[sum(c * powers[m] % p for m, c in f) % p if f else None for f in row] for row in matrix]
+            image = kernel_minors(rows, lambda a, b: a * b % p) if by_minors else rows[0]
+            values = 0 * X
+            for value, form in zip(values, image, strict=True):
+                value += 0 if form is None else form % p
+            X = self.normalized(values * X.any(axis=0))
+        return X
+
+    def normalized(self, X: Any) -> Any:
+        """The columns divided by their last coordinate that is not zero; columns of zeros stay."""
+        from kahanmaps.maps.residues.relations import inverses
+
+        last = X[0]
+        for row in X[1:]:
+            last = row + last * (row == 0)
+        return X * inverses(last, self.prime) % self.prime
+
+
+def default_eps(prime: int) -> list[fmpq]:
+    """The first two of a fixed list of eps that are not 0 and not equal up to sign (the inverse map) modulo the prime.
+
+    For p > 5 those with eps^4 = 1 are left out, at which maps may be periodic that are not so for other eps.
+
+    >>> default_eps(101)
+    [1/7, 2/11]
+    """
+    chosen: dict[int, fmpq] = {}
+    for eps in map(rational, DEFAULT_EPS):
+        if eps.p % prime and eps.q % prime:
+            residue = int(GF(prime).convert(eps))
+            if prime <= 5 or pow(residue, 4, prime) != 1:
+                chosen.setdefault(min(residue, prime - residue), eps)
+    return list(chosen.values())[:2]

@@ -1,1 +1,0 @@
-"""Maps over finite fields: the lengths of their cycles."""
