@@ -1,4 +1,4 @@
-"""The program `kahanmaps`: Ctrl-C is told in a word from the first moment on to the last.
+"""The program `kahanmaps`: Ctrl-C and SIGTERM end it with 130 and a word, from the first moment on to the last.
 
 Python itself prints a traceback where it is interrupted before it comes here. What is imported above `main` is there by
 then, or costs nothing: the handler is in place before anything is loaded.
@@ -20,9 +20,10 @@ def _end(signum: int, frame: object) -> None:
 
 def main() -> int:
     """Run the command line and return its exit status."""
-    is_ours = _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler  # not ignored, as below nohup
-    if is_ours:
-        _signal.signal(_signal.SIGINT, _end)
+    usual = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
+    ours = [number for number, action in usual.items() if _signal.getsignal(number) == action]  # none that is ignored
+    for number in ours:
+        _signal.signal(number, _end)
     import atexit
 
     from kahanmaps_cli.limited_memory import look_for_room
@@ -30,18 +31,21 @@ def main() -> int:
     from kahanmaps_cli.signals import handle
 
     look_for_room()
-    if not is_ours:
-        return run()
-    # Python takes handlers away at its end, and the status is known by then.
-    atexit.register(_signal.signal, _signal.SIGINT, _signal.SIG_IGN)
+    for number in ours:  # Python takes handlers away at its end, and the status is known by then
+        atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:
-        handle(_signal.SIGINT, _signal.default_int_handler)
-        return run()
+        for number in ours:
+            handle(number, _signal.default_int_handler)
+        status = run()
+        if status == _INTERRUPTED:
+            os._exit(status)  # all has been ended and flushed; to take large libraries apart takes a second
+        return status
     except KeyboardInterrupt:  # just before `run` looks for it, or just after
         _end(_signal.SIGINT, None)
         raise
     finally:
-        _signal.signal(_signal.SIGINT, _end)
+        for number in ours:
+            _signal.signal(number, _end)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The entry point: the lazy group of commands, and the one place where errors become messages and exit statuses.
 
 Exit statuses: 0 the claim holds or the work is done; 1 refuted, and nothing else; 2 usage error or bad input; 3
-undecided or stopped early; 70 an internal error; 130 interrupted.
+undecided or stopped early, or the output was lost; 70 an internal error; 130 interrupted by Ctrl-C or SIGTERM.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
 from kahanmaps_cli.screen.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.screen.progress import as_typed, say
-from kahanmaps_cli.screen.streams import have_standard_streams, leave_nothing_to_flush
+from kahanmaps_cli.screen.streams import have_standard_streams, leave_nothing_to_flush, output_was_lost
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -159,7 +159,7 @@ def cli(ctx: click.Context, show_version: bool) -> None:
     first: kahanmaps COMMAND --help.
 
     Exit status: 0 done, or the claim holds, 1 refuted, 2 usage error, 3 undecided or stopped early, 70 an internal
-    error, 130 interrupted.
+    error, 130 interrupted by Ctrl-C or SIGTERM.
     """
     if show_version:
         from kahanmaps.version import __version__
@@ -185,7 +185,11 @@ def _run(argv: Sequence[str] | None) -> int:
             raise click.UsageError("found a zero byte among the arguments: no file and no name can have it")
         result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
         sys.stdout.flush()
-        return result if isinstance(result, int) else HOLDS
+        status = result if isinstance(result, int) else HOLDS
+        if status == HOLDS and output_was_lost():
+            say("Error: standard output is closed: what was printed is lost; name a file with >, or -o")
+            return UNDECIDED
+        return status
     except click.exceptions.Exit as stop:
         return stop.exit_code
     except click.ClickException as error:

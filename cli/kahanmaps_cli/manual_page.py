@@ -24,7 +24,7 @@ _STATUS = {
     "0": "The work is done, or the claim holds (proved or supported).",
     "1": "Refuted, and nothing else.",
     "2": "Usage error or bad input: the message says what was found, what was expected, and what to do.",
-    "3": "Undecided, or stopped early: a singular point, a digit budget, the clock.",
+    "3": "Undecided, or stopped early: a singular point, a digit budget, the clock; or standard output is closed.",
     "70": "An internal error.",
     "130": "Interrupted by Ctrl-C or SIGTERM.",
 }

@@ -7,6 +7,8 @@ files need: text, integers, lists, tables, lists of tables in them.
 from __future__ import annotations
 
 import json
+import os
+import stat
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,6 +29,11 @@ class TomlKind(NamedTuple):
     def read(self, path: str | Path) -> bytes:
         """The bytes of a file, one more at most than it may have. Raises InputError where it cannot be read."""
         try:
+            # Nobody may ever write to a pipe, and a device need not end. But /dev/fd/63 is the shell's <(...).
+            mode = os.stat(path).st_mode
+            is_of_shell = stat.S_ISFIFO(mode) and str(path).startswith(("/dev/fd/", "/dev/stdin"))
+            if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
+                raise InputError(f"cannot read the {self.name} {path}: it is a pipe or a device, expected a file")
             with open(path, "rb") as stream:
                 return stream.read(self.most + 1)
         except OSError as error:

@@ -37,12 +37,14 @@ class Analysis(Findings, Printed):
     """What `analyze` found, and statements about it."""
 
     parts: tuple[Part, ...] = ANALYSES
+    interrupted: bool = False
 
-    def stop(self, reason: str) -> None:
-        """No pending part is gone through any more."""
+    def interrupt(self) -> None:
+        """Leave out the parts that are pending."""
         named = {part.name for part in self.parts if not part.adds}
-        self.skipped += [f"{part}: {reason}" for part in self.pending if part in named]
+        self.skipped += [f"{part}: interrupted" for part in self.pending if part in named]
         self.pending.clear()
+        self.interrupted = True
 
     @property
     def conclusion(self) -> Conclusion:
@@ -90,7 +92,7 @@ class Analysis(Findings, Printed):
             **attributes(self, "symbols"),
             **eps_record(self.eps, self.file.map),
             "arithmetic": "exact formulas, from residues modulo primes",
-            **attributes(self, "seed", "seconds", "dim"),
+            **attributes(self, "seed", "seconds", "dim", "interrupted"),
             "verdict": {
                 "integrability": final.kind,
                 "integrals": final.integrals if self.integrals_were_counted else None,

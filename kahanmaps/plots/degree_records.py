@@ -63,7 +63,7 @@ def _patterns(record: Any) -> Patterns | None:
     return Patterns(
         tuple(int(length) for length in record["lengths"]),
         None if searched is None else int(searched),
-        bool(record["some_confined"]),
+        record["some_confined"],
         str(record["running"]),
         series,
     )

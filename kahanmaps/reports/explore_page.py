@@ -57,13 +57,14 @@ def explore_page(found: Analysis, title: str, recipe: Recipe) -> str:
     held = json.dumps(data, sort_keys=True).replace("<", "\\u003c")
     script = (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
     inside += f"\n<style>{_LAYOUT}</style>\n"
-    inside += f'<script type="application/json" id="explore-data">{held}</script>\n<script>{script}</script>'
+    inside += f'<script type="application/json" id="explore-data">{held}</script>'
     sections = [
         Section("explore", "An orbit", inside),
         Section("values", "Along the orbit", _functions(data)),
         Section("system", "The system", system_html(file)),
     ]
-    return page(title, text(", ".join(filter(None, words))), sections, Pictures(False), recipe, found.seed)
+    lead = text(", ".join(filter(None, words)))
+    return page(title, lead, sections, Pictures(False), recipe, found.seed, script=script)
 
 
 def explore_data(found: Analysis) -> dict[str, Any]:

@@ -6,8 +6,10 @@ the same bytes.
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 
 from kahanmaps.display import markup
 from kahanmaps.display.checks import Room
@@ -30,12 +32,23 @@ class Section:
 
 
 def page(
-    title: str, lead: str, sections: Sequence[Section], pictures: Pictures, recipe: Recipe, seed: int | None = None
+    title: str,
+    lead: str,
+    sections: Sequence[Section],
+    pictures: Pictures,
+    recipe: Recipe,
+    seed: int | None = None,
+    script: str = "",
 ) -> str:
     """The whole page. `title` is text, `lead` is HTML; sections that are empty are left out.
 
-    `recipe` and `seed` (None where nothing is drawn at random) say how it was made.
+    `recipe` and `seed` (None where nothing is drawn at random) say how it was made. The page's policy lets browsers load
+    nothing, and run no script but `script`, which it names by its hash.
     """
+    digest = b64encode(sha256(script.encode()).digest()).decode()
+    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; font-src data:; base-uri 'none'"
+    policy += f"; form-action 'none'; script-src '{f'sha256-{digest}' if script else 'none'}'"
+    program = f"<script>{script}</script>\n" if script else ""
     note = Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else "")
     present = [section for section in (*sections, note, _remake(recipe, seed)) if section.html]
     links = "".join(f'<li><a href="#{one.id}">{markup.escape(one.title)}</a></li>' for one in present)
@@ -50,6 +63,7 @@ def page(
 <html lang="en">
 <head>
 <meta charset="utf-8"/>
+<meta http-equiv="Content-Security-Policy" content="{policy}"/>
 <meta name="viewport" content="width=device-width, initial-scale=1"/>
 <meta name="generator" content="kahanmaps {recipe.version}"/>
 <link rel="icon" href="data:,"/>
@@ -65,7 +79,7 @@ def page(
 <main>
 {body}
 </main>
-</body>
+{program}</body>
 </html>
 """
 

@@ -62,6 +62,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     assert {line["status"] for line in statements} <= STATUSES
     assert {"section": "growth", "status": "explained", "text": "d_n = 2*n^2 + 1"} in statements
     assert [run["verdict"] for run in found.pop("singularities")] == ["confined", "confined"]
+    assert found.pop("interrupted") is False
     assert found == {
         "command": "analyze",
         "arithmetic": "exact formulas, from residues modulo primes",
@@ -164,7 +165,7 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
     assert skipped[-1] == "commuting systems: interrupted"
     assert (verdict[0] == "undecided") is (part == "family.constant_structures")
     as_json = kahanmaps("analyze weierstrass --json")
-    assert (as_json.status, as_json.json["skipped"]) == (130, skipped)
+    assert (as_json.status, as_json.json["skipped"], as_json.json["interrupted"]) == (130, skipped, True)
 
 
 def test_an_interrupt_before_anything_was_begun_prints_nothing(kahanmaps, monkeypatch):

@@ -7,6 +7,7 @@ a sentence and an exit status, never a traceback.
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -153,6 +154,62 @@ def test_a_reader_that_has_seen_enough_changes_no_verdict(tmp_path):
     assert outcome.err == ""
 
 
+PROGRAM = [sys.executable, "-m", "kahanmaps_cli"]
+READY = "import os, sys; from kahanmaps_cli import __main__; os.write(2, b'ready\\n'); sys.exit(__main__.main())"
+SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+
+
+@SIGNALS
+@pytest.mark.parametrize(
+    "words",
+    [
+        "plot portrait lotka_volterra --eps 1/20 --steps 200000 -o FOLDER/o.svg",
+        "report paper_m3 -o FOLDER/o.html",
+        *(
+            pytest.param(words, marks=pytest.mark.slow)
+            for words in [
+                "cycles paper_m3_irreducible --prime 11",
+                "find-integrals paper_m3",
+                "find-density henon_heiles",
+                "degrees zhukovski_volterra_2 --terms 100 --seconds 60",
+                "singularities paper_m2 --steps 10000",
+                "scan lotka_volterra --over a,b,c,d",
+                "heights henon_heiles --seconds 60 --max-digits 1000000",
+                "lyapunov lorenz --start 1,2,3 --eps 1/400 --steps 100000000",
+                "verify --m 4",
+            ]
+        ),
+    ],
+    ids=lambda words: words.split()[0],
+)
+def test_a_signal_at_any_moment_ends_a_command_with_130_and_a_word(number, words, tmp_path):
+    line = [sys.executable, "-c", READY, *words.replace("FOLDER", str(tmp_path)).split()]
+    for delay in (0.2, 1.0, 3.0):
+        with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            try:
+                assert process.stderr.readline() == "ready\n"  # before it Python itself tells of Ctrl-C
+                time.sleep(delay)
+                process.send_signal(number)
+                _, err = process.communicate(timeout=30)  # much less on a quiet machine
+            finally:
+                process.kill()
+        assert (process.returncode, "interrupted" in err, "Traceback" in err) == (130, True, False)
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_output_to_a_closed_stream_is_an_error():
+    done = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *PROGRAM, "version"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (3, "")
+    assert "standard output is closed" in done.stderr
+
+
+def test_a_command_that_prints_nothing_needs_no_standard_output(tmp_path):
+    line = [*PROGRAM, *f"plot portrait harmonic --eps 1/20 --steps 9 -q -o {tmp_path}/o.svg".split()]
+    done = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *line], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "o.svg").exists()
+
+
 IN_FLINT = """
 import os
 from flint import fmpz
@@ -163,7 +220,7 @@ with interruptible(lambda: os.write(1, b"asked to end\\n")):  # print may be in 
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+@SIGNALS
 def test_signals_in_a_row_end_a_call_of_flint_that_holds_them_back(number):
     with subprocess.Popen([sys.executable, "-c", IN_FLINT], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"

@@ -130,19 +130,13 @@ def test_a_density_counts_every_point(kahanmaps, drawn):
     assert drawn[0][0].points == drawn[0][0].counts.sum() + drawn[0][0].outside == 802
 
 
-def test_an_interrupted_density_is_a_picture_of_what_was_counted(kahanmaps, drawn, monkeypatch, tmp_path):
-    def press(self, sentence):
-        monkeypatch.setattr(Progress, "__call__", lambda self, sentence: None)
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(Progress, "__call__", press)
-    outcome = kahanmaps(
-        "plot portrait harmonic --eps 1/20 --random 100 --steps 5000 --density -o", tmp_path / "part.png"
-    )
-    assert outcome.status == 130
-    assert "interrupted after step" in outcome.err
-    assert 0 < drawn[0][0].points < 100 * 5001
-    assert (tmp_path / "part.png").exists()
+def test_ctrl_c_ends_a_portrait_without_a_picture(kahanmaps, drawn, monkeypatch, tmp_path):
+    """Also where the orbits are complete already, as those of one portion are."""
+    monkeypatch.setattr(Progress, "__call__", lambda self, sentence: signal.raise_signal(signal.SIGINT))
+    outcome = kahanmaps(LV, "-o", tmp_path / "part.svg")
+    assert (outcome.status, outcome.err.split()) == (130, ["interrupted"])
+    assert not drawn
+    assert not (tmp_path / "part.svg").exists()
 
 
 @pytest.mark.parametrize(

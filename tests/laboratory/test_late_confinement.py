@@ -389,15 +389,15 @@ def hypersurface(status, settled_at, multiplicity=1, followed=100, note=""):
         ([("not contracted", None), ("undecided", None, 0)], Patterns((), None, False)),
         (
             [("confined", 3), ("undecided", None)],
-            Patterns((), None, False, "what becomes of x - 1 = 0 is undecided: its series ended"),
+            Patterns((), None, None, "what becomes of x - 1 = 0 is undecided: its series ended"),
         ),
         (
             [("undecided", 3, 2, 9, "no luck")],
-            Patterns((), None, False, "what becomes of x - 1 = 0 is undecided: no luck"),
+            Patterns((), None, None, "what becomes of x - 1 = 0 is undecided: no luck"),
         ),
         (
             [("not confined", None, 1, 90)],
-            Patterns((), None, False, "the pattern of x - 1 = 0 is still running after 90 steps (--steps)"),
+            Patterns((), None, None, "the pattern of x - 1 = 0 is still running after 90 steps (--steps)"),
         ),
     ],
 )

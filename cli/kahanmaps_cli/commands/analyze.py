@@ -55,7 +55,6 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     symbols, eps = symbols_and_eps(options)
     file = opt.load_system(system, options)
     report = _Report(as_json or markdown)
-    is_interrupted = False
     with Progress(quiet) as progress:
         report.progress = progress
         try:
@@ -71,8 +70,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
         except KeyboardInterrupt:
             if report.found is None:
                 raise
-            is_interrupted = True
-            report.found.stop("interrupted")
+            report.found.interrupt()
     found = report.found
     assert found is not None
     if as_json:
@@ -81,7 +79,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
         _print_markdown(found)
     else:
         report.end()
-    if is_interrupted:
+    if found.interrupted:
         say("interrupted: the verdict rests on what was found so far")
         return INTERRUPTED
     return 3 if found.conclusion.kind == "undecided" else 0

@@ -95,7 +95,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     how many points lie outside, and which orbits ended early. Colours go from dark
     to light with the value; the widest orbits are drawn first.
 
-    Ctrl-C draws what has been computed so far.
+    Ctrl-C ends it without a picture.
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
@@ -104,7 +104,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     orbits = _stored(system, options) if options["stored"] else _walked(system, options)
     figure = (_density if options["density"] else _portrait)(orbits, options, progress)
     talk = () if orbits.walked is None else (*orbits.told(), *orbits.notes)
-    return Drawn(figure, orbits.file, talk, 130 if orbits.interrupted else 3 if orbits.ended else 0)
+    return Drawn(figure, orbits.file, talk, 3 if orbits.ended else 0)
 
 
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from kahanmaps.errors import counted
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
     from kahanmaps.maps.orbits.stored import Stored
@@ -42,7 +41,6 @@ class Orbits:
     chosen: bool = False
     notes: list[str] = field(default_factory=list)
     ended: dict[str, int] = field(default_factory=dict)
-    interrupted: bool = False
     walked: int | None = None
 
     @classmethod
@@ -91,12 +89,6 @@ class Orbits:
             chosen=chosen,
         )
 
-    def interrupt(self) -> None:
-        """Ask to end after the portion in hand."""
-        self.interrupted = True
-        if self.ensemble is not None:
-            self.ensemble.interrupt()
-
     @property
     def counts_records(self) -> bool:
         """Whether the numbers of the steps are not known, only their order."""
@@ -128,15 +120,8 @@ class Orbits:
             lib.require_points(*points.shape)
             found = lib.Trajectories(self.variables, np.array(points, dtype=np.float64), self.stored.steps, self.ended)
         else:
-
-            def told(step: int) -> None:
-                progress(f"step {step} of {self.steps}")
-                if self.interrupted:  # pressed before the first portion, an ensemble forgets it
-                    self.ensemble.interrupt()
-
-            with interruptible(self.interrupt):
-                found = lib.walked(self.ensemble, self.steps, told)
-            self.ended, self.interrupted = found.ended, found.interrupted
+            found = lib.walked(self.ensemble, self.steps, lambda step: progress(f"step {step} of {self.steps}"))
+            self.ended = found.ended
         self._points = found.points
         self.walked = len(found.points) - 1
         return found
@@ -207,21 +192,13 @@ class Orbits:
             )
         else:
             portions, total = self.ensemble.records(self.steps, 1), self.ensemble.n * (self.steps + 1)
-        with interruptible(self.interrupt):
-            found = lib.density_of(self._while_wanted(portions), axes, window, shape, told)
+        found = lib.density_of(portions, axes, window, shape, told)
         if self.stored is not None:
             self.walked = len(self.stored.points) - 1
         else:
             self.ended = lib.ended_early(self.ensemble)
             self.walked = self.ensemble.step
-            self.interrupted = self.walked < self.steps
         return found
-
-    def _while_wanted(self, portions: Iterator[lib.FloatArray]) -> Iterator[lib.FloatArray]:
-        for portion in portions:
-            yield portion
-            if self.interrupted:
-                return
 
     def flow(
         self, axes: Sequence[lib.PointFunction | str], window: lib.Window, options: Mapping[str, Any]
@@ -268,5 +245,3 @@ class Orbits:
             yield f"{self.name}: {orbits}{chosen}, {counted(self.walked or 0, 'step')}{backward}{eps}"
         for reason, count in self.ended.items():
             yield f"{count} of {orbits} ended early: {reason}"
-        if self.interrupted:
-            yield f"interrupted after step {self.walked}"

@@ -24,6 +24,16 @@ class _Pipe(io.FileIO):
         return memoryview(data).nbytes
 
 
+class _Nowhere(io.FileIO):
+    """The null device in place of a closed standard output: what is written is lost, and this is noted."""
+
+    has_lost = False
+
+    def write(self, data: Any) -> int:
+        self.has_lost = True
+        return super().write(data)
+
+
 def have_standard_streams() -> None:
     """Have all three of them, and the status of a command not depend on who reads what it prints.
 
@@ -32,7 +42,9 @@ def have_standard_streams() -> None:
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 (open for as long as the process lives)
+            raw = (_Nowhere if name == "stdout" else io.FileIO)(os.devnull, mode)  # open as long as the process lives
+            buffer = io.BufferedReader(raw) if mode == "r" else io.BufferedWriter(raw)
+            setattr(sys, name, io.TextIOWrapper(buffer, encoding="utf-8"))
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -46,6 +58,12 @@ def is_read() -> bool:
     """Whether somebody may still read what is printed; it is known when a buffer was full, or has been flushed."""
     pipe = _pipe_below(sys.stdout)
     return pipe is None or pipe.is_read
+
+
+def output_was_lost() -> bool:
+    """Whether something was printed though standard output was closed when the program began; once it is flushed."""
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return isinstance(raw, _Nowhere) and raw.has_lost
 
 
 def leave_nothing_to_flush() -> None:

@@ -58,7 +58,7 @@ class Beside:
             fcntl(self._theirs.fileno(), F_SETPIPE_SZ, _ANSWERS)
         parent, held = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, ())
         try:
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
             with suppress(OSError):  # no memory for one more process, or too many
                 self._process = os.fork()
             if self._process == 0:
@@ -104,7 +104,7 @@ class Beside:
                 os.waitpid(self._process, 0)
 
     def _work(self, parent: int) -> None:
-        """Do parts in this process, which is the copy. Ctrl-C, still held back, is for the parent."""
+        """Do parts in this process, which is the copy. Signals, still held back, are for the parent."""
         end_with_parent(parent)
         self.answers.close()
         self._run.progress = lambda _: None

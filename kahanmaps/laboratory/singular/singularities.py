@@ -281,8 +281,8 @@ class Patterns:
     Degrees drop below powers of the first only where the images of contracted hypersurfaces meet points without a
     value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
     different numbers of steps after which patterns had settled, `searched` is the number of steps those were followed
-    for that are not confined (None if all are), `some_confined` tells whether others are. `running` is empty, or says
-    why the patterns are not known to the end. `series` are the coefficients above and below in the generating function
+    for that are not confined (None if all are), `some_confined` tells whether others are (None: not known). `running` is
+    empty, or says why the patterns are not known to the end. `series` are the coefficients above and below in the generating function
     of the degrees that follow from the patterns, empty where these do not tell it, and `contracted` are the
     hypersurfaces `at` one of the eps that were tried. Steps are those of the map, but for what is told of the
     hypersurfaces of a `word` of maps that is followed map by map.
@@ -290,7 +290,7 @@ class Patterns:
 
     lengths: tuple[int, ...]
     searched: int | None
-    some_confined: bool
+    some_confined: bool | None
     running: str = ""
     series: tuple[tuple[int, ...], ...] = ()
     contracted: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
@@ -455,7 +455,7 @@ def _refused(eps: fmpq, is_dominant: bool, stopped: bool) -> Patterns | None:
 
 
 def _unknown(reason: str) -> Patterns:
-    return Patterns((), None, False, reason)
+    return Patterns((), None, None, reason)
 
 
 def _patterns(

@@ -29,14 +29,13 @@ _LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
 class Trajectories:
     """Orbits side by side: `points` (records, orbits, dim), NaN where an orbit has ended; `steps` (records,).
 
-    `ended` says how many orbits ended early and why, in words; `interrupted` whether somebody stopped the work.
+    `ended` says how many orbits ended early and why, in words.
     """
 
     variables: tuple[str, ...]
     points: FloatArray
     steps: NDArray[Any]
     ended: dict[str, int] = field(default_factory=dict)
-    interrupted: bool = False
 
     @property
     def orbits(self) -> int:
@@ -75,7 +74,6 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
         points,
         np.arange(len(points)),
         ended_early(ensemble),
-        interrupted=ensemble.step < steps,
     )
 
 
