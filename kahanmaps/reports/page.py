@@ -42,8 +42,8 @@ def page(
 ) -> str:
     """The whole page. `title` is text, `lead` is HTML; sections that are empty are left out.
 
-    `recipe` and `seed` (None where nothing is drawn at random) say how it was made. The page's policy lets browsers load
-    nothing, and run no script but `script`, which it names by its hash.
+    `recipe` and `seed` (None where nothing is drawn at random) say how it was made. Its policy lets browsers load
+    nothing and run no script but `script`, which it names by its hash.
     """
     digest = b64encode(sha256(script.encode()).digest()).decode()
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; font-src data:; base-uri 'none'"

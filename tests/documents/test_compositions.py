@@ -1,6 +1,7 @@
 """Maps of other files one after the other: read, written out whole, and refused with all that is wrong."""
 
 import json
+import os
 
 import pytest
 from flint import fmpq
@@ -36,6 +37,18 @@ def test_a_word_in_files_catalogue_and_tables_is_what_its_letters_do(tmp_path):
     assert file.variables == ("x", "y")
     assert file.map.has_eps
     assert not file.map.time_steps
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_part_that_is_no_regular_file_is_refused_and_not_waited_for(tmp_path, kind):
+    name = "/dev/zero"
+    if kind == "pipe":
+        name = "pipe.toml"
+        os.mkfifo(tmp_path / name)  # nobody ever writes to it
+    with pytest.raises(InputError, match="it is a pipe or a device, expected a file"):
+        read_system(written(tmp_path, f'{{ file = "{name}" }}'))
+    with pytest.raises(InputError, match="it is a pipe or a device, expected a file"):
+        read_system(tmp_path / name)
 
 
 def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):

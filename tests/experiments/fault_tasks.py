@@ -151,6 +151,11 @@ def _not_loaded() -> dict[str, Any]:
     raise ImportError("numbers.so: failed to map segment from shared object")
 
 
+def _openblas() -> dict[str, Any]:
+    print("OpenBLAS error: Memory allocation still failed after 10 retries, giving up.", file=sys.stderr, flush=True)
+    os._exit(1)
+
+
 def _starter() -> dict[str, Any]:
     return {"pid": subprocess.Popen(["sleep", "60"]).pid}
 
@@ -176,4 +181,5 @@ FAULTS = {
     19: _verdict_of_no_text,
     20: _starter,
     21: _not_loaded,
+    22: _openblas,
 }

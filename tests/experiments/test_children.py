@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("fault_tasks")
 HERE = Path(__file__).parent
 KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
 INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE = range(8, 14)
-NOT_LOADED = 21
+NOT_LOADED, OPENBLAS = 21, 22
 DEAF, TWINS, _, READER, NOT_PLAIN, VERDICT_OF_NO_TEXT, STARTER = range(14, 21)
 
 
@@ -52,7 +52,7 @@ def among_others(orders: list[int]) -> dict[int, Record]:
 @pytest.fixture(scope="module")
 def faulty(fault_tasks) -> dict[int, Record]:
     """Every fault but that of a child that hangs."""
-    return among_others([order for order in range(1, 22) if order not in (HANG, 16)])
+    return among_others([order for order in range(1, 23) if order not in (HANG, 16)])
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +72,7 @@ def few(fault_tasks) -> dict[int, Record]:
         (FLINT_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
         (GMP_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
         (NOT_LOADED, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (OPENBLAS, Outcome.OUT_OF_MEMORY, "out of memory"),
         (INPUT_ERROR, Outcome.FAILED, "found nothing, expected something"),
         (BUG, Outcome.FAILED, "ZeroDivisionError"),
         (NOT_A_NUMBER, Outcome.FAILED, "the result cannot be kept"),

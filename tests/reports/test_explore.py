@@ -1,6 +1,9 @@
 """The page with sliders: its orbits are those of the library, what it says is what analyze found."""
 
+import base64
+import hashlib
 import json
+import re
 import shutil
 import subprocess
 from functools import cache
@@ -87,6 +90,9 @@ def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
     assert analysis.conclusion.sentence in page.text
     assert [one for one in page.fetched if not one.startswith(("#", "data:"))] == []
     assert page.tags.count("script") == 2, "data and program; names of users do not begin one"
+    program = re.search("<script>(.*?)</script>", page.html, re.DOTALL)[1]
+    digest = base64.b64encode(hashlib.sha256(program.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'\"/>" in page.html, "the policy of the page has this program alone"
     assert len(page.ids) == len(set(page.ids))
     assert ("explore-eps" in page.ids) == FILES[name].map.has_eps
     assert page.ids.count(f"explore-x{FILES[name].dim - 1}") == 1

@@ -1,5 +1,6 @@
 """Pages: what stands in them, that they fetch nothing, that they are the same every time, and hostile names."""
 
+import re
 import sys
 
 import pytest
@@ -113,6 +114,12 @@ def test_a_system_with_an_algebraic_parameter_is_drawn_around_its_fixed_points()
     assert "outside" not in html
     which = portrait_figure(km.System(field, a="root of t^2 - 2"), None, Pictures())
     assert "machine numbers: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
+
+
+def test_browsers_are_told_to_run_no_script_and_to_load_nothing(drawn):
+    policy = re.search('<meta http-equiv="Content-Security-Policy" content="([^"]*)"/>', drawn)[1]
+    assert policy.startswith("default-src 'none'; ")
+    assert policy.endswith("; script-src 'none'")
 
 
 def test_names_and_titles_are_text(volterra):

@@ -40,7 +40,7 @@ _ONLY_FOR = {
 @click.option("--value", "values", multiple=True, metavar="NAME", help="With --db: only this number, with a picture.")
 @opt.eps_options
 @opt.symbolic_option
-@opt.seconds_option(None, "Time for the analysis (default: 16 to 150 by dimension).")
+@opt.seconds_option(None, "Time for the analysis (default: 16 to 150 by dimension); pictures take seconds more.")
 @opt.seed_option
 @draw_options
 @click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")

@@ -35,7 +35,7 @@ _scale_option = click.option(
     opt.inline_options,
     click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
     opt.eps_options,
-    opt.seconds_option(10.0, "Stop each system after about so many."),
+    opt.seconds_option(10.0, "Stop each system after about so many; the picture takes seconds more."),
     click.option(
         "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
     ),

@@ -60,14 +60,20 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Sca
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
         raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
     file = opt.load_system(system, options)
-    interrupted = Event()
+    has_begun, interrupted = Event(), Event()
 
     def told(sentence: str) -> None:
+        has_begun.set()
         if interrupted.is_set():
             raise lib.TimeOver
         progress(sentence)
 
-    with Progress(quiet) as progress, interruptible(interrupted.set):
+    def interrupt() -> None:
+        if not has_begun.is_set():  # libraries and loops are loaded for seconds, and there is nothing to be kept
+            raise KeyboardInterrupt
+        interrupted.set()
+
+    with Progress(quiet) as progress, interruptible(interrupt):
         return lib.scan(
             file,
             names,

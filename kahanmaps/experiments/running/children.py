@@ -33,8 +33,11 @@ TRIES = 5
 GROUP_SECONDS = 5.0  # of work for one child: starting it costs about a fifth of a second
 _STDERR_KEPT = 2000
 _STARTS = 20  # children that end before they are ready, one after the other: then there is no use in more
-# Words with which Python, FLINT and GMP end where there is no memory.
-_NO_MEMORY = ("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc")
+# Words with which Python, FLINT, GMP and OpenBLAS end where there is no memory.
+_NO_MEMORY = (
+    *("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc", "not enough memory"),
+    *("memory allocation", "memory alloc failed", "malloc failed", "too many memory regions"),
+)
 
 # A task's own are the signals that the processor or a limit of its own raises: its code, or a library that it called,
 # has died. Any other one was sent from outside: by a cancelled job, a service that stops, a shutdown. SIGKILL may also

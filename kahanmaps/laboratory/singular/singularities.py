@@ -281,10 +281,10 @@ class Patterns:
     Degrees drop below powers of the first only where the images of contracted hypersurfaces meet points without a
     value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
     different numbers of steps after which patterns had settled, `searched` is the number of steps those were followed
-    for that are not confined (None if all are), `some_confined` tells whether others are (None: not known). `running` is
-    empty, or says why the patterns are not known to the end. `series` are the coefficients above and below in the generating function
-    of the degrees that follow from the patterns, empty where these do not tell it, and `contracted` are the
-    hypersurfaces `at` one of the eps that were tried. Steps are those of the map, but for what is told of the
+    for that are not confined (None if all are), `some_confined` tells whether others are (None: not known). `running`
+    is empty, or says why the patterns are not known to the end. `series` are the coefficients above and below in the
+    generating function of the degrees that follow from the patterns, empty where these do not tell it, and `contracted`
+    are the hypersurfaces `at` one of the eps that were tried. Steps are those of the map, but for what is told of the
     hypersurfaces of a `word` of maps that is followed map by map.
     """
 
