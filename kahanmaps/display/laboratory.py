@@ -233,7 +233,7 @@ def _census(census: Census) -> Iterator[Line]:
     """The counts, and the longest cycles."""
     if not census.looked_at:
         yield "points", census.points
-        yield "stopped", "by the clock, before the images of all points were known"
+        yield "stopped", "time limit, before the images of all points were known"
         return
     yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}"
     yield "indeterminate", census.indeterminate
@@ -241,7 +241,7 @@ def _census(census: Census) -> Iterator[Line]:
     if census.complete:
         yield "preperiodic", census.preperiodic
     else:
-        yield "open", f"{census.open} after {census.steps} steps" + (", stopped by the clock" if census.stopped else "")
+        yield "open", f"{census.open} after {census.steps} steps" + (", stopped: time limit" if census.stopped else "")
     yield "periodic", census.periodic
     if census.cycles:
         yield "cycles", f"{census.cycles}, longest {census.longest}"
