@@ -3,6 +3,7 @@
 import random
 
 import pytest
+from flint import fmpq
 
 from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
 from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, parse_rational_function
@@ -13,7 +14,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_po
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
-from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
+from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials, gradings
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -157,3 +158,78 @@ def test_powers_of_two_of_them_make_an_integral_without_time():
     extended = text.replace('"z"]', '"z", "w"]').replace('-4*z"', '-4*z", "8*w"')
     [one] = find_integrals(parse_system(extended), flow=True, max_degree=1).integrals
     assert (one.text, str(one.verdict)) == ("w*(x^2 - 4*z)^2", "proved")
+
+
+@pytest.mark.parametrize(("scale", "primes"), [(10**5, 1), (10**40, 12)])
+def test_long_coefficients_are_lifted_from_more_primes(scale, primes, monkeypatch):
+    """The Lorenz system with b = 2 s and z = scale w: x^2 - 20 scale w."""
+    monkeypatch.setattr(searched, "_PRIMES", primes)
+    rhs = ["10*y - 10*x", f"28*x - y - {scale}*x*w", f"x*y/{scale} - 20*w"]
+    found = flow_polynomials(field("x y w", *rhs), 2)
+    assert [format_polynomial(P) for P in found.functions] == [f"x^2 - {20 * scale}*w"]
+    assert (found.degree, found.reason) == (2, "")
+
+
+def test_a_degree_is_not_settled_where_something_is_not_lifted(monkeypatch):
+    """Two primes are not enough for 41 digits: the polynomial is not there, and the degree is left open."""
+    monkeypatch.setattr(searched, "_PRIMES", 2)
+    made = field("x y w", "10*y - 10*x", f"28*x - y - {10**80}*x*w", f"x*y/{10**80} - 20*w")
+    found = flow_polynomials(made, 2)
+    assert (found.functions, found.degree) == ((), 1)
+    assert found.reason == "1 polynomial of degree 2 modulo a prime not lifted to Q (limit: 2 primes)"
+    text = 'variables = ["x", "y", "w"]\n[system]\nrhs = ["{}", "{}", "{}"]'.format(*made.rhs)
+    beside = flow_and_map(find_integrals(parse_system(text), max_degree=1))
+    sentence = f"Darboux polynomials of the flow of degree 2: {found.reason}"
+    assert ("undecided", sentence) in beside.lines()
+    assert beside.to_json()["polynomials_reason"] == found.reason
+
+
+def test_conjugate_lines_leave_no_degree_open():
+    """y^2 + z^2 has factors modulo half of the primes, and of (x^3 - 2 y^3)(x + y) a sixth of them has all."""
+    assert flow_polynomials(lorenz("10", "0", "1").system, 2).degree == 2
+    cubic = parse_polynomial("x^3 - 2*y^3", ["x", "y"])
+    made = PolynomialField((cubic.derivative(1) - cubic, -cubic.derivative(0) - 3 * cubic))
+    for seed in range(4):
+        found = flow_polynomials(made, 3, seed=seed)
+        assert ([format_polynomial(P) for P in found.functions], found.degree) == (["x^3 - 2*y^3"], 3)
+
+
+@pytest.mark.parametrize(
+    ("variables", "rhs", "weights"),
+    [
+        ("x y", ["x*y", "y^2 - x^2"], [(1, 1)]),
+        ("x y", ["y", "x^2"], [(2, 3)]),
+        ("x y z", ["x*z", "-y*z", "x*y"], [(1, -1, 0), (2, 0, 1)]),
+        ("x y", ["y", "x^2 + x"], []),
+    ],
+)
+def test_the_weights_of_a_field(variables, rhs, weights):
+    made = field(variables, *rhs)
+    assert gradings(made) == weights
+    context = made.rhs[0].context()
+    for w in weights:  # f(2^w x) is 2^(w + degree) f(x)
+        scales = [fmpq(2) ** e for e in w]
+        moved = [
+            f.compose(*(c * x for c, x in zip(scales, context.gens(), strict=True)), ctx=context) for f in made.rhs
+        ]
+        ratios = [g.leading_coefficient() / f.leading_coefficient() for f, g in zip(made.rhs, moved, strict=True)]
+        assert [f * ratio for f, ratio in zip(made.rhs, ratios, strict=True)] == moved
+        assert len({ratio / c for ratio, c in zip(ratios, scales, strict=True)}) == 1
+
+
+def test_a_homogeneous_field_has_a_polynomial_of_degree_6():
+    """A published example: of 84 monomials 28 are of degree 6."""
+    made = field("x y z", "x*(y/2 + z)", "y*(2*z + x)", "z*(y - 7/5*x)")
+    found = flow_polynomials(made, 6)
+    assert (found.degree, found.reason) == (6, "")
+    *variables, P = found.functions
+    assert [str(one) for one in variables] == ["x", "y", "z"]
+    assert (P.total_degree(), str(darboux_cofactor(made, P))) == (6, "2*y + 6*z")
+    assert [(factor, k) for factor, k in P.factor()[1] if factor.total_degree() < 6] == []
+
+
+def test_without_a_grading_degree_6_is_too_large():
+    made = field("x y z", "x*(y/2 + z) + 1", "y*(2*z + x)", "z*(y - 7/5*x)")
+    assert gradings(made) == []
+    found = flow_polynomials(made, 60, 0.0)
+    assert (found.degree, found.reason) == (0, "the time was over")

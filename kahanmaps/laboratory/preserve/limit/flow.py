@@ -109,11 +109,13 @@ class ModularFlow(ModularMap):
     ) -> tuple[Sequence[Values], Point, int | None]:
         """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
         start = self.random_point()
-        rows = self.series(start, degree, count)
-        return rows if support is None else [[row[k] for k in support] for row in rows], start, None
+        return self.series(start, degree, count, support), start, None
 
-    def series(self, start: Point, degree: int, count: int) -> list[list[int]]:
-        """The first `count` Taylor coefficients of all monomials along the solution from a point: a row an order."""
+    def series(self, start: Point, degree: int, count: int, support: Sequence[int] | None = None) -> list[list[int]]:
+        """The first `count` Taylor coefficients of all monomials, or some, along the solution from a point.
+
+        A row has the coefficients of one order.
+        """
         p = self.prime
         # By the numbers of their monomials: 0 is that of 1, k + 1 that of the k-th variable.
         known = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
@@ -126,11 +128,17 @@ class ModularFlow(ModularMap):
             known[0].append(0)
             for k, slope in enumerate(slopes, 1):
                 known[k].append(slope * below % p)
-        table = [nmod_poly([1], p)]
-        for factors in monomial_tables(self.dim, degree)[1:]:
-            variable, _, place = factors[-1]
-            table.append(table[place].mul_low(nmod_poly(known[variable + 1], p), count))
-        return [[int(series[k]) for series in table] for k in range(count)]
+        factors = monomial_tables(self.dim, degree)
+        table = {0: nmod_poly([1], p)}
+
+        def monomial(place: int) -> nmod_poly:
+            if place not in table:
+                variable, _, lower = factors[place][-1]
+                table[place] = monomial(lower).mul_low(nmod_poly(known[variable + 1], p), count)
+            return table[place]
+
+        columns = [monomial(place) for place in (range(len(factors)) if support is None else support)]
+        return [[int(column[k]) for column in columns] for k in range(count)]
 
 
 def is_kept_by_flow(

@@ -6,7 +6,13 @@ random points, and P divides its minors, the extactic determinants (pereira-2001
 line modulo a prime. A P of degree d has there d zeros in all, conjugate ones in one irreducible factor, and is one of
 the polynomials that vanish along the solutions from all of them. So it is in the space of one of the choices of factors
 whose degrees add up to d: those of a line, or what those of several lines have in common. Where these spaces are 0
-there is no P; where one is a line, P is lifted to Q, and whether it divides f . grad P is decided exactly.
+there is no P; where one is a line, P is lifted to Q, and whether it divides f . grad P is decided exactly. One that is
+not rational has residues only modulo some primes, a rational one modulo all: what one prime is not enough for is joined
+with what is found modulo the next, and a degree is settled by a prime that leaves nothing without a polynomial over Q.
+
+Weights w of the variables are a grading where all terms x^a of all x_i' have the same w . a - w_i. The cofactor K of a
+P is homogeneous then, and all homogeneous parts of P have it: their quotients are integrals, and a P that belongs to
+no integral is homogeneous in every grading. So the monomials of each weight are a search of their own.
 """
 
 from __future__ import annotations
@@ -14,19 +20,21 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, reduce
+from functools import lru_cache, reduce
 from math import comb, inf
 from operator import mul
 
-from flint import fmpq_mpoly, nmod_mat, nmod_poly
+from flint import fmpq_mat, fmpq_mpoly, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.modular_matrices import combine, matrix, null_space, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, primitive_part
-from kahanmaps.algebra.residues import random_prime, rational_vector
-from kahanmaps.errors import BadPrime
+from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
+from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.modular_points import Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
@@ -34,8 +42,8 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 _MOST_MONOMIALS = 21  # of the degree that is gone to unasked, within a second
 _MOST_EVER = 56  # with which a line takes a minute
+_MOST_LISTED = 20_000  # monomials up to a degree, before they are sorted by their weights
 _SPARE = 8  # orders of a series beyond the number of monomials
-_LARGEST = 10**6  # coefficient: in a random fraction modulo primes of 61 bits it is as small once in 2^20 times
 _MOST_CHOICES = 400  # of zeros on a line, and of pairs of choices
 _PRIMES = 12  # of which the first mostly suffices
 _LINES = 4  # modulo one of them
@@ -47,9 +55,9 @@ Vectors = list[list[int]]
 class FlowPolynomials:
     """Darboux polynomials of a field, irreducible over Q, that are no integrals, each exact, short ones first.
 
-    Members P - c Q for an integral P/Q of the same degree are left out unless they are factors of right-hand sides.
-    There are no others of at most `degree` with coefficients of at most 10^6: measured on lines modulo primes. Symbols
-    count for the degree. `reason` says why higher degrees that were asked for are not settled.
+    Members P - c Q for an integral P/Q are left out unless they are factors of right-hand sides. There are no others of
+    at most `degree`: measured on lines modulo primes. Symbols count for the degree. `reason` says why higher degrees
+    that were asked for are not settled: also where something was found modulo primes and not lifted to Q.
     """
 
     functions: tuple[fmpq_mpoly, ...]
@@ -66,7 +74,7 @@ def flow_polynomials(
     Args:
         field: x' = f(x), exact. A symbol s counts as a variable with s' = 0.
         max_degree: of the polynomials in variables and symbols; by default up to 4, as long as there are at most 21
-            monomials.
+            monomials (of one weight, where the field has gradings).
         seconds: the time that the search may take, about.
         seed: of the random lines and primes.
 
@@ -82,11 +90,14 @@ def flow_polynomials(
         wider = PolynomialField((*field.rhs, *[context.constant(0)] * len(field.symbols)))
         known = flow_polynomials(wider, max_degree, seconds, seed)
         return replace(known, functions=tuple(P for P in known.functions if degree_in(P, field.dim)))
-    n = field.dim
-    if max_degree is not None:
-        top = max((d for d in range(max_degree + 1) if comb(n + d, d) <= _MOST_EVER), default=0)
-    else:
-        top = max((d for d in (1, 2, 3, 4) if comb(n + d, d) <= _MOST_MONOMIALS), default=0)
+    n, top = field.dim, 0
+    asked, most = (4, _MOST_MONOMIALS) if max_degree is None else (max_degree, _MOST_EVER)
+    weights = gradings(field)
+    # The work grows with the cube of a support at least, and is that of all supports of a degree together.
+    while top < asked and comb(n + top + 1, n) <= _MOST_LISTED:
+        if sum(len(support) ** 3 for support in _supports(n, top + 1, weights)) > most**3:
+            break
+        top += 1
     deadline = time.monotonic() + seconds
     rng = random.Random(f"flow polynomials {seed_for(seed, field.rhs)}")
     found: dict[str, fmpq_mpoly] = {}
@@ -95,83 +106,191 @@ def flow_polynomials(
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             found.setdefault(str(P), P)
-    done, reason = 0, "too many monomials" if max_degree is not None and top < max_degree else ""
-    while done < top:
-        unsettled = _unsettled(field, done + 1, rng, deadline, found)
-        if unsettled:
-            reason = unsettled
-            break
-        done += 1
+    done, reason = 0, ""
+    primes = [random_prime(rng) for _ in range(_PRIMES)]
+    while done < top and not reason:
+        for support in _supports(n, done + 1, weights):
+            reason = _Search(field, done + 1, support, rng, found).run(primes, deadline)
+            if reason:
+                break
+        else:
+            done += 1
+    if not reason and max_degree is not None and top < max_degree:
+        reason = "too many monomials"
     listed = [P for P in found.values() if not field.derivative(P).is_zero()]
-    by_size = sorted(listed, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()]))
+    by_size = sorted(
+        listed, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()], str(P))
+    )
     return FlowPolynomials(tuple(by_size), done, reason)
 
 
-def _unsettled(
-    field: PolynomialField, degree: int, rng: random.Random, deadline: float, found: dict[str, fmpq_mpoly]
-) -> str:
-    """Adds the polynomials of a degree, given those of lower ones; why there may be others, "" where there are none."""
-    for _ in range(_PRIMES):
-        try:
-            flow = ModularFlow(field, random_prime(rng), (), rng.getrandbits(64))
-        except BadPrime:
-            continue
-        common: list[Vectors] = []
-        for k in range(_LINES):
+def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
+    """A basis of the weights w of the variables for which all terms x^a of all x_i' have the same w . a - w_i.
+
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> gradings(QuadraticSystem.from_text(["x", "y"], ["y", "x^2"]))
+    [(2, 3)]
+    """
+    n = field.dim
+    terms = ((i, [int(e) for e in m]) for i, f in enumerate(field.rhs) for m in f.monoms())
+    rows = [[*(e - (i == k) for k, e in enumerate(m)), -1] for i, m in terms] or [[0] * n + [1]]
+    return [tuple(map(int, primitive_integers(w)[:n])) for w in nullspace(QQ, fmpq_mat(rows))]
+
+
+def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
+    """The numbers of the monomials that a polynomial of the degree, irreducible and no variable, may consist of.
+
+    They have one weight in each grading, not all of them a variable in common, and one is of the degree.
+    """
+    exponents, alike = exponents_up_to(n, degree), dict[tuple[int, ...], list[int]]()
+    for k, exponent in enumerate(exponents):
+        alike.setdefault(tuple(sum(map(mul, w, exponent)) for w in weights), []).append(k)
+    return [
+        tuple(support)
+        for support in alike.values()
+        if max(sum(exponents[k]) for k in support) == degree
+        and not any(map(min, *(exponents[k] for k in support), exponents[support[0]]))
+    ]
+
+
+class _Search:
+    """The search for polynomials of a degree with given monomials; those of lower degrees are among `found`."""
+
+    def __init__(
+        self,
+        field: PolynomialField,
+        degree: int,
+        support: Sequence[int],
+        rng: random.Random,
+        found: dict[str, fmpq_mpoly],
+    ) -> None:
+        self.field, self.degree, self.support, self.rng, self.found = field, degree, support, rng, found
+        exponents = exponents_up_to(field.dim, degree)
+        self.monomials = [exponents[k] for k in support]
+
+    def run(self, primes: list[int], deadline: float) -> str:
+        """Adds the polynomials to those found; why there may be others, "" where there are none.
+
+        The prime that settles it comes first for the next search: factors over extensions of Q that have no residues
+        modulo this one do not come again in products.
+        """
+        reason = "lines modulo primes leave others possible"
+        joined: list[tuple[list[int], int]] = []  # residues of what is not lifted yet, and their moduli
+        for prime in list(primes):
             if time.monotonic() > deadline:
                 return "the time was over"
-            here = _Line(flow, degree, found.values()).spaces()
+            try:
+                flow = ModularFlow(self.field, prime, (), self.rng.getrandbits(64))
+            except BadPrime:
+                continue
+            vectors, are_all = self._modulo(flow, deadline)
+            missing = [vector for vector in vectors if not self._lifts(vector, prime)]
+            if not are_all:
+                continue
+            pairs = [(chinese(old, m, new, prime), m * prime, new) for old, m in joined for new in missing]
+            joined = []
+            for residues, modulus, new in pairs[:_MOST_CHOICES]:
+                if new in missing and self._lifts(residues, modulus):
+                    missing.remove(new)
+                joined.append((residues, modulus))
+            if not missing:
+                primes.sort(key=lambda one: one != prime)
+                return ""
+            joined = joined or [(vector, prime) for vector in missing]
+            reason = (
+                f"{counted(len(missing), 'polynomial')} of degree {self.degree} modulo a prime not lifted to Q "
+                f"(limit: {_PRIMES} primes)"
+            )
+        return reason
+
+    def _modulo(self, flow: ModularFlow, deadline: float) -> tuple[Vectors, bool]:
+        """The coefficients of polynomials modulo the prime of a flow, the first being 1, and whether these are all."""
+        common: list[Vectors] = []
+        for k in range(_LINES):
+            here = _Line(flow, self.degree, self.support, self.found.values()).spaces()
             if here is None or (k and len(common) * len(here) > _MOST_CHOICES):
                 break
             if k:
                 pairs = (_intersection(A, B, flow.prime) for A in common for B in here)
                 here = [list(map(list, key)) for key in {tuple(map(tuple, space)) for space in pairs if space}]
             common = here
-            for vector in [space[0] for space in common if len(space) == 1]:
-                P = _lifted(vector, degree, flow.prime, field)
-                if P is not None and darboux_cofactor(field, P) is not None:
-                    found.setdefault(str(P), P)
             if all(len(space) == 1 for space in common):
-                return ""
-    return "lines modulo primes leave others possible"
+                return [_monic(*space, flow.prime) for space in common], True
+            if time.monotonic() > deadline:
+                break
+        return [_monic(*space, flow.prime) for space in common if len(space) == 1], False
+
+    def _lifts(self, residues: Sequence[int], modulus: int) -> bool:
+        """Whether the simplest fractions with these residues are the coefficients of a polynomial: it is added."""
+        values = rational_vector(residues, modulus)
+        if values is None:
+            return False
+        terms = {monomial: c for monomial, c in zip(self.monomials, values, strict=True) if c}
+        P = primitive_part(self.field.rhs[0].context().from_dict(terms))[1]
+        if str(P) not in self.found:
+            if darboux_cofactor(self.field, P) is None or not self._is_special(P):
+                return False
+            self.found[str(P)] = P
+        return True
+
+    def _is_special(self, P: fmpq_mpoly) -> bool:
+        """Whether P stands out modulo a fresh prime: where a pencil has a member for every number, any residue lifts.
+
+        So x^2 + y^2 - 1 + 2 i y would, a product of conjugate lines of two special members.
+        """
+        while True:
+            with suppress(BadPrime):
+                flow = ModularFlow(self.field, random_prime(self.rng), (), self.rng.getrandbits(64))
+                line = _Line(flow, self.degree, self.support, ())
+                along = line.restricted(P)
+                return len(line.special(along)) == len(along.factor()[1])
 
 
-def _rank(flow: ModularFlow, degree: int) -> int:
-    """How many monomials up to a degree are independent along the solution from a random point."""
-    orders = comb(flow.dim + degree, degree) + _SPARE
-    return rank(flow.series(flow.random_point(), degree, orders), flow.prime)
+def _monic(vector: Sequence[int], prime: int) -> list[int]:
+    """The multiple of a vector modulo a prime whose first entry other than 0 is 1."""
+    lead = pow(next(c for c in vector if c), -1, prime)
+    return [c * lead % prime for c in vector]
 
 
 class _Line:
     """A random line, x = start + t slope, and the polynomials in t that are 0 where solutions lie on more than others.
 
-    `left` is the extactic determinant without the factors that are known.
+    More polynomials with the monomials of the `support`, that is. Zeros of polynomials that are `known` are left out.
     """
 
-    def __init__(self, flow: ModularFlow, degree: int, known: Iterable[fmpq_mpoly]) -> None:
-        self.flow, self.degree = flow, degree
-        self.count = comb(flow.dim + degree, degree)
-        self.rank = _rank(flow, degree)
+    def __init__(self, flow: ModularFlow, degree: int, support: Sequence[int], known: Iterable[fmpq_mpoly]) -> None:
+        self.flow, self.degree, self.support, self.known = flow, degree, support, known
+        self.count = len(support)
         self.start, self.slope = flow.random_point(), flow.random_point()
-        self.left = self._without(self._extactic(), known)
+        self._known_usual: dict[int, int] = {}
 
     def at(self, t: int) -> Point:
         """The point of a parameter."""
         return tuple((a + t * b) % self.flow.prime for a, b in zip(self.start, self.slope, strict=True))
 
-    def spaces(self) -> list[Vectors] | None:
-        """What vanishes along the solutions from as many zeros as the degree is, for each choice; None if too many.
+    def special(self, along: nmod_poly) -> list[tuple[int, Vectors]]:
+        """The degrees of the factors of a polynomial in t and what vanishes along the solutions from their zeros.
 
         Only where that is more than from as many random points: there products of integrals less a number do.
         """
-        p = self.flow.prime
-        usual = cache(lambda k: len(null_space([row for _ in range(k) for row in self._rows(None)], self.count, p)))
         points = []
-        for factor, _ in self.left.factor()[1] if self.left.degree() > 0 else ():
+        for factor, _ in along.factor()[1] if along.degree() > 0 else ():
             if factor.degree() <= self.degree:
-                space = null_space(self._conjugates(factor), self.count, p)
-                if len(space) > usual(factor.degree()):
+                space = null_space(self._conjugates(factor), self.count, self.flow.prime)
+                if len(space) > self._usual(factor.degree()):
                     points.append((factor.degree(), space))
+        return points
+
+    def _usual(self, points: int) -> int:
+        """How many polynomials vanish along the solutions from so many random points."""
+        if points not in self._known_usual:
+            rows = [row for _ in range(points) for row in self._rows(None)]
+            self._known_usual[points] = len(null_space(rows, self.count, self.flow.prime))
+        return self._known_usual[points]
+
+    def spaces(self) -> list[Vectors] | None:
+        """What vanishes along the solutions from as many zeros as the degree is, for each choice; None if too many."""
+        p, points = self.flow.prime, self.special(self._left())
         found: list[Vectors] = []
         waiting: list[tuple[int, int, Vectors]] = [(0, 0, [])]
         tried = 0
@@ -183,7 +302,7 @@ class _Line:
                     continue
                 tried += 1
                 both = _intersection(common, space, p) if size else space
-                if size and len(both) <= usual(size + degree):
+                if size and len(both) <= self._usual(size + degree):
                     continue
                 if size + degree == self.degree:
                     found.append(both)
@@ -195,7 +314,7 @@ class _Line:
 
     def _rows(self, x: Point | None) -> Vectors:
         """The Taylor coefficients along the solution from a point, or a random one."""
-        return self.flow.series(x or self.flow.random_point(), self.degree, self.count + _SPARE)
+        return self.flow.series(x or self.flow.random_point(), self.degree, self.count + _SPARE, self.support)
 
     def _conjugates(self, factor: nmod_poly) -> Vectors:
         """The Taylor coefficients from a zero of an irreducible polynomial in t, in the powers of the zero.
@@ -225,7 +344,7 @@ class _Line:
         or a factor more than once. The columns are combined at random, differently where there are too many: on a
         random line two such minors have in common what all have.
         """
-        p, flow, size = self.flow.prime, self.flow, self.rank
+        p, flow, size = self.flow.prime, self.flow, rank(self._rows(None), self.flow.prime)
         mixes = [nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)] * 2
         if size < self.count:
             mixes[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
@@ -234,41 +353,29 @@ class _Line:
         top = sum(self.degree + order * step for order in range(size)) + step
         values: list[tuple[int, ...]] = []
         for t in range(top + 1):
-            *rows, last, following = flow.series(self.at(t), self.degree, size + 1)
+            *rows, last, following = flow.series(self.at(t), self.degree, size + 1, self.support)
             minors = (matrix([*rows, one], p) * mix for one, mix in zip((last, following), mixes, strict=True))
             values.append(tuple(int(minor.det()) for minor in minors))
         first, second = (interpolated(range(top + 1), column, p) for column in zip(*values, strict=True))
         return first.gcd(second)
 
-    def _without(self, whole: nmod_poly, known: Iterable[fmpq_mpoly]) -> nmod_poly:
-        """A polynomial in t without the factors of known polynomials."""
-        residues = GF(self.flow.prime)
-        for P in known:
-            nodes = range(degree_in(P, self.flow.dim) + 1)
-            places = ([residues.convert(c) for c in self.at(t)] for t in nodes)
-            factor = interpolated(nodes, [int(evaluate(P, residues, x)) for x in places], self.flow.prime)
-            while (common := whole.gcd(factor)).degree() > 0:
-                whole = whole // common
-        return whole
+    def _left(self) -> nmod_poly:
+        """The extactic determinant without the factors of known polynomials."""
+        left = self._extactic()
+        for P in self.known:
+            factor = self.restricted(P)
+            while (common := left.gcd(factor)).degree() > 0:
+                left = left // common
+        return left
+
+    def restricted(self, P: fmpq_mpoly) -> nmod_poly:
+        """A polynomial on the line, in t."""
+        residues, nodes = GF(self.flow.prime), range(degree_in(P, self.flow.dim) + 1)
+        places = ([residues.convert(c) for c in self.at(t)] for t in nodes)
+        return interpolated(nodes, [int(evaluate(P, residues, x)) for x in places], self.flow.prime)
 
 
 def _intersection(A: Vectors, B: Vectors, prime: int) -> Vectors:
     """A basis of what the spans of two bases have in common."""
     kernel = null_space(list(zip(*A, *B, strict=True)), len(A) + len(B), prime)
     return combine([weights[: len(A)] for weights in kernel], A, prime)
-
-
-def _lifted(vector: Sequence[int], degree: int, prime: int, field: PolynomialField) -> fmpq_mpoly | None:
-    """The polynomial over Q with these coefficients modulo the prime, up to a factor; None where they are too long.
-
-    A residue that is no small number is a fraction of two of half its length, and where a pencil has a member for every
-    number that fraction would pass: so is x^2 + y^2 - 1 + 2 i y, a product of conjugate lines of two special members.
-    """
-    lead = pow(next(c for c in vector if c), -1, prime)
-    values = rational_vector([c * lead % prime for c in vector], prime)
-    if values is None:
-        return None
-    support = exponents_up_to(field.dim, degree)
-    terms = {exponent: c for exponent, c in zip(support, values, strict=True) if c}
-    P = primitive_part(field.rhs[0].context().from_dict(terms))[1]
-    return P if max(abs(c) for c in P.coeffs()) <= _LARGEST else None

@@ -89,7 +89,7 @@ class FlowAndMap:
     of the flow, None where there can be no more than the limits. `density` is a phi of the flow, `density_search` what
     was sought where that of the map gave none; `polynomials` are those of its Darboux polynomials above degree 1 that
     are known and no integrals, `polynomials_degree` is the degree up to which there are no others, measured; 0 where
-    they were not sought.
+    they were not sought; `polynomials_reason` is what leaves the next degree open where something does.
     """
 
     limits: tuple[Limit, ...]
@@ -102,6 +102,7 @@ class FlowAndMap:
     density_search: DensitySearch | None
     polynomials: tuple[fmpq_mpoly, ...]
     polynomials_degree: int
+    polynomials_reason: str = ""
 
     @property
     def reason(self) -> str:
@@ -159,13 +160,15 @@ class FlowAndMap:
             which, but = ("other ", "") if self.polynomials else ("", "affine ones and ")
             shown = f"no {which}Darboux polynomial of the flow shows up to degree {self.polynomials_degree}"
             found.append(("measured", f"{shown} but {but}those of integrals"))
+        if self.polynomials_reason:
+            which = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
+            found.append(("undecided", f"{which}: {self.polynomials_reason}"))
         return found
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        known = attributes(
-            self, "limits", "others", "lost", "without_limit", "density", "reason", "polynomials", "polynomials_degree"
-        )
+        known = attributes(self, "limits", "others", "lost", "without_limit", "density", "reason")
+        known |= attributes(self, "polynomials", "polynomials_degree", "polynomials_reason")
         return {**known, "degree": None if self.search is None else self.search.profile.degree}
 
 
@@ -235,7 +238,7 @@ def flow_and_map(
     density = next(iter(found.densities), None)
     functions += [] if density is None else [density.function]
     polynomials = _polynomials(laboratory, sought.functions, functions)
-    beside = (tuple(others), without, count, search, flow, density, found, polynomials, sought.degree)
+    beside = (tuple(others), without, count, search, flow, density, found, polynomials, sought.degree, sought.reason)
     return with_limit(FlowAndMap(limits, *beside), densities)
 
 
