@@ -50,6 +50,26 @@ def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
     return fmpq(n, d)
 
 
+def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
+    """The fraction n/d with this residue for which |n| d is least, if that is below modulus / 2^spare_bits.
+
+    There is at most one such fraction, and a random residue has one with a probability of about 2^-spare_bits times the
+    bits of the modulus. The numerator may be much longer than the denominator or the reverse. Exact.
+
+    >>> m = 10**40 + 121
+    >>> simple_fraction(10**25 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
+    (10000000000000000000000000/7, None)
+    """
+    above, below = (modulus, 0), (residue % modulus, 1)
+    best = below
+    while below[0] * abs(below[1]):
+        best = min(best, below, key=lambda pair: pair[0] * abs(pair[1]))
+        quotient = above[0] // below[0]
+        above, below = below, (above[0] - quotient * below[0], above[1] - quotient * below[1])
+    n, d = best
+    return fmpq(n, d) if n * abs(d) < modulus >> spare_bits else None
+
+
 def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
     """The simplest fractions with these residues, taken together; None where no simple ones stand out.
 

@@ -33,7 +33,7 @@ from kahanmaps.laboratory.scan.result import Scan
 from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
-from kahanmaps.laboratory.symmetry.symmetries import SIGNED, Symmetries
+from kahanmaps.laboratory.symmetry.symmetries import MATRICES, Symmetries
 from kahanmaps.maps.convention import eps_record, eps_told
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -293,7 +293,7 @@ def _symmetries(found: Symmetries) -> Iterator[Line]:
     if found.order is not None:
         yield "group", found.group_text or "the identity alone"
     elements = [("generator", t) for t in found.generators]
-    elements += [("besides", t) for t in found.others if found.group_of == SIGNED]
+    elements += [("besides", t) for t in found.others if found.group_of != MATRICES]
     for name, t in elements:
         yield name, f"{t.kind} {t.text}", *["obvious"] * t.obvious
     yield from (("searched", sentence) for sentence in found.searched)

@@ -74,7 +74,7 @@ def test_polynomials_with_a_given_cofactor():
 def test_the_search_ends_when_enough_is_found_or_the_time_is_over():
     laboratory = Laboratory(system("x y", "x", "y"))
     map_, known = laboratory.maps[0], laboratory.cofactors()
-    [(product, space)] = search_cofactors(map_, known, [], 1, 3, 10.0)
+    [(product, _, [space])] = search_cofactors(map_, known, [], 1, 3, 10.0)
     assert (product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
     assert list(search_cofactors(map_, known, [space], 1, 3, 10.0)) == []
     assert list(search_cofactors(map_, known, [], 1, 3, -1.0)) == []

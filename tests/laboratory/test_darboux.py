@@ -8,13 +8,14 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as module
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -96,3 +97,36 @@ def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynom
     found = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
     assert found.spaces == ()
     assert f"at eps = {eps} the map" in found.reason
+
+
+@pytest.mark.parametrize(("symbols", "cofactor"), [((), "1/5*(y + 1)*1/(x)^2"), (("a",), "(1/a)*(y + 1)*1/(x)^2")])
+def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
+    """Lyness' map x_{n+1} x_{n-1} = a + x_n for a multiples of the x_n: factors of det dPhi are right up to numbers."""
+    file = parse_system("variables = ['x', 'y']\nparameters.a = 5\n[map]\nimage = ['y', '(y + 1)/(a*x)']")
+    found = darboux_polynomials(file, 3, symbols=symbols)
+    [space] = found.spaces
+    assert (space.cofactor, space.verdict, found.reason) == (cofactor, Verdict.PROVED, "")
+    assert [len(P) for P in space.polynomials] == [1, 7 if not symbols else 9]
+    assert str(space.polynomials[0]) == "x*y"
+
+
+def test_polynomials_whose_cofactors_differ_by_a_number_come_apart():
+    """x + y goes to itself, and x - y to its negative."""
+    file = parse_system("variables = ['x', 'y', 'z']\n[map]\nimage = ['y', 'x', '3*z/(1 + z)']")
+    spaces = {one.cofactor: list(map(str, one.polynomials)) for one in darboux_polynomials(file, 1).spaces}
+    assert spaces["1"] == ["x + y"]
+    assert spaces["-1"] == ["x - y"]
+
+
+def test_a_wrong_number_in_front_is_refuted(monkeypatch):
+    file = parse_system("variables = ['x', 'y']\n[map]\nimage = ['y', '(y + 1)/(5*x)']")
+    right = module.constants_of
+
+    def doubled(*arguments):
+        [c] = right(*arguments)
+        return [RationalFunction(c.numerator * 2, c.denominator)]
+
+    monkeypatch.setattr(module, "constants_of", doubled)
+    found = darboux_polynomials(file, 3)
+    assert found.spaces == ()
+    assert "did not pass as an identity" in found.reason

@@ -129,7 +129,7 @@ def test_orbits_that_disagree_give_nothing():
 
 
 def test_a_common_number_that_is_not_simple_is_taken_for_an_accident(monkeypatch):
-    monkeypatch.setattr(module, "_SIMPLE", 2)
+    monkeypatch.setattr(module, "_SPARE_BITS", 120)
     (found,) = relations("zhukovski_volterra_2", 2)
     assert found.text == "x1^2 + e1*x2^2 + c1*x3^2 - x1 + e2*x2 + c2 = 0"
 

@@ -29,9 +29,10 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Kahan's map goes along with affine changes of variables: T(x) = S x + r is a symmetry, for every eps, exactly where
     f(T(x)) = S f(x), and a reversing one where f(T(x)) = -S f(x). So everything that is told is proved.
 
-    Searched are one-parameter groups and a scaling; signed permutations, with a translation (dimension at most 12); in
-    dimension at most 3 all rational matrices, unless there are one-parameter groups of them. -I reverses every
-    homogeneous quadratic system: this is told as obvious. A finite group is shown by generators, --json lists it.
+    Searched are one-parameter groups and a scaling; signed permutations, of the variables or of scaled ones, with a
+    translation (dimension at most 12); in dimension at most 3 all rational matrices, unless there are one-parameter
+    groups of them. -I reverses every homogeneous quadratic system: this is told as
+    obvious. A finite group is shown by generators, --json lists it.
 
     Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the time over.
     """

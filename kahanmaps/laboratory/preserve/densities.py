@@ -367,7 +367,7 @@ def _period(laboratory: Laboratory) -> int | None:
 
 def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
     """The P of degree at most `degree` with P(x~) = det dPhi P(x), and with the monomials of the model."""
-    sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, model))
+    sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, *([] if model is None else [model])))
     return cofactor_space(sample, _ONCE, degree, model)
 
 

@@ -351,7 +351,7 @@ def _sorted_by_constant(
     """Which products of the vectors have the constant 1; the exponent of det dPhi comes first in them."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
-    values = _constants(laboratory, polynomials, vectors)
+    values = constants_of(laboratory, lambda map_: [_constant(map_, polynomials, vector) for vector in vectors])
     known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
     minus = RationalFunction(context.constant(-1), context.constant(1))
 
@@ -391,15 +391,10 @@ def _assembled(
     return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in in_time))
 
 
-def _constants(
-    laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly], vectors: Sequence[Sequence[int]]
-) -> list[RationalFunction | None]:
-    """The numbers that the products of the vectors are, functions of the symbols and eps; None where not found."""
+def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:
+    """Numbers that are known on every map, as functions of the symbols and eps; None where these were not found."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
-
-    def constants(map_: ModularMap) -> list[int]:
-        return [_constant(map_, polynomials, vector) for vector in vectors]
 
     def box(prime: int, place: tuple[int, ...]) -> list[int] | None:
         try:
@@ -409,7 +404,7 @@ def _constants(
 
     is_one = [all(c == 1 for c in column) for column in zip(*map(constants, laboratory.maps), strict=True)]
     if all(is_one):
-        return [one] * len(vectors)
+        return [one] * len(is_one)
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
     answer = reconstruct_at(laboratory.root, box, names, seed=laboratory.seed)
     if answer.functions is None:

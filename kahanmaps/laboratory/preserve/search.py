@@ -20,7 +20,7 @@ from types import MappingProxyType
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.modular_matrices import null_space
-from kahanmaps.algebra.residues import rational_reconstruction
+from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
@@ -30,6 +30,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     CofactorProduct,
     Sample,
     cofactor_space,
+    cofactor_spaces,
     points_needed,
     search_cofactors,
 )
@@ -50,6 +51,7 @@ _MOST_TERMS = 1000
 NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
 AFFINE = "v.x with v.f(x) = 0"
+_CHANCE = 20  # bits by which a fraction is simpler than one of a random residue
 _FEW = 20  # with more relations than these, cofactors come first
 
 
@@ -62,6 +64,7 @@ class Step:
     product: CofactorProduct | None
     text: str
     lift: Lift | None = None  # of "iterates"
+    up_to_numbers: bool = False  # whether the cofactors of spaces are the product times numbers
 
 
 @dataclass(frozen=True)
@@ -126,8 +129,10 @@ def search(
             top -= 1
         progress(f"polynomials of degree up to {top} with {comb(map_.dim + top, top)} terms and known cofactors")
         left = deadline - time.monotonic()
-        for product, space in search_cofactors(map_, cofactors, found.all_spaces, wanted, top, left):
-            found.add(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"), [space])
+        for product, scaled, spaces in search_cofactors(map_, cofactors, found.all_spaces, wanted, top, left):
+            text = f"common cofactor {product.text(cofactors)}{', up to a number' * scaled}"
+            step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
+            found.add(step, sorted(spaces, key=pattern))
     take_relations(_FEW + 1, LARGEST_SPAN)
     return found
 
@@ -161,7 +166,10 @@ def repeat(
             affine = affine_space(map_)
             group = [affine] if affine is not None else []
         elif step.product is not None:
-            group = [cofactor_space(sample, step.product, step.degree, *model)]
+            if step.up_to_numbers:
+                group = [space for _, space in cofactor_spaces(sample, step.product, step.degree, model)]
+            else:
+                group = [cofactor_space(sample, step.product, step.degree, *model)]
         elif step.lift is not None:
             group = lifted_spaces(map_, step.lift)
         else:
@@ -230,13 +238,13 @@ def _most_alike(
 
 
 def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference: int) -> int:
-    """How many coefficients seem to be the same rational number."""
+    """How many coefficients seem to be the same rational number: modulo both primes one simple fraction has them."""
     count = 0
     for mine, its in zip(one.basis, model.basis, strict=True):
         for a, b in zip(mine, its, strict=True):
             if b and b != 1:
-                value = rational_reconstruction(b, reference)
-                count += value is not None and (value.p - a * value.q) % prime == 0
+                [residue] = chinese([a], prime, [b], reference)
+                count += simple_fraction(residue, prime * reference, _CHANCE) is not None
     return count
 
 

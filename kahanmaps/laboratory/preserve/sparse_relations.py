@@ -15,12 +15,12 @@ from flint import fmpq
 
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.residues import rational_reconstruction
+from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 
-_SIMPLE = 10**6  # a number that both maps share and that is no simpler is taken for an accident
+_SPARE_BITS = 40  # of 122 modulo two primes, by which a number must be simpler than an accident
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
 
 
@@ -137,13 +137,14 @@ def _implied(map_: ModularMap, degree: int, support: Sequence[tuple[int, ...]]) 
 
 
 def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) -> str | None:
-    """The coefficient as a simple number times a power of eps, which both maps share; None where it is none."""
+    """The coefficient as a number times a power of eps, modulo both primes simpler than by chance; None otherwise."""
     for power in _POWERS:
-        value = rational_reconstruction(one * pow(map_.eps, -power, map_.prime) % map_.prime, map_.prime)
-        again = other * pow(other_map.eps, -power, other_map.prime) % other_map.prime
-        if value is None or value != rational_reconstruction(again, other_map.prime):
-            continue
-        if abs(value.p) < _SIMPLE and value.q < _SIMPLE:
+        residues = [
+            [entry * pow(at.eps, -power, at.prime) % at.prime] for entry, at in ((one, map_), (other, other_map))
+        ]
+        [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
+        value = simple_fraction(residue, map_.prime * other_map.prime, _SPARE_BITS)
+        if value is not None:
             return _times_power(value, power)
     return None
 

@@ -33,7 +33,8 @@ DEFAULT_SECONDS = 30
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
 MAX_LISTED = 200  # of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
-SIGNED, MATRICES = "signed permutations", "rational matrices"
+SIGNED, SCALED = "signed permutations", "signed permutations of scaled variables"
+MATRICES = "rational matrices"
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ class Symmetries(Printed):
     """What was found. `complete` says that each search in `searched` came to its end.
 
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
-    `signed` are all signed permutations (with a translation where needed), `others` linear symmetries that are none.
+    `signed` are all signed permutations (with a translation where needed), of the variables or of scaled ones (see
+    signed_permutations.py), `others` linear symmetries that are none.
     `generators` generate a group whose linear parts are `order` matrices (None: not known): those of `signed`, or of
     `others` as well where there are no infinitesimal symmetries, so that all are finite in number: see `group_of`.
     """
@@ -121,7 +123,7 @@ class Symmetries(Printed):
     @property
     def reversing_order(self) -> int:
         """How many elements of the group take the map to its inverse."""
-        if self.group_of == SIGNED:
+        if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
         # f is not 0 here, so that none is both, and those that commute with the map are all or half of them
         return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
@@ -150,7 +152,7 @@ class Symmetries(Printed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""
-        signed = self.group_of == SIGNED
+        signed = self.group_of != MATRICES
         forward = sum(not t.reversing for t in self.signed) if signed else (self.order or 0) - self.reversing_order
         group = {
             "of": self.group_of,
@@ -178,9 +180,10 @@ def linear_symmetries(
 ) -> Symmetries:
     """Affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
-    Searched: the Lie algebra of affine symmetries, and a scaling; signed permutations, with a translation where
-    needed (dimension at most 12); in dimension at most 3, where that algebra has no linear element, all rational
-    matrices. All exact and proved. `seconds` bounds the time, roughly. Raises InputError where it is not positive.
+    Searched: the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled variables, with a
+    translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no linear element,
+    all rational matrices. All exact and proved. `seconds` bounds the time, roughly. Raises InputError where it is not
+    positive.
     Source: cmoq-2013.
 
     >>> found = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
@@ -259,6 +262,8 @@ def _add_signed(found: Symmetries, deadline: float) -> None:
         return
     found.searched.append("signed permutations, with a translation: all")
     found.order = len({_key(t.S) for t in found.signed})  # for f = 0 each is both kinds
+    if any(abs(entry) not in (0, 1) for t in found.signed for entry in t.S.entries()):
+        found.group_of = SCALED
     found.generators = _generators(found.signed)
 
 

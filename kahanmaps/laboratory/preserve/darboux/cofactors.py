@@ -8,7 +8,8 @@ the products of
     l(x~)/l(x)                  for the affine l with l' = l L, which are Darboux polynomials themselves.
 
 A polynomial that is even in eps has a cofactor with C(x, eps) C(x~, -eps) = 1, as these have. For other maps they are
-the products of the irreducible factors of det dPhi(x), and of 1/det M(x). Source: celledoni-2019.
+the products of the irreducible factors of det dPhi(x), and of 1/det M(x), each times any number: which numbers there
+are is an eigenvalue problem, and they change with the scales of the variables. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product as product_of_lists
 from operator import sub
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz
+from flint import fmpq, fmpq_mpoly, fmpz, nmod
 
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
-from kahanmaps.algebra.modular_matrices import null_space
+from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.invariants.measures import jacobian_determinant_sides
@@ -181,12 +183,14 @@ class Sample:
     map: ModularMap
     pairs: list[tuple[Point, Point]]
     sides: list[list[tuple[int, int]]]  # by cofactor, then by point
+    up_to_numbers: bool  # cofactors are those that occur, times unknown numbers
 
     @classmethod
     def of(cls, map_: ModularMap, cofactors: Sequence[Cofactor], count: int) -> Sample:
         """So many points."""
         pairs = list(map_.pairs(count))
-        return cls(map_, pairs, [[one.sides(map_, x, image) for x, image in pairs] for one in cofactors])
+        sides = [[one.sides(map_, x, image) for x, image in pairs] for one in cofactors]
+        return cls(map_, pairs, sides, any(one.kind != "reversed" for one in cofactors))
 
     def values(self, product: CofactorProduct) -> list[tuple[int, int]]:
         """Numerator and denominator of a product, at each point."""
@@ -209,28 +213,84 @@ def cofactor_space(
     With a `model`, the space modulo another prime, they have no other monomials than its elements. The sample must have
     `points_needed`.
     """
-    dim, prime = sample.map.dim, sample.map.prime
-    terms = len(exponents_up_to(dim, degree))
-    places = range(terms) if model is None else model.places
-    rows = []
-    for (x, image), sides in zip(
-        sample.pairs[: points_needed(dim, degree, model)], sample.values(product), strict=False
-    ):
-        here, there = sample.map.moved(x, image, degree, sides)
-        row = list(map(sub, there, here))
-        rows.append(row if model is None else [row[k] for k in places])
-    vectors = [dict(zip(places, vector, strict=True)) for vector in null_space(rows, len(places), prime)]
-    whole = [[vector.get(k, 0) for k in range(terms)] for vector in vectors]
-    return DarbouxSpace.spanned_by(dim, degree, whole, prime)
+    places = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.places
+    here, there = _values(sample, product, degree, places)
+    rows = [list(map(sub, after, before)) for before, after in zip(here, there, strict=True)]
+    return _space(sample, degree, places, null_space(rows, len(places), sample.map.prime))
 
 
-def points_needed(dim: int, degree: int, model: DarbouxSpace | None = None) -> int:
-    """How many points a sample needs for polynomials of this degree, with the monomials of the model if there is one.
+def cofactor_spaces(
+    sample: Sample, product: CofactorProduct, degree: int, models: Sequence[DarbouxSpace] = ()
+) -> list[tuple[int, DarbouxSpace]]:
+    """The same for P(x~) = c C(x) P(x) with each number c that has any P, where cofactors are known up to numbers.
+
+    With several `models` there are no other monomials than in all of them. Numbers c that are not in the field of the
+    prime are left out, and of a cofactor that is no product of factors up to numbers, c is 1.
+    """
+    prime, terms = sample.map.prime, len(exponents_up_to(sample.map.dim, degree))
+    places = sorted({k for one in models for k in one.places}) if models else range(terms)
+    if not sample.up_to_numbers:
+        model = DarbouxSpace(sample.map.dim, degree, [v for one in models for v in one.basis]) if models else None
+        space = cofactor_space(sample, product, degree, model)
+        return [(1, space)] if space.basis else []
+    # As many points as unknowns give the matrix M with C M P = P(x~) there. M P = c P has to hold at others too, for
+    # M P, M M P, ... as well: K M^j P = 0, of which the first j leave next to nothing as a rule.
+    count = len(places)
+    before, after = _values(sample, product, degree, places)
+    M = matrix(before[:count], prime).solve(matrix(after[:count], prime))
+    K = matrix(after[count:], prime) - matrix(before[count:], prime) * M
+    entries = list[nmod]()
+    for _ in range(count // _SPARE + 2):
+        entries += K.entries()
+        K = K * M
+    basis, dimension = null_space([entries[k : k + count] for k in range(0, len(entries), count)], count, prime), -1
+    while basis and len(basis) != dimension:  # of the space the part that M keeps in it
+        dimension = len(basis)
+        moved = integers(matrix(basis, prime) * M.transpose())
+        inside = null_space(list(zip(*basis, *moved, strict=True)), 2 * dimension, prime)
+        basis = combine([weights[dimension:] for weights in inside], basis, prime)
+    if not basis:
+        return []
+    basis = echelon(basis, prime)
+    moved = integers(matrix(basis, prime) * M.transpose())
+    action = matrix([[row[k] for k in pivots(basis)] for row in moved], prime)
+    found = []
+    for factor, _ in action.charpoly().factor()[1]:
+        if factor.degree() == 1:
+            c = int(-factor[0] / factor[1])
+            shifted = [[entry - c * (i == j) for j, entry in enumerate(row)] for i, row in enumerate(integers(action))]
+            weights = null_space(list(zip(*shifted, strict=True)), len(basis), prime)
+            found.append((c, _space(sample, degree, places, combine(weights, basis, prime))))
+    return found
+
+
+def _values(
+    sample: Sample, product: CofactorProduct, degree: int, places: Sequence[int]
+) -> tuple[list[list[Any]], list[list[Any]]]:
+    """The values of monomials times C at the points, and at their images, both times the denominators of C."""
+    here, there = [], []
+    for (x, image), sides in zip(sample.pairs[: len(places) + _SPARE], sample.values(product), strict=False):
+        before, after = sample.map.moved(x, image, degree, sides)
+        here.append([before[k] for k in places])
+        there.append([after[k] for k in places])
+    return here, there
+
+
+def _space(sample: Sample, degree: int, places: Sequence[int], vectors: Sequence[Sequence[int]]) -> DarbouxSpace:
+    """The space that vectors on some monomials span."""
+    dim, entries = sample.map.dim, [dict(zip(places, vector, strict=True)) for vector in vectors]
+    whole = [[vector.get(k, 0) for k in range(len(exponents_up_to(dim, degree)))] for vector in entries]
+    return DarbouxSpace.spanned_by(dim, degree, whole, sample.map.prime)
+
+
+def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
+    """How many points a sample needs for polynomials of this degree, with the monomials of models if there are any.
 
     >>> points_needed(2, 3), points_needed(2, 3, DarbouxSpace(2, 3, [[1, 0, 1] + [0] * 7]))
     (18, 10)
     """
-    return (len(exponents_up_to(dim, degree)) if model is None else len(model.places)) + _SPARE
+    places = {k for model in models for k in model.places}
+    return (len(places) if models else len(exponents_up_to(dim, degree))) + _SPARE
 
 
 def search_cofactors(
@@ -240,27 +300,31 @@ def search_cofactors(
     wanted: int,
     max_degree: int,
     seconds: float,
-) -> Iterator[tuple[CofactorProduct, DarbouxSpace]]:
+) -> Iterator[tuple[CofactorProduct, bool, list[DarbouxSpace]]]:
     """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are found.
 
-    A space is new if the integrals of `known` and of those found before do not account for its own.
+    Spaces are new if the integrals of `known` and of those found before do not account for theirs. Those whose
+    cofactors are the product up to numbers come together, and this is said.
     """
     deadline = time.monotonic() + seconds
     found = list(known)
     independent = gradient_rank(map_, found)
     sample = Sample.of(map_, cofactors, points_needed(map_.dim, max_degree))
     candidates = products(cofactors, max_degree)
-    for degree in range(1, max_degree + 1):
-        for product in candidates:
-            if independent >= wanted or time.monotonic() > deadline:
-                return
-            if product.weight > degree + 1:
-                continue
-            space = cofactor_space(sample, product, degree)
-            if len(space.basis) < 2:
-                continue
-            more = gradient_rank(map_, [*found, space])
-            if more > independent:
-                independent = more
-                found.append(space)
-                yield product, space
+    # With the number 1 alone the work is a third, and often that is all.
+    numbers, degrees = (False, True)[: 1 + sample.up_to_numbers], range(1, max_degree + 1)
+    for up_to_numbers, degree, product in product_of_lists(numbers, degrees, candidates):
+        if independent >= wanted or time.monotonic() > deadline:
+            return
+        if product.weight > degree + 1:
+            continue
+        if up_to_numbers:
+            spaces = [one for _, one in cofactor_spaces(sample, product, degree)]
+        else:
+            spaces = [cofactor_space(sample, product, degree)]
+        spaces = [one for one in spaces if len(one.basis) > 1]
+        more = gradient_rank(map_, [*found, *spaces]) if spaces else independent
+        if more > independent:
+            independent = more
+            found += spaces
+            yield product, up_to_numbers, spaces

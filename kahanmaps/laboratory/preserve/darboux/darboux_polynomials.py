@@ -1,7 +1,7 @@
 """The discrete Darboux polynomials of a map: all P of bounded degree with P(x~) = C(x) P(x), for many C.
 
-C runs through the products of the cofactors in cofactors.py. A space of such P is listed unless products of elements of
-spaces listed before span it. Source: celledoni-2019.
+C runs through the products of the cofactors in cofactors.py, times numbers where these are known up to numbers. A space
+of such P is listed unless products of elements of spaces listed before span it. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.modular_matrices import echelon
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
@@ -30,17 +30,20 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
     CofactorProduct,
     Sample,
-    cofactor_space,
+    cofactor_spaces,
     points_needed,
     products,
 )
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
+from kahanmaps.laboratory.preserve.products import constants_of
 from kahanmaps.laboratory.preserve.results import Search
+from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
 
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
 _MOST_PRODUCTS = 2000
+Law = tuple[CofactorProduct, int]  # a product of cofactors, and the number that it is multiplied by, modulo a prime
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,8 @@ def darboux_polynomials(
     progress: Callable[[str], None] = lambda _: None,
 ) -> DarbouxSearch:
     """All discrete Darboux polynomials of degree at most `degree` whose cofactor is a product of the usual ones.
+
+    For maps that are no Kahan maps, the product times any number, which may contain the symbols and eps.
 
     Args:
         file: the system.
@@ -156,21 +161,21 @@ def _of_map(
         candidates = candidates[:_MOST_PRODUCTS]
     map_ = laboratory.maps[0]
     sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
-    known: dict[CofactorProduct, DarbouxSpace] = {}
+    spaces: dict[Law, DarbouxSpace] = {}
     for product in candidates:
         if time.monotonic() > deadline:
             reason = "the time was over before all products of cofactors were tried"
             break
         progress(f"cofactor {product.text(cofactors)}")
-        space = _without_constants(cofactor_space(sample, product, degree), product)
-        if space.basis:
-            known[product] = space
+        spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
+    known = {law: space for law, one in spaces.items() if (space := _without_constants(one)).basis}
     # Different products of cofactors may be the same function, and one of them may show that products span the space.
-    listed = [space for product, space in known.items() if _is_spanned_by_products(known, product, map_.prime)]
-    for product, space in known.items():
+    listed = [space for law, space in known.items() if _is_spanned_by_products(known, law, map_.prime)]
+    for law, space in known.items():
         if space not in listed:
             listed.append(space)
-            written = _written(laboratory, cofactors, product, space, deadline)
+            others = [one for other, one in spaces.items() if other[0] == law[0] and other != law]
+            written = _written(laboratory, cofactors, law[0], [spaces[law], *others], deadline)
             if isinstance(written, str):
                 reason = written
             else:
@@ -189,22 +194,20 @@ def _of_flow(laboratory: Laboratory, degree: int, seconds: float, found: list[Da
     return "" if known.degree >= degree else f"degrees above {known.degree} are not settled: {known.reason}"
 
 
-def _without_constants(space: DarbouxSpace, product: CofactorProduct) -> DarbouxSpace:
+def _without_constants(space: DarbouxSpace) -> DarbouxSpace:
     """For C = 1 the constants solve the equation: they are left out."""
-    if any(product.powers):
-        return space
     return DarbouxSpace(space.dim, space.degree, [vector for vector in space.basis if any(vector[1:])])
 
 
-def _is_spanned_by_products(known: dict[CofactorProduct, DarbouxSpace], product: CofactorProduct, prime: int) -> bool:
+def _is_spanned_by_products(known: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:
     """Whether products P Q of elements of other spaces, whose cofactors multiply to the given one, span its space."""
-    space = known[product]
-    by_powers = {one.powers: other for one, other in known.items() if one != product}
+    space, (product, c) = known[law], law
+    others = {(one.powers, number): other for (one, number), other in known.items() if (one, number) != law}
     rows = []
-    for powers, left in by_powers.items():
-        rest = tuple(a - b for a, b in zip(product.powers, powers, strict=True))
-        right = by_powers.get(rest)
-        if right is not None and powers <= rest:
+    for (powers, number), left in others.items():
+        rest = tuple(a - b for a, b in zip(product.powers, powers, strict=True)), c * pow(number, -1, prime) % prime
+        right = others.get(rest)
+        if right is not None and (powers, number) <= rest:
             rows += [product_of(P, Q, space.dim, space.degree, prime) for P in left.basis for Q in right.basis]
     return len(echelon([row for row in rows if row is not None], prime)) == len(space.basis)
 
@@ -213,28 +216,51 @@ def _written(
     laboratory: Laboratory,
     cofactors: Sequence[Cofactor],
     product: CofactorProduct,
-    model: DarbouxSpace,
+    spaces: Sequence[DarbouxSpace],
     deadline: float,
 ) -> DarbouxPolynomials | str:
-    """A space in closed form, or why there is none."""
+    """The first of spaces in closed form, or why there is none; the cofactors of the others differ by numbers."""
+    text, bases, reason = product.text(cofactors), list[list[fmpq_mpoly]](), ""
+    # The others tell spaces that look alike apart; where they are conjugate they have no formulas themselves.
+    for together in [spaces, spaces[:1]][len(spaces) == 1 :]:
+        step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
+        search = Found([step], [list(together)])
+        bases, reason = bases_of(laboratory, laboratory.primes[0], search, cofactors, deadline)
+        if bases:
+            break
+    else:
+        return f"no closed form for the cofactor {text}: {reason}"
+    polynomials = tuple(P for P in bases[0] if not P.is_constant())
 
-    def spaces_on(map_: ModularMap) -> list[DarbouxSpace]:
-        sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree, model))
-        return [_without_constants(cofactor_space(sample, product, model.degree, model), product)]
+    def number(map_: ModularMap) -> list[int]:
+        """The number by which the cofactor differs from the product."""
+        sample, field = Sample.of(map_, cofactors, 1), GF(map_.prime)
+        [(above, below)], [pair] = sample.values(product), sample.pairs
+        places = ([field.convert(c) for c in (*x, *map_.values, map_.eps)] for x in pair)
+        before, after = (int(evaluate(polynomials[0], field, place)) for place in places)
+        return [after * below * pow(before * above, -1, map_.prime) % map_.prime]
 
-    forms = laboratory.formulas([model], spaces_on, deadline)
-    if forms.bases is None:
-        return f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
-    polynomials = tuple(forms.bases[0])
-    outcomes = [_judged(laboratory, cofactors, product, P) for P in polynomials]
+    [c] = constants_of(laboratory, number)
+    if c is None:
+        return f"no closed form for the number in front of the cofactor {text}"
+    outcomes = [_judged(laboratory, cofactors, product, c, P) for P in polynomials]
     if not all(outcome.holds for outcome in outcomes):
-        return f"a formula for the cofactor {product.text(cofactors)} did not pass as an identity"
+        return f"a formula for the cofactor {text} did not pass as an identity"
     verdict = Verdict.PROVED if all(one is Verdict.PROVED for one in outcomes) else Verdict.SUPPORTED
-    return DarbouxPolynomials(product.text(cofactors), polynomials, verdict)
+    factor = format_rational_function(c)
+    if factor != "1":
+        text = f"{factor if c.is_polynomial and len(c.numerator) == 1 else f'({factor})'}*{text}".removesuffix("*1")
+    return DarbouxPolynomials(text, polynomials, verdict)
 
 
-def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> Verdict:
-    """Whether P(x~) = P(x) prod C^k, the denominators multiplied out."""
+def _judged(
+    laboratory: Laboratory,
+    cofactors: Sequence[Cofactor],
+    product: CofactorProduct,
+    c: RationalFunction,
+    P: fmpq_mpoly,
+) -> Verdict:
+    """Whether P(x~) = c P(x) prod C^k, the denominators multiplied out."""
     map_, n = laboratory.map, laboratory.map.dim
 
     def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides:
@@ -242,6 +268,8 @@ def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: Cofa
         over = map_.at(eps, field, values)
         image = over.step(point)
         left, right = evaluate(P, field, (*image, *values, eps)), evaluate(P, field, (*place, eps))
+        left = left * evaluate(c.denominator, field, (*place, eps))
+        right = right * evaluate(c.numerator, field, (*place, eps))
         for one, power in zip(cofactors, product.powers, strict=True):
             above, below = one.over(over, point, image, values) if power else (field.one, field.one)
             for _ in range(power):
@@ -252,6 +280,7 @@ def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: Cofa
         map_.symbols,
         map_.subject,
         P,
+        c,
         [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)],
     )
     identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)

@@ -215,10 +215,10 @@ class _Search:
                 here = [list(map(list, key)) for key in {tuple(map(tuple, space)) for space in pairs if space}]
             common = here
             if all(len(space) == 1 for space in common):
-                return [_monic(*space, flow.prime) for space in common], True
+                return [_monic(vector, flow.prime) for [vector] in common], True
             if time.monotonic() > deadline:
                 break
-        return [_monic(*space, flow.prime) for space in common if len(space) == 1], False
+        return [_monic(space[0], flow.prime) for space in common if len(space) == 1], False
 
     def _lifts(self, residues: Sequence[int], modulus: int) -> bool:
         """Whether the simplest fractions with these residues are the coefficients of a polynomial: it is added."""

@@ -1,0 +1,246 @@
+"""Answers go along with x -> D x, permutations of the variables and of time: every search on a system and its images.
+
+D has entries up to 10^6 and down to 1/10^6. What a search finds for an image is moved back to the variables of the
+system, exactly, and is what it finds there.
+"""
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, primitive_part, ring
+from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.sparse_relations import sparse_relations
+from kahanmaps.laboratory.singular.singularities import singularities
+from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+
+FIELDS = {
+    "lorenz": ["10*(y - x)", "x*(28 - z) - y", "x*y - 20*z"],  # x^2 - 20 z
+    "euler": ["y*z", "-2*x*z", "x*y"],
+    "volterra": ["x*(y - z)", "y*(z - x)", "z*(x - y)"],
+    "periodic": ["x*(y - w)", "y*(z - x)", "z*(w - y)", "w*(x - z)"],
+    "conjugate": ["x^2 + 2*y^2 - 1", "2*x*y"],  # conjugate lines of special members of a pencil
+    "double": ["(x + 3*y)^2 - 3*x*y", "x*y"],  # x + 3 y, and y = 0 twice
+    "predators": ["x*(1 - y)", "y*(x - 1)"],
+    "weighted": ["y", "x^2"],
+}
+MAPS = {
+    "lyness": ["y", "(y + 5)/x"],
+    "todd": ["y", "z", "(3 + y + z)/x"],
+    "fibonacci": ["y", "x*y"],
+}
+D = [Fraction(100000), Fraction(1, 7), Fraction(3, 10**6), Fraction(1000, 999)]
+
+
+@dataclass(frozen=True)
+class Image:
+    """An image of a system: y_place[i] = scale[i] x_i, and time runs `speed` times as fast."""
+
+    file: SystemFile
+    scale: list[Fraction]
+    place: list[int]
+    speed: Fraction
+
+    def back(self, function: RationalFunction | fmpq_mpoly) -> RationalFunction:
+        """A function of y and eps as one of x and eps."""
+        if isinstance(function, fmpq_mpoly):
+            function = RationalFunction(function, function.context().constant(1))
+        context = function.numerator.context()
+        gens, moved = context.gens(), list(context.gens())
+        for i, (place, c) in enumerate(zip(self.place, self.scale, strict=True)):
+            moved[place] = gens[i] * fmpq(c.numerator, c.denominator)
+        if len(gens) > len(self.place):
+            moved[-1] = gens[-1] / fmpq(self.speed.numerator, self.speed.denominator)
+        return RationalFunction(*(P.compose(*moved, ctx=context) for P in (function.numerator, function.denominator)))
+
+    @property
+    def matrix(self) -> fmpq_mat:
+        """y = matrix x."""
+        M = fmpq_mat(len(self.place), len(self.place))
+        for i, (place, c) in enumerate(zip(self.place, self.scale, strict=True)):
+            M[place, i] = fmpq(c.numerator, c.denominator)
+        return M
+
+
+def image_of(name: str, how: str) -> Image:
+    """The system itself ("same"), or one of its images."""
+    formulas = FIELDS.get(name) or MAPS[name]
+    names = ["x", "y", "z", "w"][: len(formulas)]
+    n = len(names)
+    scale = D[:n] if how == "scaled" else [Fraction(1)] * n
+    place = [(i + 1) % n for i in range(n)] if how == "permuted" else list(range(n))
+    speed = Fraction(10**6 + 3, 7) if how == "faster" else Fraction(1)
+    old = {x: f"({names[place[i]]}/({scale[i]}))" for i, x in enumerate(names)}
+    moved = [""] * n
+    for i, text in enumerate(formulas):
+        inside = re.sub("[a-z]", lambda match: old[match[0]], text)
+        moved[place[i]] = f"({scale[i] * speed})*({inside})"
+    section = "[system]\nrhs" if name in FIELDS else "[map]\nimage"
+    return Image(parse_system(f"variables = {names}\n{section} = {moved}"), scale, place, speed)
+
+
+def primitive(P: fmpq_mpoly) -> str:
+    """A polynomial up to a factor."""
+    return str(primitive_part(P)[1])
+
+
+def span(polynomials) -> str:
+    """The space of polynomials, the same text for each basis."""
+    monomials = sorted({tuple(m) for P in polynomials for m in P.monoms()})
+    return f"{monomials} {fmpq_mat([[P[m] for m in monomials] for P in polynomials]).rref()[0]}"
+
+
+HOW = ["scaled", "permuted", "faster"]
+
+
+def cases(*names):
+    return [(name, how) for name in names for how in HOW if name in FIELDS or how != "faster"]
+
+
+@pytest.mark.parametrize(("name", "how"), cases("lorenz", "euler", "conjugate", "double", "weighted"))
+def test_darboux_polynomials_of_flows(name, how):
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (darboux_polynomials(one.file, 2, flow=True) for one in (same, image))
+    assert (found.reason, moved.reason) == ("", "")
+    wanted = {primitive(P) for space in found.spaces for P in space.polynomials}
+    assert {primitive(image.back(P).numerator) for space in moved.spaces for P in space.polynomials} == wanted
+    if name != "weighted":  # and with a wrong scale they are no others
+        wrong = Image(image.file, [*image.scale[:-1], image.scale[-1] * 2], image.place, image.speed)
+        assert {primitive(wrong.back(P).numerator) for one in moved.spaces for P in one.polynomials} != wanted
+
+
+@pytest.mark.parametrize(("name", "how"), cases("euler", "volterra", "lyness", "todd", "fibonacci"))
+def test_darboux_polynomials_of_maps(name, how):
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (darboux_polynomials(one.file, 3) for one in (same, image))
+    assert (found.reason, moved.reason) == ("", "")
+    assert found.spaces
+    wanted = sorted(span(space.polynomials) for space in found.spaces)
+    back = [[image.back(P).numerator for P in space.polynomials] for space in moved.spaces]
+    assert sorted(map(span, back)) == wanted
+    assert all(space.verdict.holds for space in moved.spaces)
+
+
+@pytest.mark.parametrize("flow", [False, True])
+@pytest.mark.parametrize(("name", "how"), cases("lorenz", "euler", "volterra", "conjugate", "lyness", "todd"))
+def test_integrals(name, how, flow):
+    """As many as there, and moved back they are integrals there: all is proved."""
+    if flow and name in MAPS:
+        pytest.skip("a map has no flow")
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (find_integrals(one.file, flow=flow, max_degree=4) for one in (same, image))
+    assert (len(found.integrals), found.reason) == (len(moved.integrals), moved.reason)
+    assert len(found.in_time) == len(moved.in_time)
+    laboratory = Laboratory(same.file, flow=flow)
+    assert all(laboratory.verdict_on(image.back(one.function))[0].holds for one in moved.integrals)
+    for one in moved.in_time:
+        back, speed = image.back(one.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
+        factor = RationalFunction(one.factor.numerator / speed, one.factor.denominator)
+        assert laboratory.verdict_on(back, factor=factor)[0].holds
+    if how == "scaled" and moved.integrals and not flow:  # what is not moved back is none
+        refuted = [laboratory.verdict_on(one.function)[0].holds for one in moved.integrals]
+        assert not all(refuted)
+
+
+@pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "double", "predators", "lyness", "todd"))
+def test_densities(name, how):
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (find_densities(one.file).densities for one in (same, image))
+    assert found
+    wanted = sorted(primitive(one.function.numerator) for one in found)
+    assert sorted(primitive(image.back(one.function).numerator) for one in moved) == wanted
+
+
+@pytest.mark.parametrize(("name", "how"), cases("volterra", "predators", "conjugate", "lyness"))
+def test_poisson_tensors(name, how):
+    """{y_i, y_j} is scale_i scale_j {x_i, x_j}: all tensors together span the same space."""
+    same, image = image_of(name, "same"), image_of(name, how)
+    spaces = []
+    for one, tensors in ((same, find_poisson(same.file, 3)), (image, find_poisson(image.file, 3))):
+        n, entries = len(one.place), []
+        context = ring([*"xyzw"[:n], "eps", *(f"d{i}" for i in range(n))])
+        d = context.gens()[n + 1 :]
+        for found in tensors.tensors:
+            rows, total = found.tensor.rows, context.constant(0)
+            for i in range(n):
+                for j in range(i):
+                    back = one.back(rows[one.place[i]][one.place[j]])
+                    assert back.denominator.is_constant()
+                    c = one.scale[i] * one.scale[j]
+                    moved = back.numerator.compose(*context.gens()[: n + 1], ctx=context) * d[i] * d[j]
+                    total += moved / fmpq(c.numerator, c.denominator) / back.denominator.leading_coefficient()
+            entries.append(primitive_part(total)[1])
+        spaces.append(sorted(str(one if one.leading_coefficient() > 0 else -one) for one in entries))
+    assert spaces[0]
+    assert spaces[0] == spaces[1]
+
+
+@pytest.mark.parametrize(("name", "how"), cases("euler", "volterra", "periodic", "predators", "weighted"))
+def test_symmetries(name, how):
+    """Matrix and all: S for y is M S M^-1; in dimension 4 only permutations of scaled variables are sought."""
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (linear_symmetries(one.file.system) for one in (same, image))
+    assert (found.order, found.reversing_order) == (moved.order, moved.reversing_order)
+    assert len(found.infinitesimal) == len(moved.infinitesimal)
+    M = image.matrix
+    wanted = {(str(M * t.S * M.inv()), t.reversing) for t in (*found.signed, *found.others)}
+    assert {(str(t.S), t.reversing) for t in (*moved.signed, *moved.others)} == wanted
+    assert len(wanted) > 1
+
+
+@pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "predators", "double"))
+def test_commuting_fields(name, how):
+    """g for y is M g(M^-1 y), and runs faster as f does."""
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (commuting_systems(one.file.system, "quadratic", seconds=300) for one in (same, image))
+    assert found.complete
+    assert moved.complete
+    assert len(found.families) == len(moved.families)
+    assert found.dimension == moved.dimension
+    inverse, speed = image.matrix.inv(), fmpq(image.speed.numerator, image.speed.denominator)
+    back = {
+        str(g.system.composed(image.matrix, [fmpq(0)] * len(image.place)).transformed(inverse).scaled(1 / speed))
+        for g in moved.solutions
+    }
+    assert back == {str(g.system) for g in found.solutions}
+
+
+@pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "weighted", "lyness", "todd", "fibonacci"))
+def test_degrees_and_singularities(name, how):
+    same, image = image_of(name, "same"), image_of(name, how)
+    found, moved = (degree_growth(one.file.map, max_terms=8).degrees for one in (same, image))
+    length = min(len(found), len(moved))
+    assert length >= 5
+    assert found[:length] == moved[:length]
+    eps = Fraction(2, 7)
+    runs = singularities(same.file.map, eps, steps=12), singularities(image.file.map, eps / image.speed, steps=12)
+    assert runs[0].shape == runs[1].shape
+    assert runs[0].verdict == runs[1].verdict
+
+
+@pytest.mark.parametrize("how", ["scaled", "permuted"])
+def test_relations_have_their_numbers_at_every_scale(how):
+    """Lyness' map has no eps: no coefficient is a function of eps, however long it is."""
+    image = image_of("lyness", how)
+    (relation,) = sparse_relations(Laboratory(image.file).maps, 3, ["x", "y"])
+    assert (relation.functions_of_eps, relation.integrals) == ((), ("c1",))
+
+
+def test_a_product_of_two_systems_has_the_polynomials_of_both():
+    """x + 2100000 y of one factor and those of a Riccati equation with rational fixed points at all scales."""
+    scaled = image_of("double", "scaled")
+    rhs = [*(str(f) for f in scaled.file.system.rhs), "10^6*z^2 - 3*z"]
+    product = parse_system(f"variables = ['x', 'y', 'z']\n[system]\nrhs = {rhs}")
+    found = darboux_polynomials(product, 2, flow=True)
+    assert found.reason == ""
+    assert {str(P) for space in found.spaces for P in space.polynomials} == {"x + 2100000*y", "y", "z", "1000000*z - 3"}
