@@ -6,9 +6,12 @@ random points, and P divides its minors, the extactic determinants (pereira-2001
 line modulo a prime. A P of degree d has there d zeros in all, conjugate ones in one irreducible factor, and is one of
 the polynomials that vanish along the solutions from all of them. So it is in the space of one of the choices of factors
 whose degrees add up to d: those of a line, or what those of several lines have in common. Where these spaces are 0
-there is no P; where one is a line, P is lifted to Q, and whether it divides f . grad P is decided exactly. One that is
-not rational has residues only modulo some primes, a rational one modulo all: what one prime is not enough for is joined
-with what is found modulo the next, and a degree is settled by a prime that leaves nothing without a polynomial over Q.
+there is no P; where one is a line, P is lifted to Q, and whether it divides f . grad P is decided exactly.
+
+Lifted by Newton's iteration: P and K modulo p are a solution of f . grad P = K P, mostly a simple one, so that they are
+known modulo powers of p. There the coefficients show as rational, or as algebraic numbers: then P is one of several
+conjugate polynomials, and its product with the others is of a higher degree. What is not lifted so is joined with what
+is found modulo the next prime, and a degree is settled by a prime that leaves nothing without an answer.
 
 Weights w of the variables are a grading where all terms x^a of all x_i' have the same w . a - w_i. The cofactor K of a
 P is homogeneous then, and all homogeneous parts of P have it: their quotients are integrals, and a P that belongs to
@@ -23,16 +26,16 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
-from math import comb, inf
+from math import comb, inf, lcm
 from operator import mul
 
-from flint import fmpq_mat, fmpq_mpoly, nmod_mat, nmod_poly
+from flint import fmpq_mat, fmpq_mpoly, fmpz_mat, fmpz_poly, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
-from kahanmaps.algebra.modular_matrices import combine, matrix, null_space, rank
-from kahanmaps.algebra.polynomials import degree_in, evaluate, primitive_part
+from kahanmaps.algebra.modular_matrices import combine, echelon, matrix, null_space, pivots, rank
+from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.modular_points import Point, exponents_up_to, interpolated
@@ -46,6 +49,8 @@ _MOST_LISTED = 20_000  # monomials up to a degree, before they are sorted by the
 _SPARE = 8  # orders of a series beyond the number of monomials
 _MOST_CHOICES = 400  # of zeros on a line, and of pairs of choices
 _PRIMES = 12  # of which the first mostly suffices
+_PRECISION = 24  # powers of a prime: 1,464 bits
+_MOST_CONJUGATES = 8
 _LINES = 4  # modulo one of them
 
 Vectors = list[list[int]]
@@ -184,7 +189,9 @@ class _Search:
             except BadPrime:
                 continue
             vectors, are_all = self._modulo(flow, deadline)
-            missing = [vector for vector in vectors if not self._lifts(vector, prime)]
+            missing = [
+                vector for vector in vectors if not self._lifts(vector, prime) and not self._is_known(vector, flow)
+            ]
             if not are_all:
                 continue
             pairs = [(chinese(old, m, new, prime), m * prime, new) for old, m in joined for new in missing]
@@ -233,17 +240,92 @@ class _Search:
             self.found[str(P)] = P
         return True
 
-    def _is_special(self, P: fmpq_mpoly) -> bool:
-        """Whether P stands out modulo a fresh prime: where a pencil has a member for every number, any residue lifts.
+    def _is_known(self, vector: Sequence[int], flow: ModularFlow) -> bool:
+        """Whether a higher power of the prime shows the polynomial: it is added, or has conjugate ones."""
+        residues = self._newton(vector, flow.prime)
+        modulus = flow.prime**_PRECISION
+        return bool(residues) and (self._lifts(residues, modulus) or any(_is_irrational(c, modulus) for c in residues))
 
-        So x^2 + y^2 - 1 + 2 i y would, a product of conjugate lines of two special members.
+    def _newton(self, vector: Sequence[int], p: int) -> list[int]:
+        """The coefficients modulo a power of p, of a P known modulo p; empty where that is no simple solution."""
+        field, context = self.field, self.field.rhs[0].context()
+        below = lcm(*(int(common_denominator(f)) for f in field.rhs))
+        f = [component * below for component in field.rhs]
+        cofactor = [context.from_dict({m: 1}) for m in exponents_up_to(field.dim, max(0, field.degree - 1))]
+        terms = [context.from_dict({m: 1}) for m in self.monomials]
+
+        def total(weights: Sequence[int], polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+            return sum((c * P for c, P in zip(weights, polynomials, strict=True) if c), context.constant(0))
+
+        def along(P: fmpq_mpoly) -> fmpq_mpoly:
+            return sum((P.derivative(k) * g for k, g in enumerate(f)), context.constant(0))
+
+        def solved(columns: Sequence[fmpq_mpoly], right: fmpq_mpoly) -> list[int] | None:
+            """The weights of the columns that add up to the right-hand side modulo p, if that is one vector."""
+            rows = {tuple(m) for column in (*columns, right) for m in column.monoms()}
+            table = [[int(column[m].p) % p for column in (*columns, right)] for m in sorted(rows)]
+            found = echelon(table, p)
+            is_one = pivots(found) == list(range(len(columns)))
+            return [row[-1] for row in found] if is_one else None
+
+        first = next(k for k, c in enumerate(vector) if c)
+        P, P_known = total(vector, terms), list(vector)
+        K_known = solved([P * k for k in cofactor], along(P))
+        if K_known is None:
+            return []
+        K = total(K_known, cofactor)
+        others = [k for k in range(len(terms)) if k != first]
+        columns = [*(along(terms[k]) - K * terms[k] for k in others), *(-P * k for k in cofactor)]
+        modulus = p
+        for _ in range(_PRECISION - 1):
+            P = total(P_known, terms)
+            rest = along(P) - total(K_known, cofactor) * P
+            if any(int(c.p) % modulus for c in rest.coeffs()):
+                return []
+            step = solved(columns, rest / -modulus)
+            if step is None:
+                return []
+            for k, c in zip(others, step, strict=False):
+                P_known[k] += c * modulus
+            K_known = [a + c * modulus for a, c in zip(K_known, step[len(others) :], strict=True)]
+            modulus *= p
+        return P_known
+
+    def _is_special(self, P: fmpq_mpoly) -> bool:
+        """Whether more than usual vanishes along the solution from a zero of P, modulo a fresh prime where it has one.
+
+        Where a pencil has a member for every number, any residue lifts to a member: so x^2 + y^2 - 1 + 2 i y would, a
+        product of conjugate lines of two special members.
         """
         while True:
             with suppress(BadPrime):
                 flow = ModularFlow(self.field, random_prime(self.rng), (), self.rng.getrandbits(64))
                 line = _Line(flow, self.degree, self.support, ())
-                along = line.restricted(P)
-                return len(line.special(along)) == len(along.factor()[1])
+                zeros = [factor for factor, _ in line.restricted(P).factor()[1] if factor.degree() == 1]
+                if zeros:
+                    return bool(line.special(zeros[0]))
+
+
+def _is_irrational(residue: int, modulus: int) -> bool:
+    """Whether an algebraic number of degree 2 to 8, of simple coefficients, has this residue, and no rational one.
+
+    >>> p = 7**60
+    >>> root = 3  # of x^2 - 2 modulo 7
+    >>> for _ in range(6):
+    ...     root = (root - (root**2 - 2) * pow(2 * root, -1, p)) % p
+    >>> [_is_irrational(n, p) for n in (root, 5**20 % p, 11**60 % p)]
+    [True, False, False]
+    """
+    for degree in range(2, _MOST_CONJUGATES + 1):
+        powers = [pow(residue, k, modulus) for k in range(1, degree + 1)]
+        rows = [[modulus, *[0] * degree]]
+        rows += [[-power, *(int(k == j) for j in range(1, degree + 1))] for k, power in enumerate(powers, 1)]
+        shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
+        # By chance the entries have 1/(degree + 1) of the bits of the modulus.
+        if max(map(abs, shortest)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
+            factors = [one for one, _ in fmpz_poly(shortest).factor()[1] if one(residue) % modulus == 0]
+            return bool(factors) and all(one.degree() > 1 for one in factors)
+    return False
 
 
 def _monic(vector: Sequence[int], prime: int) -> list[int]:
