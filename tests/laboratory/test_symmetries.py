@@ -96,6 +96,22 @@ def test_a_translation_is_found_where_it_is_needed():
     assert [t.text for t in found.symmetries] == ["(x, y) -> (x, y)", "(x, y) -> (y - 1, x + 1)"]
 
 
+@pytest.mark.parametrize(
+    ("rhs", "actions"),
+    [
+        (["x^2", "4*y^2"], ["(x, y) -> (x, y)", "(x, y) -> (4*y, x/4)"]),
+        (["y^2", "2*x^2"], ["(x, y) -> (x, y)"]),  # (a y, b x) with b^2 = 2 a, b = 2 a^2: a^3 = 1/2
+        (["y^2", "8*x^2"], ["(x, y) -> (x, y)", "(x, y) -> (y/2, 2*x)"]),
+        (["x^2 + 6000000*x*y", "2000000*y^2 + 3*x*y"], ["(x, y) -> (x, y)", "(x, y) -> (2000000*y, x/2000000)"]),
+        (["x^2 + 6000000*x*y", "2000000*y^2 + 3*x*y + y"], ["(x, y) -> (x, y)"]),
+    ],
+)
+def test_permutations_of_scaled_variables(rhs, actions):
+    """With and without a rational scale; the last one is spoiled by a linear term."""
+    found = linear_symmetries(system("x y", *rhs))
+    assert {t.text for t in found.signed if not t.reversing} == set(actions)
+
+
 def test_matrices_that_are_no_signed_permutations():
     """Conjugate a system with the group of order 12 of the triangle by a shear: the matrices are still found."""
     f = load("zander_111", {}).system
