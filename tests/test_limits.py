@@ -281,6 +281,12 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "1",
     ),
     (
+        "laboratory.preserve.hirota_kimura.MAX_INDEPENDENT",
+        10,
+        lambda: str(len(orbit_profile(Laboratory(load("euler_top")).maps).nullities)),
+        "1",
+    ),
+    (
         "laboratory.preserve.inherited.MAX_DIMENSION",
         4,
         lambda: f"[{inherited_integrals(load('henon_heiles').system).text}]",
@@ -366,6 +372,7 @@ def test_the_degrees_that_are_tried_in_each_dimension_are_those_of_the_documenta
     "promise",
     [
         f"at most {hirota_kimura.MAX_UNKNOWNS} monomials",
+        f"leave more than {hirota_kimura.MAX_INDEPENDENT} monomials",
         f"(at most {densities._MAX_DEGREE}, and {densities._MAX_UNKNOWNS} monomials)",
         f"Where they span more than {darboux_spaces.LARGEST_SPAN} dimensions",
         f"multiplied out up to dimension {expand.MAX_DIMENSION} within",

@@ -4,6 +4,7 @@ import pytest
 from helpers import DIMENSION
 from search_helpers import system
 
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
@@ -15,6 +16,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     CofactorProduct,
     Sample,
     cofactor_space,
+    denominators_among,
     determinant_factors,
     determinant_polynomial,
     points_needed,
@@ -71,14 +73,33 @@ def test_polynomials_with_a_given_cofactor():
     assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
 
 
-def test_the_search_ends_when_enough_is_found_or_the_time_is_over():
+def test_the_search_ends_when_enough_is_known():
     laboratory = Laboratory(system("x y", "x", "y"))
     map_, known = laboratory.maps[0], laboratory.cofactors()
-    [(product, _, [space])] = search_cofactors(map_, known, [], 1, 3, 10.0)
+    [(product, _, [space])] = search_cofactors(map_, known, [], [], 1, 3).spaces
     assert (product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
-    assert list(search_cofactors(map_, known, [space], 1, 3, 10.0)) == []
-    assert list(search_cofactors(map_, known, [], 1, 3, -1.0)) == []
-    assert list(search_cofactors(map_, known, [], 0, 3, 10.0)) == []
+    assert search_cofactors(map_, known, [], [space], 1, 3).spaces == []
+    assert search_cofactors(map_, known, [], [], 1, 3, deadline=0.0).spaces == []
+    assert search_cofactors(map_, known, [], [], 0, 3).spaces == []
+
+
+def test_products_that_are_spanned_by_rows():
+    # the rows of an echelon form on 1, x, y, x^2, x y, y^2
+    places = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (2, 0): 3, (1, 1): 4, (0, 2): 5}
+    rows = {1: [0, 1, 0, 0, 5, 0], 3: [0, 0, 0, 1, 0, 0]}
+    x, xy = {(1, 0): 1}, {(1, 0): 3, (1, 1): 15}
+    assert module._product([x, xy], (2, 0), 101) == {(2, 0): 1}
+    assert module._product([x, {(1, 0): 1, (0, 0): 1}], (0, 2), 101) == {(0, 0): 1, (1, 0): 2, (2, 0): 1}
+    assert [module._is_spanned(one, places, rows, 101) for one in (x, xy, {(2, 0): 7}, {(0, 0): 1})] == [
+        *(False, True, True, False)
+    ]
+
+
+@pytest.mark.parametrize(("most", "names"), [(84, ["x", "y", "x + y"]), (83, ["x", "y"])])
+def test_of_many_denominators_the_first_are_taken(most, names, monkeypatch):
+    monkeypatch.setattr(module, "_MAX_DENOMINATORS", most)
+    x, y = ring(["x", "y"]).gens()
+    assert [one.name for one in denominators_among([x, y, x + y], 2)] == names
 
 
 @pytest.mark.parametrize(("digits", "is_written"), [(800, True), (2400, False)])

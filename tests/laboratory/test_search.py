@@ -1,5 +1,6 @@
 """A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only."""
 
+from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -12,15 +13,17 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.closed_forms import closed_forms
+from kahanmaps.laboratory.preserve.darboux import cofactors
+from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among, search_cofactors
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
-from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.products import candidates
+from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search, take_relations
 
 
-def searched(file, eps=None, seconds=30.0):
+def searched(file, eps=None):
     laboratory = Laboratory(file, (), eps)
-    known = laboratory.cofactors()
-    return laboratory, known, search(laboratory.maps[0], orbit_profile(laboratory.maps), known, seconds)
+    return laboratory, search(laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors())
 
 
 @pytest.mark.parametrize(
@@ -32,12 +35,12 @@ def searched(file, eps=None, seconds=30.0):
     ],
 )
 def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
-    laboratory, known, found = searched(load(name))
+    laboratory, found = searched(load(name))
     assert [step.kind for step in found.steps] == kinds
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == independent
     assert not may_be_conjugate(found)
     reference, second = laboratory.primes[0], laboratory.maps[1]
-    again = repeat(found, second, known, reference)
+    again = repeat(found, second, reference)
     assert again is not None
     assert [[len(space.basis) for space in group] for group in again.spaces] == [
         [len(space.basis) for space in group] for group in found.spaces
@@ -52,59 +55,102 @@ def test_cofactors_alone_give_the_three_integrals_of_lyness_of_order_five():
     variables = ["x1", "x2", "x3", "x4", "x5"]
     laboratory = Laboratory(parse_system(f"variables = {variables}\n[map]\nimage = {image}\ninverse = {inverse}"))
     profile = SimpleNamespace(nullities=(), codimension=3)
-    found = search(laboratory.maps[0], profile, laboratory.cofactors(), 60.0)
+    found = search(laboratory.maps[0], profile, laboratory.cofactors())
     assert [(step.kind, step.degree) for step in found.steps] == [("cofactor", 6)]
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == 3
 
 
-def calls_of_a_search(monkeypatch, nullities, wanted=1, by_relations=0, by_cofactors=0):
-    """The degrees whose relations are taken and what is told, with stand-ins for the work."""
-    taken, told, independent = [], [], [0]
+# Recurrences with Laurent polynomials for integrals: x_{n+N} = 3/(x_{n+1} ... x_{n+N-1}) - x_n - ... - x_{n+N-1}.
+FOURTH_ORDER = ("a b c d", ["b", "c", "d", "3/(b*c*d) - a - b - c - d"])
+FIFTH_ORDER = ("a b c d e", ["b", "c", "d", "e", "3/(b*c*d*e) - a - b - c - d - e"])
 
-    def relations(map_, degree, *_):
+
+def recurrence(names, image):
+    return parse_system(f"variables = {names.split()}\n[map]\nimage = {image}")
+
+
+@pytest.mark.parametrize(
+    ("map_", "origins"),
+    [
+        (FOURTH_ORDER, ["denominator b*c", "common cofactor 1"]),
+        (FIFTH_ORDER, ["denominator b*d", "denominator b*c*d", "common cofactor 1"]),
+    ],
+)
+def test_laurent_polynomials_are_found_without_the_span_of_the_relations(map_, origins, monkeypatch):
+    monkeypatch.setattr(module, "darboux_spaces", lambda *_: pytest.fail("the relations span too many dimensions"))
+    laboratory = Laboratory(recurrence(*map_))
+    known = laboratory.cofactors()
+    profile, dim = orbit_profile(laboratory.maps), laboratory.map.dim
+    assert profile.codimension == len(origins)
+    over = denominators_among(candidates(laboratory, known), dim)
+    found = search(laboratory.maps[0], profile, known, over)
+    assert [step.text for step in found.steps] == origins
+    assert gradient_rank(laboratory.maps[0], found.all_spaces) == len(origins)
+    # Without the variables for denominators only the polynomial is found.
+    with pytest.raises(pytest.fail.Exception):
+        search(laboratory.maps[0], profile, known)
+
+
+def test_too_much_work_ends_the_search_with_the_degree_before(monkeypatch):
+    laboratory = Laboratory(recurrence(*FOURTH_ORDER))
+    known = laboratory.cofactors()
+    over = denominators_among(candidates(laboratory, known), 4)
+    every = search_cofactors(laboratory.maps[0], known, over, [], 2, 6)
+    assert (every.degree, len(every.spaces)) == (5, 2)
+    monkeypatch.setattr(cofactors, "_MAX_WORK", 5_000)
+    some = search_cofactors(laboratory.maps[0], known, over, [], 2, 6)
+    assert (some.degree, some.spaces) == (3, [])
+    late = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, deadline=0.0)
+    assert (late.degree, late.spaces) == (2, [])  # no relation before degree 3, and nothing to try
+
+
+def degrees_whose_relations_are_taken(monkeypatch, nullities, largest, answers=(), wanted=1, by_relations=0):
+    """With stand-ins for the work; an answer is the number of spaces, None for too many dimensions."""
+    taken, independent, waiting = [], [0], list(answers)
+
+    def spaces(map_, degree, known, most):
+        assert most == largest
         taken.append(degree)
         independent[0] += by_relations
+        return waiting.pop(0) if waiting else []
 
-    def cofactors(*_):
-        independent[0] += by_cofactors
-        return iter(())
-
-    monkeypatch.setattr(module, "_take_relations", relations)
-    monkeypatch.setattr(module, "search_cofactors", cofactors)
+    monkeypatch.setattr(module, "darboux_spaces", spaces)
     monkeypatch.setattr(module, "gradient_rank", lambda *_: independent[0])
-    profile = SimpleNamespace(nullities=nullities, codimension=wanted)
-    search(Laboratory(load("lorenz")).maps[0], profile, [], 30.0, told.append)
-    return taken, [text for text in told if "cofactors" in text]
+    profile, found = SimpleNamespace(nullities=nullities, codimension=wanted), module.Found()
+    take_relations(Laboratory(load("lorenz")).maps[0], profile, found, largest, inf, lambda _: None)
+    return taken, found.searched
 
 
-def test_degrees_with_many_relations_come_after_the_cofactors_and_none_after_what_is_wanted(monkeypatch):
-    terms = ["polynomials of degree up to 7 with 120 terms and known cofactors"]
-    many = module.LARGEST_SPAN
-    assert calls_of_a_search(monkeypatch, (0, 3, 21, 20)) == ([2, 4, 3], terms)
-    assert calls_of_a_search(monkeypatch, (1, many - 1, 1)) == ([1, 3, 2], terms)
-    assert calls_of_a_search(monkeypatch, (1, many, 1)) == ([1], terms)
-    assert calls_of_a_search(monkeypatch, (1, 1, 30), by_relations=1) == ([1], [])
-    assert calls_of_a_search(monkeypatch, (1, 30, 30), by_cofactors=1) == ([1], terms)
-    assert calls_of_a_search(monkeypatch, (30, 30), by_relations=1) == ([1], terms)
-    assert calls_of_a_search(monkeypatch, (1, 30), wanted=0) == ([], [])
+def test_degrees_with_few_relations_are_taken_until_enough_is_known(monkeypatch):
+    few = module.SMALL_SPAN
+    assert degrees_whose_relations_are_taken(monkeypatch, (0, 3, few - 1, few), few) == ([2, 3], [2, 3])
+    assert degrees_whose_relations_are_taken(monkeypatch, (1, few, 1), few) == ([1], [1])
+    assert degrees_whose_relations_are_taken(monkeypatch, (1, 1), few, by_relations=1) == ([1], [1])
+    assert degrees_whose_relations_are_taken(monkeypatch, (1, 1), few, wanted=0) == ([], [])
+    # A degree with too many dimensions waits for a larger limit.
+    assert degrees_whose_relations_are_taken(monkeypatch, (1, 2), few, [None]) == ([1, 2], [2])
+    assert degrees_whose_relations_are_taken(monkeypatch, (1, 2), 60) == ([1, 2], [1, 2])
 
 
 @pytest.mark.parametrize(("most", "degree", "terms"), [(120, 7, 120), (119, 6, 84), (10, 2, 10), (9, 1, 4)])
 def test_cofactors_are_tried_up_to_so_many_terms(most, degree, terms, monkeypatch):
     monkeypatch.setattr(module, "_MOST_TERMS", most)
-    (told,) = calls_of_a_search(monkeypatch, ())[1]
-    assert told == f"polynomials of degree up to {degree} with {terms} terms and known cofactors"
+    told, profile = [], SimpleNamespace(nullities=(), codimension=1)
+    found = search(Laboratory(load("lorenz")).maps[0], profile, [], progress=told.append)
+    assert told == [f"polynomials of degree up to {degree} with {terms} terms and known cofactors"]
+    assert (found.cofactor_degree, found.spaces) == (degree, [])
 
 
 def test_relations_that_show_nothing_new_are_no_step(monkeypatch):
-    laboratory, _, found = searched(load("euler_top"))
+    laboratory, found = searched(load("euler_top"))
     map_, known = laboratory.maps[0], list(found.steps)
+    profile = SimpleNamespace(nullities=(0, 2), codimension=3)
     monkeypatch.setattr(module, "darboux_spaces", lambda *_: found.all_spaces)
-    module._take_relations(map_, 2, found, float("inf"))
+    take_relations(map_, profile, found, 60, inf, lambda _: None)
     assert found.steps == known
     nothing = module.Found()
     monkeypatch.setattr(module, "darboux_spaces", lambda *_: found.spaces[0])
-    module._take_relations(map_, 2, nothing, float("inf"))
+    take_relations(map_, profile, nothing, 60, inf, lambda _: None)
     assert [(step.kind, step.degree, step.product) for step in nothing.steps] == [("relations", 2, None)]
 
 

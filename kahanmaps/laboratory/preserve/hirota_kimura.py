@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import comb
+from math import comb, inf
 from typing import Any
 
 from flint import fmpq_mpoly, nmod_mat
@@ -35,6 +35,7 @@ from kahanmaps.laboratory.modular_points import (
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
+MAX_INDEPENDENT = 800  # monomials that relations of lower degrees leave: their matrix takes about a second
 _SETTLED = 4  # degrees
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
@@ -154,12 +155,11 @@ def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[
     return support
 
 
-def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> list[list[int]]:
-    """The reduced echelon basis of the span of the relations of all orbits."""
-    deadline = time.monotonic() + seconds
+def span_of_relations(map_: ModularMap, degree: int, largest: float = inf) -> list[list[int]]:
+    """The reduced echelon basis of the span of the relations of all orbits, or of some once it exceeds `largest`."""
     first, still = relations_on_orbit(map_, degree), 0
     found, most = first.vectors, first.independent
-    while found and still < 2 and time.monotonic() < deadline:
+    while found and still < 2 and len(found) <= largest:
         more = echelon([*found, *relations_on_orbit(map_, degree, most).vectors], map_.prime)
         still = still + 1 if len(more) == len(found) else 0
         found = more
@@ -170,7 +170,7 @@ def orbit_profile(
     maps: Sequence[ModularMap],
     *,
     max_degree: int | None = None,
-    seconds: float = 20.0,
+    seconds: float = inf,
     known: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
@@ -178,14 +178,14 @@ def orbit_profile(
 
     Args:
         maps: the maps, with different primes and, where eps is not given, different eps.
-        max_degree: the last degree; by default one that takes seconds.
-        seconds: the time that may be taken, about.
+        max_degree: the last degree; by default it depends on the dimension and on the number of monomials.
+        seconds: no degree is begun after so many seconds.
         known: the gradients of known integrals at a point.
         progress: is told what is being tried.
 
     Returns:
         The `Profile`, measured. It ends where the codimension leaves curves (dim - 1; points, dim, where orbits
-        close), at `max_degree`, or, not complete, when the time is over or there are too many monomials.
+        close), at `max_degree`, or, not complete, when there are too many monomials or the time is over.
 
     Raises:
         NoPoint: where orbits meet the singular set.
@@ -203,26 +203,22 @@ def orbit_profile(
     nullities: list[int] = []
     codimensions: list[int] = []
     with_known = 0
-    agree, period, took, complete = True, None, 0.0, True
+    agree, period, complete = True, None, True
     leading: list[frozenset[Exponent]] = [frozenset()] * len(maps)
     top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
         top = max((d for d in range(1, top + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
-    began = time.monotonic()
-    maps[0].step(maps[0].random_point())
-    step = time.monotonic() - began
+    largest = MAX_UNKNOWNS if max_degree is not None else MAX_INDEPENDENT
     for degree in range(1, top + 1):
-        unknowns = comb(dim + degree, degree)
-        took = max(took, step * unknowns * len(maps) / 8)
-        growth = (unknowns / comb(dim + degree - 1, degree - 1)) ** 3
-        if unknowns > MAX_UNKNOWNS or time.monotonic() + took * min(growth, 8) > deadline:
+        is_too_large = comb(dim + degree, degree) > MAX_UNKNOWNS or any(
+            len(_not_multiples(dim, degree, lower)) > largest for lower in leading
+        )
+        if is_too_large or time.monotonic() > deadline:
             complete = False
             break
         progress(f"relations of degree {degree} along orbits")
-        began = time.monotonic()
         found = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
         leading = [one.leading for one in found]
-        took = time.monotonic() - began
         agree = agree and len({(one.dimension, one.codimension) for one in found}) == 1
         # A special orbit has more relations, never fewer.
         nullities.append(min(one.dimension for one in found))

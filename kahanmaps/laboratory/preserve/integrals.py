@@ -28,7 +28,8 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
-from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
+from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, denominators_among
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LARGEST_SPAN
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.iterates import (
@@ -40,7 +41,15 @@ from kahanmaps.laboratory.preserve.iterates import (
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
-from kahanmaps.laboratory.preserve.search import AFFINE, bases_of, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.search import (
+    AFFINE,
+    Found,
+    bases_of,
+    may_be_conjugate,
+    repeat,
+    search,
+    take_relations,
+)
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
@@ -273,11 +282,18 @@ def find_integrals(
         return result(empty, laboratory.defect)
     gradients = {} if known is None else {"known": known.gradients}
     try:
-        profile = orbit_profile(
-            laboratory.maps, max_degree=max_degree, seconds=seconds / 3, progress=progress, **gradients
-        )
+        profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds, progress=progress, **gradients)
         cofactors = laboratory.cofactors()
-        formulas, reason = _formulas(laboratory, profile, cofactors, deadline, progress)
+        # Of a system these would be too many, and few integrals of its map have other denominators than those.
+        factors = [one.polynomial for one in cofactors if one.polynomial is not None]
+        factors = factors if laboratory.field is not None else candidates(laboratory, cofactors)
+        denominators = denominators_among(factors, laboratory.map.dim)
+
+        def quickly(map_: ModularMap) -> Found:
+            return search(map_, profile, cofactors, denominators, deadline, progress)
+
+        base = laboratory.maps[0]
+        base, found, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, deadline, progress)
     except NoPoint as error:
         return result(empty, str(error))
     collected.offer(formulas)
@@ -287,6 +303,20 @@ def find_integrals(
         progress("products of powers of known polynomials")
         collected.add_products(cofactors)
     done = result(profile, "")
+    if not done.is_complete:
+        # This may take longer than all that went before, whose formulas are therefore known by now.
+        steps = len(found.steps)
+        take_relations(base, profile, found, LARGEST_SPAN, deadline, progress)
+        if len(found.steps) > steps:
+
+            def thoroughly(map_: ModularMap) -> Found:
+                again = quickly(map_)
+                take_relations(map_, profile, again, LARGEST_SPAN, deadline, progress)
+                return again
+
+            _, found, formulas, reason = _formulas(laboratory, base, found, thoroughly, deadline, progress)
+            collected.offer(formulas)
+            done = result(profile, "")
     if not flow and not done.is_complete and laboratory.root is None:
         collected.add_in_iterates(done.codimension)
         done = result(profile, "")
@@ -295,11 +325,11 @@ def find_integrals(
         reason = ""
     elif not reason:
         have = "has" if missing == 1 else "have"
-        reason = (
-            f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q of the degrees and "
-            "sizes that were tried: coefficients of Hirota-Kimura bases are such integrals"
-        )
-    reasons = (reason, _at_the_values(laboratory, done), _unfinished(profile, max_degree))
+        reason = f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q {found.tried}"
+        if time.monotonic() > deadline:
+            reason += f", and then the {seconds:g} seconds were over"
+        reason += ": coefficients of Hirota-Kimura bases are such integrals"
+    reasons = (reason, _at_the_values(laboratory, done), _unfinished(profile, max_degree, deadline))
     return replace(done, reason="; ".join(filter(None, reasons)))
 
 
@@ -349,37 +379,38 @@ def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
     return f"at {told} only {left} of the {len(rows)} formulas are independent: without --symbolic others may be found"
 
 
-def _unfinished(profile: Profile, max_degree: int | None) -> str:
+def _unfinished(profile: Profile, max_degree: int | None, deadline: float) -> str:
     """What the profile leaves open; empty where it left nothing that was asked for or is likely to show more."""
     if not profile.complete and (max_degree is not None or not profile.is_settled):
-        return f"relations of degree {profile.degree + 1} and more were not tried: too many unknowns or too little time"
+        why = "too many unknowns" if time.monotonic() < deadline else "the time was over"
+        return f"relations of degree {profile.degree + 1} and more were not tried: {why}"
     return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
 
 
 def _formulas(
     laboratory: Laboratory,
-    profile: Profile,
-    cofactors: Sequence[Cofactor],
+    base: ModularMap,
+    found: Found,
+    look: Callable[[ModularMap], Found],
     deadline: float,
     progress: Callable[[str], None],
-) -> tuple[list[Formula], str]:
-    """Ratios of polynomials with a common cofactor, and why there are no others. Raises NoPoint.
+) -> tuple[ModularMap, Found, list[Formula], str]:
+    """The ratios of the polynomials `found` on the map `base`, and why there are no others; first the map and spaces.
 
-    They are sought modulo a prime where spaces that are conjugate over an extension of Q do not occur.
+    Where these may be conjugate over an extension of Q, `look` finds those on maps modulo other primes, where conjugate
+    ones do not occur. Raises NoPoint.
     """
-    base = laboratory.maps[0]
-    found = search(base, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
     if may_be_conjugate(found):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
-            if time.monotonic() < deadline and repeat(found, map_, cofactors, base.prime) is None:
-                base, found = map_, search(map_, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
+            if time.monotonic() < deadline and repeat(found, map_, base.prime) is None:
+                base, found = map_, look(map_)
     if not found.steps:
-        return [], ""
+        return base, found, [], ""
     progress("interpolating closed forms")
-    bases, reason = bases_of(laboratory, base.prime, found, cofactors, deadline)
+    bases, reason = bases_of(laboratory, base.prime, found, deadline)
     origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
     pairs = zip(bases, origins, strict=False)
-    return [(_ratio(P, Q), origin, "") for (Q, *more), origin in pairs for P in more], reason
+    return base, found, [(_ratio(P, Q), origin, "") for (Q, *more), origin in pairs for P in more], reason
 
 
 def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:

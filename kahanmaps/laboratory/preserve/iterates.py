@@ -217,7 +217,7 @@ def integrals_in_iterates(
             progress(one.text)
             found = Found()
             found.add(Step("iterates", 2, None, one.text, one), sorted(spaces, key=pattern))
-            bases, _ = bases_of(inside, base.prime, found, [], deadline)
+            bases, _ = bases_of(inside, base.prime, found, deadline)
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]
                 for ratio in _ratios(one, functions if back is None else [back(F, one.shift) for F in functions]):

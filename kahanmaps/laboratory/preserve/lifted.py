@@ -96,7 +96,7 @@ def lifted_spaces(map_: ModularMap, lift: Lift) -> list[DarbouxSpace]:
     """The spaces of functions with a common cofactor; of rank 2 the space of all functions that are in relations."""
     lifted = Lifted(map_, lift)
     if lift.rank == 1:
-        return darboux_spaces(lifted, DEGREE)
+        return darboux_spaces(lifted, DEGREE) or []
     span = span_of_relations(lifted, DEGREE)
     if len(span) - relations_on_orbit(lifted, DEGREE).dimension != lift.rank:
         return []

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import takewhile
-from math import comb
+from math import comb, inf
 from types import MappingProxyType
 
 from flint import fmpq_mpoly
@@ -35,7 +35,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     search_cofactors,
 )
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
-    LARGEST_SPAN,
+    SMALL_SPAN,
     DarbouxSpace,
     darboux_spaces,
     gradient_rank,
@@ -52,7 +52,6 @@ NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
 AFFINE = "v.x with v.f(x) = 0"
 _CHANCE = 20  # bits by which a fraction is simpler than one of a random residue
-_FEW = 20  # with more relations than these, cofactors come first
 
 
 @dataclass(frozen=True)
@@ -69,15 +68,32 @@ class Step:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found on one map: a list of spaces for each step."""
+    """What a search found on one map: a list of spaces for each step.
+
+    The products of the steps are of the `cofactors`, which were tried up to a degree; `searched` are the degrees of
+    relations along orbits whose span was searched.
+    """
 
     steps: list[Step] = field(default_factory=list)
     spaces: list[list[DarbouxSpace]] = field(default_factory=list)
+    cofactors: Sequence[Cofactor] = ()
+    cofactor_degree: int = 0
+    searched: list[int] = field(default_factory=list)
 
     @property
     def all_spaces(self) -> list[DarbouxSpace]:
         """The spaces of all steps."""
         return [space for spaces in self.spaces for space in spaces]
+
+    @property
+    def tried(self) -> str:
+        """Among which functions integrals were sought."""
+        parts = []
+        if self.cofactor_degree:
+            parts.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")
+        if self.searched:
+            parts.append(f"relations of degree {', '.join(map(str, self.searched))} along orbits")
+        return f"among {' and '.join(parts)}" if parts else "that was found"
 
     def add(self, step: Step, spaces: list[DarbouxSpace]) -> None:
         """One more step."""
@@ -99,56 +115,70 @@ def search(
     map_: ModularMap,
     profile: Profile,
     cofactors: Sequence[Cofactor],
-    seconds: float,
+    denominators: Sequence[Cofactor] = (),
+    deadline: float = inf,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Found:
-    """Spaces whose ratios are as many independent integrals as the profile shows, as far as they can be found."""
-    deadline = time.monotonic() + seconds
+    """Spaces whose ratios are as many independent integrals as the profile shows, as far as cheap searches find them.
+
+    These are the span of few relations along orbits, and polynomials with known cofactors or over known denominators.
+    Nothing is begun after the `deadline`, a value of time.monotonic(). Raises NoPoint.
+    """
     found, wanted = Found(), profile.codimension
-
-    def done() -> bool:
-        return gradient_rank(map_, found.all_spaces) >= wanted or time.monotonic() > deadline
-
+    is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver)
     affine = affine_space(map_)
     if affine is not None:
-        text = AFFINE if isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver) else "affine integral"
-        found.add(Step("affine", 1, None, text), [affine])
-
-    def take_relations(least: int, most: int) -> None:
-        sizes = takewhile(lambda size: size < LARGEST_SPAN, profile.nullities)
-        for degree in [degree for degree, size in enumerate(sizes, 1) if least <= size <= most]:
-            if done():
-                break
-            progress(f"closed forms from the relations of degree {degree}")
-            _take_relations(map_, degree, found, deadline)
-
-    take_relations(1, _FEW)
-    if not done():
-        top = _COFACTOR_DEGREE.get(map_.dim, 2)
-        while comb(map_.dim + top, top) > _MOST_TERMS:
-            top -= 1
-        progress(f"polynomials of degree up to {top} with {comb(map_.dim + top, top)} terms and known cofactors")
-        left = deadline - time.monotonic()
-        for product, scaled, spaces in search_cofactors(map_, cofactors, found.all_spaces, wanted, top, left):
-            text = f"common cofactor {product.text(cofactors)}{', up to a number' * scaled}"
-            step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
-            found.add(step, sorted(spaces, key=pattern))
-    take_relations(_FEW + 1, LARGEST_SPAN)
+        found.add(Step("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
+    if is_of_field:  # whose denominators are factors of a determinant, which is longer than few relations
+        take_relations(map_, profile, found, SMALL_SPAN, deadline, progress)
+    if gradient_rank(map_, found.all_spaces) >= wanted or time.monotonic() > deadline:
+        return found
+    dim, top = map_.dim, _COFACTOR_DEGREE.get(map_.dim, 2)
+    while comb(dim + top, top) > _MOST_TERMS:
+        top -= 1
+    progress(f"polynomials of degree up to {top} with {comb(dim + top, top)} terms and known cofactors")
+    known = found.all_spaces
+    result = search_cofactors(map_, cofactors, denominators, known, wanted, top, deadline)
+    found = replace(found, cofactors=result.cofactors, cofactor_degree=result.degree)
+    for product, scaled, spaces in result.spaces:
+        text = f"{product.origin(found.cofactors)}{', up to a number' * scaled}"
+        step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
+        found.add(step, sorted(spaces, key=pattern))
+    if not is_of_field:
+        take_relations(map_, profile, found, SMALL_SPAN, deadline, progress)
     return found
 
 
-def _take_relations(map_: ModularMap, degree: int, found: Found, deadline: float) -> None:
-    known = found.all_spaces
-    spaces = darboux_spaces(map_, degree, known, max(1.0, deadline - time.monotonic()))
-    if spaces and gradient_rank(map_, [*known, *spaces]) > gradient_rank(map_, known):
-        step = Step("relations", degree, None, f"relations of degree {degree} along orbits")
-        found.add(step, sorted(spaces, key=pattern))
+def take_relations(
+    map_: ModularMap,
+    profile: Profile,
+    found: Found,
+    largest: int,
+    deadline: float,
+    progress: Callable[[str], None],
+) -> None:
+    """Add the spaces that are seen in the span of the relations of a degree, until there are as many as wanted.
+
+    Taken are the degrees in which the relations of all orbits span at most `largest` dimensions.
+    """
+    few = takewhile(lambda size: size < largest, profile.nullities)
+    for degree in [degree for degree, size in enumerate(few, 1) if size]:
+        known = found.all_spaces
+        independent = gradient_rank(map_, known)
+        if independent >= profile.codimension or degree in found.searched or time.monotonic() > deadline:
+            continue
+        progress(f"closed forms from the relations of degree {degree}")
+        spaces = darboux_spaces(map_, degree, known, largest)
+        if spaces is not None:
+            found.searched.append(degree)
+        if spaces and gradient_rank(map_, [*known, *spaces]) > independent:
+            step = Step("relations", degree, None, f"relations of degree {degree} along orbits")
+            found.add(step, sorted(spaces, key=pattern))
 
 
 def repeat(
     found: Found,
     map_: ModularMap,
-    cofactors: Sequence[Cofactor],
     reference: int,
     branches: Mapping[int, Mapping[Pattern, Branches]] = NOTHING,
 ) -> Found | None:
@@ -157,10 +187,10 @@ def repeat(
     `reference` is the prime of `found`. Spaces of the same shape come in any order where there are no `branches` of
     their step, by which they are told apart.
     """
-    again = Found()
+    again = Found(cofactors=found.cofactors)
     steps = list(zip(found.steps, found.spaces, strict=True))
     needed = [points_needed(map_.dim, step.degree, *model) for step, model in steps if step.product is not None]
-    sample = Sample.of(map_, cofactors, max(needed, default=0))
+    sample = Sample.of(map_, found.cofactors, max(needed, default=0))
     for number, (step, model) in enumerate(steps):
         if step.kind == "affine":
             affine = affine_space(map_)
@@ -173,7 +203,7 @@ def repeat(
         elif step.lift is not None:
             group = lifted_spaces(map_, step.lift)
         else:
-            group = darboux_spaces(map_, step.degree, again.all_spaces)
+            group = darboux_spaces(map_, step.degree, again.all_spaces) or []
         ordered = _in_order(group, model, map_, reference, branches.get(number, {}))
         if ordered is None:
             return None
@@ -249,20 +279,20 @@ def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference
 
 
 def bases_of(
-    laboratory: Laboratory, reference: int, found: Found, cofactors: Sequence[Cofactor], deadline: float
+    laboratory: Laboratory, reference: int, found: Found, deadline: float
 ) -> tuple[list[list[fmpq_mpoly]], str]:
     """Bases of all spaces, polynomials in (variables, symbols, eps); none, and a reason, where that failed.
 
     `reference` is the prime modulo which the spaces were found.
     """
-    if repeat(found, laboratory.maps[1], cofactors, reference) is None:
+    if repeat(found, laboratory.maps[1], reference) is None:
         return [], "what was found at one eps was not found at another"
-    branches, reason = _branches(laboratory, found, cofactors, reference, deadline)
+    branches, reason = _branches(laboratory, found, reference, deadline)
     if reason:
         return [], f"integrals were found modulo primes, but no closed form: {reason}"
 
     def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
-        again = repeat(found, map_, cofactors, reference, branches)
+        again = repeat(found, map_, reference, branches)
         return None if again is None else again.all_spaces
 
     forms = laboratory.formulas(found.all_spaces, spaces_on, deadline)
@@ -272,7 +302,7 @@ def bases_of(
 
 
 def _branches(
-    laboratory: Laboratory, found: Found, cofactors: Sequence[Cofactor], reference: int, deadline: float
+    laboratory: Laboratory, found: Found, reference: int, deadline: float
 ) -> tuple[dict[int, dict[Pattern, Branches]], str]:
     """What tells the spaces of each step apart that have zeros at the same places, and a reason where nothing does."""
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
@@ -280,7 +310,7 @@ def _branches(
     @cache
     def again(prime: int, values: tuple[int, ...]) -> Found | None:
         try:
-            return repeat(found, laboratory.map_for(prime, values), cofactors, reference)
+            return repeat(found, laboratory.map_for(prime, values), reference)
         except (NoPoint, BadPrime):
             return None
 

@@ -15,27 +15,32 @@ are is an eigenvalue problem, and they change with the scales of the variables. 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import product as product_of_lists
-from operator import sub
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product as cartesian
+from math import inf, prod
+from operator import add, sub
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz, nmod
 
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
-from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots
+from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.written.text import format_polynomial, format_product
 from kahanmaps.invariants.measures import jacobian_determinant_sides
-from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
+from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 _SPARE = 8
 _DETERMINANT_BUDGET = 20_000_000
+_DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # so many products of denominators up to this degree
+_MAX_WORK = 4_000_000  # entries of matrices, about two seconds
 _MAX_DIMENSION = 16  # beyond it the determinant is not expanded: even a sparse one costs more than it tells
 
 
@@ -43,8 +48,9 @@ _MAX_DIMENSION = 16  # beyond it the determinant is not expanded: even a sparse 
 class Cofactor:
     """A function of x that is made of a polynomial g in the variables, the symbols and eps, as `kind` says.
 
-    "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps). Without a polynomial it is det dPhi
-    itself. `weight` says from which degree on polynomials may have it for a cofactor, about.
+    "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps); "denominator": g(x~, eps)/g(x, eps).
+    Without a polynomial it is det dPhi itself. `weight` says from which degree on polynomials may have it for a
+    cofactor, about.
     """
 
     name: str
@@ -60,6 +66,8 @@ class Cofactor:
         here = evaluate(self.polynomial, field, (*x, *values, eps))
         if self.kind == "reversed":
             return evaluate(self.polynomial, field, (*image, *values, -eps)), here
+        if self.kind == "denominator":
+            return evaluate(self.polynomial, field, (*image, *values, eps)), here
         return (here, field.one) if self.kind == "factor" else (field.one, here)
 
     def sides(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
@@ -161,6 +169,14 @@ class CofactorProduct:
         ]
         return "*".join(parts) or "1"
 
+    def origin(self, cofactors: Sequence[Cofactor]) -> str:
+        """Where the ratios of polynomials with this cofactor come from, in words."""
+        powers = [(one, power) for one, power in zip(cofactors, self.powers, strict=True) if power]
+        if not powers or powers[0][0].kind != "denominator":
+            return f"common cofactor {self.text(cofactors)}"
+        factors = [(one.polynomial, power) for one, power in powers if one.polynomial is not None]
+        return f"denominator {format_product(factors)}"
+
 
 def products(cofactors: Sequence[Cofactor], max_weight: int) -> list[CofactorProduct]:
     """All products of weight at most `max_weight`, by increasing weight; the first is 1."""
@@ -178,29 +194,34 @@ def products(cofactors: Sequence[Cofactor], max_weight: int) -> list[CofactorPro
 
 @dataclass(frozen=True)
 class Sample:
-    """Random points with their images and the values of all cofactors there, for many searches on one map."""
+    """Random points with their images and the values of cofactors there, for many searches on one map."""
 
     map: ModularMap
     pairs: list[tuple[Point, Point]]
-    sides: list[list[tuple[int, int]]]  # by cofactor, then by point
-    up_to_numbers: bool  # cofactors are those that occur, times unknown numbers
+    cofactors: Sequence[Cofactor]
+    sides: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # of cofactors that were needed, by point
+
+    @property
+    def up_to_numbers(self) -> bool:
+        """Whether cofactors are those that occur, times unknown numbers."""
+        return any(one.kind in ("factor", "pole") for one in self.cofactors)
 
     @classmethod
     def of(cls, map_: ModularMap, cofactors: Sequence[Cofactor], count: int) -> Sample:
         """So many points."""
-        pairs = list(map_.pairs(count))
-        sides = [[one.sides(map_, x, image) for x, image in pairs] for one in cofactors]
-        return cls(map_, pairs, sides, any(one.kind != "reversed" for one in cofactors))
+        return cls(map_, list(map_.pairs(count)), cofactors)
 
-    def values(self, product: CofactorProduct) -> list[tuple[int, int]]:
-        """Numerator and denominator of a product, at each point."""
+    def values(self, product: CofactorProduct, count: int) -> list[tuple[int, int]]:
+        """Numerator and denominator of a product, at each of the first points."""
         prime = self.map.prime
-        found = [(1, 1)] * len(self.pairs)
-        for power, column in zip(product.powers, self.sides, strict=True):
+        found = [(1, 1)] * min(count, len(self.pairs))
+        for k, (power, one) in enumerate(zip(product.powers, self.cofactors, strict=True)):
             if power:
+                if k not in self.sides:
+                    self.sides[k] = [one.sides(self.map, x, image) for x, image in self.pairs]
                 found = [
                     (a * pow(c, power, prime) % prime, b * pow(d, power, prime) % prime)
-                    for (a, b), (c, d) in zip(found, column, strict=True)
+                    for (a, b), (c, d) in zip(found, self.sides[k], strict=False)
                 ]
         return found
 
@@ -268,8 +289,8 @@ def _values(
     sample: Sample, product: CofactorProduct, degree: int, places: Sequence[int]
 ) -> tuple[list[list[Any]], list[list[Any]]]:
     """The values of monomials times C at the points, and at their images, both times the denominators of C."""
-    here, there = [], []
-    for (x, image), sides in zip(sample.pairs[: len(places) + _SPARE], sample.values(product), strict=False):
+    here, there, count = [], [], len(places) + _SPARE
+    for (x, image), sides in zip(sample.pairs[:count], sample.values(product, count), strict=True):
         before, after = sample.map.moved(x, image, degree, sides)
         here.append([before[k] for k in places])
         there.append([after[k] for k in places])
@@ -293,38 +314,160 @@ def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
     return (len(places) if models else len(exponents_up_to(dim, degree))) + _SPARE
 
 
+def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofactor]:
+    """The cofactors g(x~)/g(x) that denominators of integrals have which are products of these polynomials g.
+
+    Of many polynomials the first are taken.
+    """
+    found = list[Cofactor]()
+    for g in polynomials:
+        one = Cofactor(format_polynomial(g), degree_in(g, dim), g, "denominator")
+        if len(products([*found, one], _DENOMINATOR_DEGREE)) > _MAX_DENOMINATORS:
+            break
+        found.append(one)
+    return found
+
+
+@dataclass(frozen=True)
+class CofactorSearch:
+    """Spaces with a common cofactor by their cofactor, a product of `cofactors`; all degrees up to `degree`.
+
+    Beside the product stands whether the cofactors of its spaces are that product times numbers.
+    """
+
+    cofactors: list[Cofactor]
+    spaces: list[tuple[CofactorProduct, bool, list[DarbouxSpace]]]
+    degree: int
+
+
 def search_cofactors(
     map_: ModularMap,
     cofactors: Sequence[Cofactor],
+    denominators: Sequence[Cofactor],
     known: Sequence[DarbouxSpace],
     wanted: int,
     max_degree: int,
-    seconds: float,
-) -> Iterator[tuple[CofactorProduct, bool, list[DarbouxSpace]]]:
-    """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are found.
+    deadline: float = inf,
+) -> CofactorSearch:
+    """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are known.
 
-    Spaces are new if the integrals of `known` and of those found before do not account for theirs. Those whose
-    cofactors are the product up to numbers come together, and this is said.
+    A space is new if the integrals of `known` and of those found before do not account for its own. The cofactors are
+    products of the `cofactors`, or of the `denominators`. Last come the `cofactors` times any numbers, where they are
+    known up to numbers. The search ends where it is too much work, or at the `deadline`, a value of time.monotonic().
+
+    Where P/Q = c on an orbit, P - c Q is a relation along this orbit: so unknown are only the coordinates of P - c Q in
+    a basis of its relations. And Q is, up to a factor, the difference of the relations along two orbits, which tells
+    the few products that can be denominators from all others.
     """
-    deadline = time.monotonic() + seconds
-    found = list(known)
-    independent = gradient_rank(map_, found)
-    sample = Sample.of(map_, cofactors, points_needed(map_.dim, max_degree))
-    candidates = products(cofactors, max_degree)
-    # With the number 1 alone the work is a third, and often that is all.
-    numbers, degrees = (False, True)[: 1 + sample.up_to_numbers], range(1, max_degree + 1)
-    for up_to_numbers, degree, product in product_of_lists(numbers, degrees, candidates):
-        if independent >= wanted or time.monotonic() > deadline:
-            return
+    prime, dim, every, work = map_.prime, map_.dim, [*cofactors, *denominators], 0
+    found = CofactorSearch(every, [], 0)
+    spaces = list(known)
+    independent = gradient_rank(map_, spaces)
+    polynomials = [_residues(map_, one.polynomial) for one in denominators if one.polynomial is not None]
+    for degree in range(1, max_degree + 1):
+        if independent >= wanted:
+            break
+        orbit = relations_on_orbit(map_, degree)
+        relations, places = orbit.vectors, {e: k for k, e in enumerate(exponents_up_to(dim, degree))}
+        if relations:
+            sums = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
+            rows = dict(zip(pivots(sums), sums, strict=True))
+            tried = [
+                replace(one, powers=(*one.powers, *[0] * len(denominators)))
+                for one in products(cofactors, min(degree + 1, max_degree))
+            ]
+            tried += [
+                replace(one, powers=(*[0] * len(cofactors), *one.powers))
+                for one in products(denominators, degree)[1:]
+                if _is_spanned(_product(polynomials, one.powers, prime), places, rows, prime)
+            ]
+            count = len(relations) + _SPARE
+            sample = Sample.of(map_, every, points_needed(dim, degree))
+            basis = matrix(relations, prime).transpose()
+            moved = zip(*(map_.moved(x, image, degree) for x, image in sample.pairs[:count]), strict=True)
+            here, there = ((matrix(list(values), prime) * basis).tolist() for values in moved)
+        for product in tried if relations else ():
+            if independent >= wanted:
+                break
+            work += count**2
+            if work > _MAX_WORK or time.monotonic() > deadline:
+                return found
+            equations = [
+                [b * v - a * u for u, v in zip(before, after, strict=True)]
+                for (a, b), before, after in zip(sample.values(product, count), here, there, strict=True)
+            ]
+            coordinates = null_space(equations, len(relations), prime)
+            # At a point of the orbit, where P = c Q, the gradient of P/Q is that of P - c Q up to a factor.
+            slopes = [gradient_values(R, orbit.point, degree, prime)[1] for R in combine(coordinates, relations, prime)]
+            before = gradients_of_ratios(orbit.point, spaces, prime)
+            if rank([*before, *slopes], prime) == rank(before, prime):
+                continue
+            space = cofactor_space(sample, product, degree)
+            more = gradient_rank(map_, [*spaces, space])
+            if more > independent:
+                independent = more
+                spaces.append(space)
+                found.spaces.append((product, False, [space]))
+        found = replace(found, degree=degree)
+    # Factors of determinants are cofactors up to numbers. The number 1 is a third of the work, and often enough.
+    if all(one.kind == "reversed" for one in cofactors):
+        return found
+    sample = Sample.of(map_, every, points_needed(dim, max_degree))
+    for degree, product in cartesian(range(1, max_degree + 1), products(cofactors, max_degree)[1:]):
+        if independent >= wanted:
+            break
         if product.weight > degree + 1:
             continue
-        if up_to_numbers:
-            spaces = [one for _, one in cofactor_spaces(sample, product, degree)]
-        else:
-            spaces = [cofactor_space(sample, product, degree)]
-        spaces = [one for one in spaces if len(one.basis) > 1]
-        more = gradient_rank(map_, [*found, *spaces]) if spaces else independent
+        work += 3 * points_needed(dim, degree) ** 2
+        if work > 2 * _MAX_WORK or time.monotonic() > deadline:
+            break
+        product = replace(product, powers=(*product.powers, *[0] * len(denominators)))
+        some = [space for _, space in cofactor_spaces(sample, product, degree) if len(space.basis) > 1]
+        more = gradient_rank(map_, [*spaces, *some]) if some else independent
         if more > independent:
             independent = more
-            found += spaces
-            yield product, up_to_numbers, spaces
+            spaces += some
+            found.spaces.append((product, True, some))
+    return found
+
+
+def _residues(map_: ModularMap, polynomial: fmpq_mpoly) -> dict[Exponent, int]:
+    """The coefficients of a polynomial in (variables, symbols, eps) on a map modulo a prime."""
+    field, n = GF(map_.prime), map_.dim
+    values = [field.convert(c) for c in (*map_.values, map_.eps)]
+    found: dict[Exponent, int] = {}
+    for monomial, coefficient in polynomial.terms():
+        term = prod((c ** int(e) for c, e in zip(values, monomial[n:], strict=True)), start=field.convert(coefficient))
+        exponents = tuple(map(int, monomial[:n]))
+        found[exponents] = (found.get(exponents, 0) + int(term)) % map_.prime
+    return found
+
+
+def _product(polynomials: Sequence[dict[Exponent, int]], powers: Sequence[int], prime: int) -> dict[Exponent, int]:
+    """The coefficients of a product of powers."""
+    total = {(0,) * len(next(iter(polynomials[0]))): 1} if polynomials else {}
+    for polynomial, power in zip(polynomials, powers, strict=True):
+        for _ in range(power):
+            terms: dict[Exponent, int] = {}
+            for (a, c), (b, d) in cartesian(total.items(), polynomial.items()):
+                exponents = tuple(map(add, a, b))
+                terms[exponents] = (terms.get(exponents, 0) + c * d) % prime
+            total = terms
+    return total
+
+
+def _is_spanned(
+    polynomial: dict[Exponent, int], places: dict[Exponent, int], rows: dict[int, list[int]], prime: int
+) -> bool:
+    """Whether a polynomial is in the span of rows of an echelon form, each under the place of its first entry."""
+    left = {places[exponents]: c for exponents, c in polynomial.items() if c}
+    while left:
+        first = min(left)
+        if first not in rows:
+            return False
+        factor = left[first]
+        for k, entry in enumerate(rows[first][first:], first):
+            if entry:
+                left[k] = (left.get(k, 0) - factor * entry) % prime
+        left = {k: c for k, c in left.items() if c}
+    return True

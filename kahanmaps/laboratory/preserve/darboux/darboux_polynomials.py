@@ -224,8 +224,8 @@ def _written(
     # The others tell spaces that look alike apart; where they are conjugate they have no formulas themselves.
     for together in [spaces, spaces[:1]][len(spaces) == 1 :]:
         step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
-        search = Found([step], [list(together)])
-        bases, reason = bases_of(laboratory, laboratory.primes[0], search, cofactors, deadline)
+        search = Found([step], [list(together)], cofactors)
+        bases, reason = bases_of(laboratory, laboratory.primes[0], search, deadline)
         if bases:
             break
     else:
@@ -235,7 +235,7 @@ def _written(
     def number(map_: ModularMap) -> list[int]:
         """The number by which the cofactor differs from the product."""
         sample, field = Sample.of(map_, cofactors, 1), GF(map_.prime)
-        [(above, below)], [pair] = sample.values(product), sample.pairs
+        [(above, below)], [pair] = sample.values(product, 1), sample.pairs
         places = ([field.convert(c) for c in (*x, *map_.values, map_.eps)] for x in pair)
         before, after = (int(evaluate(polynomials[0], field, place)) for place in places)
         return [after * below * pow(before * above, -1, map_.prime) % map_.prime]

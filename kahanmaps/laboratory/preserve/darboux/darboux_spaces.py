@@ -19,7 +19,6 @@ Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discre
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,12 +26,13 @@ from flint import nmod_mat
 
 from kahanmaps.algebra.matrices import combination_of
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
-from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to, gradient_values, product_of
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, gradient_values, product_of
 from kahanmaps.laboratory.preserve.hirota_kimura import span_of_relations
 
 _SPARE = 8
 _ENOUGH = 12
-LARGEST_SPAN = 60  # of W: 1770 unknown entries of A
+# Of W, whose dimension s gives s (s - 1)/2 unknown entries of A: 0.2 s and 10 s.
+SMALL_SPAN, LARGEST_SPAN = 30, 60
 
 Vectors = list[list[int]]
 
@@ -93,24 +93,25 @@ def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
 
 
 def darboux_spaces(
-    map_: ModularMap, degree: int, known: Sequence[DarbouxSpace] = (), seconds: float = 30.0
-) -> list[DarbouxSpace]:
+    map_: ModularMap, degree: int, known: Sequence[DarbouxSpace] = (), largest: int = LARGEST_SPAN
+) -> list[DarbouxSpace] | None:
     """The spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
 
     Relations that no space accounts for have integrals for coefficients that are no P/Q of this degree. None are looked
-    for where relations span too many dimensions.
+    for, and the answer is None, where relations span more than `largest` dimensions.
     """
     prime = map_.prime
-    deadline = time.monotonic() + seconds
-    span = span_of_relations(map_, degree, seconds / 2)
+    span = span_of_relations(map_, degree, 2 * LARGEST_SPAN)
+    if len(span) > 2 * LARGEST_SPAN:
+        return None
     explained = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
     fresh = _complement(explained, span, prime)
     if not fresh:
         return []
     if not explained and _is_darboux(map_, fresh, degree):
         return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
-    if len(fresh) + len(explained) > LARGEST_SPAN or time.monotonic() > deadline:
-        return []
+    if len(fresh) + len(explained) > largest:
+        return None
     solutions = _antisymmetric(map_, [*fresh, *explained], degree)
     bases = [basis for basis in _separate(solutions, fresh, explained, prime) if _is_darboux(map_, basis, degree)]
     if not bases and not explained:
@@ -307,11 +308,15 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
 
 def gradient_rank(map_: ModularMap, spaces: Sequence[DarbouxSpace]) -> int:
     """The number of functionally independent integrals among the ratios of the spaces, at a random point."""
-    prime, x = map_.prime, map_.random_point()
+    return rank(gradients_of_ratios(map_.random_point(), spaces, map_.prime), map_.prime)
+
+
+def gradients_of_ratios(x: Point, spaces: Sequence[DarbouxSpace], prime: int) -> Vectors:
+    """Multiples of the gradients of the ratios of the spaces at a point."""
     rows = []
     for space in spaces:
         values = [gradient_values(vector, x, space.degree, prime) for vector in space.basis]
         q, dq = values[0]
         for p, dp in values[1:]:
             rows.append([(q * a - p * b) % prime for a, b in zip(dp, dq, strict=True)])
-    return rank(rows, prime)
+    return rows

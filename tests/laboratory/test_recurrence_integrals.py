@@ -1,0 +1,94 @@
+"""Integrals of recurrences that are published as integrable, and of their images under scalings and permutations.
+
+The known integrals are checked here along exact orbits first, with Python's fractions.
+"""
+
+from fractions import Fraction
+
+import pytest
+from search_helpers import ranks
+
+from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.files import parse_system
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve import integrals, search
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+
+NAMES = "abcdefg"
+
+
+def of_sums(order):
+    """x_{n+N} = 3/(x_{n+1} ... x_{n+N-1}) - x_n - ... - x_{n+N-1}, and an integral: (P - 3) S, P the product, S the sum.
+
+    With x' = 3/Q - S, Q the product without x_n, P' = Q x' and S' = S - x_n + x': (P' - 3) S' = (P - 3) S.
+    """
+    x = NAMES[:order]
+    return x, f"3/({'*'.join(x[1:])}) - {' - '.join(x)}", [f"({'*'.join(x)} - 3)*({' + '.join(x)})"]
+
+
+def lyness(order):
+    """x_{n+N} = (3 + x_{n+1} + ... + x_{n+N-1})/x_n, and an integral: (3 + S) times all (1 + x_i)/x_i."""
+    x = NAMES[:order]
+    ones = "*".join(f"({c} + 1)" for c in x)
+    return x, f"(3 + {' + '.join(x[1:])})/{x[0]}", [f"(3 + {' + '.join(x)})*{ones}/({'*'.join(x)})"]
+
+
+def image_of(names, last, scales, order):
+    """The map (x_1, ..., x_N) -> (x_2, ..., x_N, last) for y_i = x_i/D_i, the variables in another order."""
+    x = {name: f"({scale}*{name})" for name, scale in zip(names, scales, strict=True)}
+    text = "".join(x.get(c, c) for c in last)
+    images = [f"{x[after]}/({scale})" for after, scale in zip(names[1:], scales, strict=False)]
+    images.append(f"({text})/({scales[-1]})")
+    variables, image = [names[k] for k in order], [images[k] for k in order]
+    return parse_system(f"variables = {variables}\n[map]\nimage = {image}")
+
+
+@pytest.mark.parametrize("case", [of_sums(4), of_sums(5), lyness(3), lyness(4)])
+def test_the_known_integrals_are_constant_along_exact_orbits(case):
+    names, last, known = case
+    point = [Fraction(2), Fraction(3, 2), Fraction(-5, 3), Fraction(7), Fraction(1, 4)][: len(names)]
+    values = set()
+    for _ in range(4):
+        values.add(tuple(eval(text, {}, dict(zip(names, point, strict=True))) for text in known))
+        point = [*point[1:], eval(last, {}, dict(zip(names, point, strict=True)))]
+    assert len(values) == 1
+
+
+@pytest.mark.parametrize(
+    ("case", "count", "scales", "order"),
+    [
+        (of_sums(4), 2, [1, 1, 1, 1], [0, 1, 2, 3]),
+        (of_sums(4), 2, [10**6, "1/3", 7, "2/999983"], [2, 0, 3, 1]),
+        (of_sums(5), 3, [1, 1, 1, 1, 1], [0, 1, 2, 3, 4]),
+        pytest.param(of_sums(5), 3, [3, 10**6, "1/7", 1, 2], [4, 2, 0, 1, 3], marks=pytest.mark.slow),
+        (lyness(3), 2, [2, "1/5", 10**5], [1, 2, 0]),
+        (lyness(4), 2, [1, 1, 1, 1], [0, 1, 2, 3]),
+        pytest.param(lyness(4), 2, [5, 1, "1/1000", 3], [3, 2, 1, 0], marks=pytest.mark.slow),
+        (("abcd", "(1 + a + b + c + d)/a", []), 0, [1, 1, 1, 1], [0, 1, 2, 3]),
+    ],
+)
+def test_all_integrals_of_recurrences_are_found(case, count, scales, order):
+    names, last, known = case
+    file = image_of(names, last, scales, order)
+    found = find_integrals(file)
+    assert (len(found.integrals), found.codimension, found.reason) == (count, count, "")
+    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+    texts = ["".join(f"({scales[names.index(c)]}*{c})" if c in names else c for c in text) for text in known]
+    functions = [parse_rational_function(text, [*file.variables, "eps"]) for text in texts]
+    number, _, of_all = ranks([one.function for one in found.integrals], functions, Laboratory(file).maps[0])
+    assert number == of_all == count  # the known ones are functions of those found
+
+
+def test_the_reason_names_what_was_tried(monkeypatch):
+    names, last, _ = of_sums(4)
+    file = image_of(names, last, [1, 1, 1, 1], range(4))
+    monkeypatch.setattr(integrals, "candidates", lambda *_: [])
+    monkeypatch.setattr(integrals, "LARGEST_SPAN", 2)
+    monkeypatch.setattr(search, "SMALL_SPAN", 2)
+    found = find_integrals(file)
+    assert [one.text for one in found.integrals] == ["(a*b*c*d - 3)*(a + b + c + d)"]
+    assert found.reason == (
+        "1 of the 2 independent integrals has no closed form P/Q among P and Q of degree up to 6 with known cofactors "
+        "or denominators: coefficients of Hirota-Kimura bases are such integrals"
+    )
