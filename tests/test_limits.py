@@ -24,10 +24,8 @@ from kahanmaps.documents.structured_facts import relation_functions
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.invariants.phase_functions import where
-from kahanmaps.laboratory import analysis
-from kahanmaps.laboratory.analyses import growth
+from kahanmaps.laboratory import analysis, defaults
 from kahanmaps.laboratory.cycles import cycle_census
-from kahanmaps.laboratory.growth import degrees
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import densities, hirota_kimura, search
 from kahanmaps.laboratory.preserve.darboux import darboux_spaces
@@ -376,8 +374,7 @@ def test_the_degrees_that_are_tried_in_each_dimension_are_those_of_the_documenta
         f"(at most {densities._MAX_DEGREE}, and {densities._MAX_UNKNOWNS} monomials)",
         f"Where they span more than {darboux_spaces.LARGEST_SPAN} dimensions",
         f"multiplied out up to dimension {expand.MAX_DIMENSION} within",
-        f"Degrees end at {degrees.DEFAULT_MAX_DEGREE} ",
-        f"`analyze` goes to {growth._MAX_DEGREE}.",
+        f"Degrees end at {defaults.ITERATE_DEGREE} (`--max-degree`) or after {defaults.SECONDS['degrees']:.0f} seconds",
         f"Above dimension {singularities.WRITTEN_DIMENSION} `degrees` takes random points",
         f"`singularities` goes up to dimension {singularities.MAX_DIMENSION}",
         f"signed permutations up to dimension {symmetries.MAX_SIGNED}",

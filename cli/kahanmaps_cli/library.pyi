@@ -110,6 +110,8 @@ from kahanmaps.laboratory.analysis import analyze as analyze
 from kahanmaps.laboratory.cycles import Census as Census
 from kahanmaps.laboratory.cycles import cycle_census as cycle_census
 from kahanmaps.laboratory.cycles import default_eps as default_eps
+from kahanmaps.laboratory.defaults import ITERATE_DEGREE as ITERATE_DEGREE
+from kahanmaps.laboratory.defaults import SECONDS as SECONDS
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
 from kahanmaps.laboratory.growth.degrees import degree_growth as degree_growth
 from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS

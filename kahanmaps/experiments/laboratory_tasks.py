@@ -137,7 +137,7 @@ def poisson(
     system: SystemFile,
     eps: Any = None,
     symbolic: list[str] | None = None,
-    max_degree: int = 2,
+    max_degree: int | None = None,
     seconds: int = 30,
     seed: int = 0,
 ) -> Whole:

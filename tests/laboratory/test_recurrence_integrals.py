@@ -19,7 +19,7 @@ NAMES = "abcdefg"
 
 
 def of_sums(order):
-    """x_{n+N} = 3/(x_{n+1} ... x_{n+N-1}) - x_n - ... - x_{n+N-1}, and an integral: (P - 3) S, P the product, S the sum.
+    """x_{n+N} = 3/(x_{n+1} ... x_{n+N-1}) - x_n - ... - x_{n+N-1}; (P - 3) S is kept, P the product and S the sum.
 
     With x' = 3/Q - S, Q the product without x_n, P' = Q x' and S' = S - x_n + x': (P' - 3) S' = (P - 3) S.
     """

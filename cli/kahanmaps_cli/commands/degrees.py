@@ -20,12 +20,17 @@ _SHOWN = 8  # degrees in a line of a table
 @click.command("degrees")
 @opt.system_options
 @opt.eps_options
-@opt.seconds_option(10.0, "Stop after about so many seconds.")
+@opt.seconds_option(lib.SECONDS["degrees"], "Stop after about so many seconds.")
 @click.option(
     "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
 )
 @click.option(
-    "--max-degree", type=int, metavar="D", default=20_000, show_default=True, help="Work out no larger degree."
+    "--max-degree",
+    type=int,
+    metavar="D",
+    default=lib.ITERATE_DEGREE,
+    show_default=True,
+    help="Work out no larger degree.",
 )
 @click.option(
     "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."

@@ -23,7 +23,7 @@ from kahanmaps_cli.screen.terminal import tell
 )
 @opt.seed_option
 @opt.error_bits_option("What is supported is false with probability below 2^-BITS.")
-@opt.seconds_option(60, "Stop about then, and say what is open.")
+@opt.seconds_option(lib.SECONDS["commuting systems"], "Stop about then, and say what is open.")
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """All rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.

@@ -16,7 +16,7 @@ from kahanmaps_cli.screen.progress import Progress
 @opt.system_options
 @click.option("--flow", is_flag=True, help="Densities of the differential equation itself.")
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
-@search_options("density")
+@search_options("density", lib.SECONDS["densities"])
 def command(system: str | None, **options: Any) -> int:
     """Densities of SYSTEM: phi with dx/phi invariant, polynomials of the least degree or products of powers.
 

@@ -41,7 +41,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 )
 @click.option("--flow", is_flag=True, help="Integrals of the differential equation, and what the map makes of them.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
-@search_options("integrals")
+@search_options("integrals", lib.SECONDS["integrals"])
 def command(system: str | None, **options: Any) -> int:
     """Integrals of the map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
 

@@ -16,16 +16,20 @@ from kahanmaps_cli.screen.terminal import tell
 @click.command("find-poisson")
 @opt.system_options
 @click.option(
-    "--degree", type=click.IntRange(0, 20), metavar="D", default=2, show_default=True, help="Largest degree of entries."
+    "--degree",
+    type=click.IntRange(0, 20),
+    metavar="D",
+    help="Largest degree of entries (default: 3 in dimension 3, else 2).",
 )
 @click.option("--denominator", metavar="EXPR", help="A function that all entries are divided by, e.g. a density.")
-@search_options("poisson")
+@search_options("poisson", lib.SECONDS["Poisson tensors"])
 def command(system: str | None, **options: Any) -> int:
     """Poisson tensors of SYSTEM: skew P(x), its entries polynomials, that the map preserves, dPhi P dPhi^T = P(x~).
 
     \b
       kahanmaps find-poisson lotka_volterra
-      kahanmaps find-poisson euler_top --degree 3
+      kahanmaps find-poisson euler_top
+      kahanmaps find-poisson volterra_periodic_4 --degree 3
       kahanmaps find-poisson weierstrass --symbolic g2 --toml
 
     They are told by brackets {x_i, x_j} = P_ij, with rank, the Jacobi identity, the Casimirs and the involution of the

@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.terminal import tell
 
 @click.command("find-symmetry")
 @system_options
-@seconds_option(30, "Stop about then, and say what is open.")
+@seconds_option(lib.SECONDS["symmetries"], "Stop about then, and say what is open.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Affine symmetries T Phi T^-1 = Phi and reversing symmetries T Phi T^-1 = Phi^-1 of the map of SYSTEM.

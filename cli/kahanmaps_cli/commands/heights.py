@@ -39,7 +39,7 @@ from kahanmaps_cli.screen.value_rows import Cell, table
 @click.option(
     "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
-@opt.seconds_option(30.0, "Stop after about so many seconds.")
+@opt.seconds_option(lib.SECONDS["heights"], "Stop after about so many seconds.")
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:

@@ -22,7 +22,7 @@ from kahanmaps_cli.screen.terminal import formula, tell
     metavar="N",
     help="Steps to follow each hypersurface for (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
 )
-@opt.seconds_option(60.0, "Time for each eps.")
+@opt.seconds_option(lib.SECONDS["singularities"], "Time for each eps.")
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:

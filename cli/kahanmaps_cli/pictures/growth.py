@@ -35,12 +35,17 @@ _scale_option = click.option(
     opt.inline_options,
     click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
     opt.eps_options,
-    opt.seconds_option(10.0, "Stop each system after about so many; the picture takes seconds more."),
+    opt.seconds_option(lib.SECONDS["degrees"], "Stop each system after about so many; the picture takes seconds more."),
     click.option(
         "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
     ),
     click.option(
-        "--max-degree", type=int, metavar="N", default=20_000, show_default=True, help="Work out no larger degree."
+        "--max-degree",
+        type=int,
+        metavar="N",
+        default=lib.ITERATE_DEGREE,
+        show_default=True,
+        help="Work out no larger degree.",
     ),
     opt.seed_option,
     _scale_option,
@@ -112,7 +117,7 @@ def _add(growths: dict[str, lib.DegreeGrowth], name: str, found: lib.DegreeGrowt
         show_default=True,
         help="Digit budget of each orbit.",
     ),
-    opt.seconds_option(30.0, "Stop after about so many seconds."),
+    opt.seconds_option(lib.SECONDS["heights"], "Stop after about so many seconds."),
     opt.seed_option,
     _scale_option,
 )

@@ -15,12 +15,12 @@ from kahanmaps_cli.screen.terminal import formula, tell
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def search_options(section: str) -> Callable[[F], F]:
-    """eps, --symbolic, --seconds, --seed and the forms of output; `section` is that of a system file."""
+def search_options(section: str, seconds: float) -> Callable[[F], F]:
+    """eps, --symbolic, --seconds with this default, --seed and the output; `section` is that of a system file."""
     return opt.stack(
         opt.eps_options,
         opt.symbolic_option,
-        opt.seconds_option(60, "Time for the search."),
+        opt.seconds_option(seconds, "Time for the search."),
         opt.seed_option,
         click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
         click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),

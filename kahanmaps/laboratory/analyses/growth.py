@@ -13,7 +13,6 @@ from kahanmaps.laboratory.growth.height_survey import HeightSurvey, height_surve
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.singular.singularities import WRITTEN_DIMENSION, patterns_of
 
-_MAX_DEGREE = 200_000
 _SHOWN_DEGREES = 12
 
 
@@ -23,7 +22,7 @@ def degrees(run: Run, **budget: Any) -> DegreeGrowth:
     # Where they are known to the end and are those that `degrees` would ask for itself.
     known = patterns_of(runs) if runs else None
     given: dict[str, Any] = {"patterns": None if known is None or known.running else known, "seed": run.seed}
-    return degree_growth(run.map, run.found.eps, max_degree=_MAX_DEGREE, **given, **budget)
+    return degree_growth(run.map, run.found.eps, **given, **budget)
 
 
 def heights(run: Run, **budget: Any) -> HeightSurvey:

@@ -10,14 +10,14 @@ from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson, with_brackets
 
-_DEGREES = {3: 3, 4: 2}  # of the tensors by dimension; in the plane they are densities
+_DIMENSIONS = (3, 4)  # in the plane they are densities, and in more dimensions they take long
 
 
 def poisson(run: Run, **budget: Any) -> PoissonSearch | None:
     """Those of low degree, in dimensions 3 and 4."""
-    if run.dim not in _DEGREES:
+    if run.dim not in _DIMENSIONS:
         return None
-    return find_poisson(run.bare, _DEGREES[run.dim], integrals=(), **run.asked, **budget)
+    return find_poisson(run.bare, integrals=(), **run.asked, **budget)
 
 
 def with_brackets_of_integrals(run: Run, seconds: float, **_: Any) -> PoissonSearch | None:

@@ -73,7 +73,7 @@ ANALYSES = (
         "integrals",
         integrals.statements,
         Of.EVERY,
-        share=0.45,
+        share=0.4,
         reads=("the commuting family", "degrees", "invariant curves", "relations along orbits"),
     ),
     Part("invariant curves", integrals.curves, of=Of.MAPS_OVER_Q, result="pencil", json=integrals.curves_json),

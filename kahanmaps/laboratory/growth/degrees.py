@@ -34,6 +34,7 @@ from kahanmaps.algebra.written.text import format_number
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.defaults import ITERATE_DEGREE, SECONDS
 from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, Recurrence, find_recurrence
@@ -46,8 +47,6 @@ from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-DEFAULT_SECONDS = 10.0
-DEFAULT_MAX_DEGREE = 20_000
 _MOST_TERMS = 10_000
 _LINES = 2
 _OFTEN, _SELDOM = 64, 8  # up to so many terms a recurrence is looked for after each, then after so many
@@ -239,9 +238,9 @@ def degree_growth(
     system: QuadraticSystem | BirationalMap,
     eps: Any = None,
     *,
-    seconds: float = DEFAULT_SECONDS,
+    seconds: float = SECONDS["degrees"],
     max_terms: int | None = None,
-    max_degree: int = DEFAULT_MAX_DEGREE,
+    max_degree: int = ITERATE_DEGREE,
     seed: int = 0,
     steps: int | None = None,
     patterns: Patterns | None = None,

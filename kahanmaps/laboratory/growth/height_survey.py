@@ -25,6 +25,7 @@ from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, height_growth
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -33,7 +34,6 @@ DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
 DEFAULT_STARTS = 3
 DEFAULT_STEPS = 60
 DEFAULT_MAX_DIGITS = 20_000
-DEFAULT_SECONDS = 30.0
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
 _MOST_STARTS = 1000
@@ -131,7 +131,7 @@ def height_survey(
     starts: Sequence[Any] | int = DEFAULT_STARTS,
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
-    seconds: float = DEFAULT_SECONDS,
+    seconds: float = SECONDS["heights"],
     normal_form: SystemNormalForm | NoNormalForm | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,

@@ -24,6 +24,7 @@ from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, counted
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -154,7 +155,7 @@ def find_densities(
     flow: bool = False,
     max_degree: int | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
-    seconds: float = 30.0,
+    seconds: float = SECONDS["densities"],
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DensitySearch:

@@ -26,6 +26,7 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, denominators_among
@@ -232,7 +233,7 @@ def find_integrals(
     eps: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
-    seconds: float = 60.0,
+    seconds: float = SECONDS["integrals"],
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> IntegralSearch:

@@ -27,6 +27,7 @@ from kahanmaps.algebra.written.plain import all_fields, attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
 from kahanmaps.laboratory.singular.contracted import OrdersUnknown, contracted
@@ -166,7 +167,7 @@ def singularities(
     *,
     steps: int | None = None,
     seed: int = 0,
-    seconds: float = 60.0,
+    seconds: float = SECONDS["singularities"],
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
     """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their outcome.

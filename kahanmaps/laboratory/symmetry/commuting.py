@@ -27,6 +27,7 @@ from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.symmetry.commuting_equations import commutator_equations
 from kahanmaps.laboratory.symmetry.commuting_proofs import affine, judge_family, judge_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
@@ -39,7 +40,6 @@ from kahanmaps.laboratory.symmetry.commuting_space import (
 )
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
-DEFAULT_SECONDS = 60
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
 MAX_TOLD = 6  # sentences about equations that were not solved
 QUICK_DIMENSION, QUICK_SECONDS = 3, 1.0  # all quadratic g are tried by default: some hundredths of a second as a rule
@@ -158,7 +158,7 @@ def commuting_systems(
     *,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    seconds: float = DEFAULT_SECONDS,
+    seconds: float = SECONDS["commuting systems"],
     progress: Callable[[str], None] = lambda _: None,
     C: fmpq_mat | None = None,
 ) -> CommutingSystems:

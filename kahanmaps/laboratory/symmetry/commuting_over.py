@@ -17,8 +17,8 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.errors import InputError
 from kahanmaps.family.tensor import GENERATOR, over_algebra
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.symmetry.commuting import (
-    DEFAULT_SECONDS,
     CommutingField,
     CommutingSystems,
     commuting_systems,
@@ -35,7 +35,7 @@ def find_commuting(
     *,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    seconds: float = DEFAULT_SECONDS,
+    seconds: float = SECONDS["commuting systems"],
     progress: Callable[[str], None] = lambda _: None,
 ) -> CommutingSystems:
     """All quadratic g whose Kahan map commutes with that of f at the same eps, over Q or the number field of f.

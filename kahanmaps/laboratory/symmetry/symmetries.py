@@ -24,12 +24,12 @@ from kahanmaps.algebra.written.plain import attributes, plain
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
 from kahanmaps.laboratory.symmetry.symmetry_equations import is_singular, matrix_equations, translation
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
-DEFAULT_SECONDS = 30
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
 MAX_LISTED = 200  # of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
@@ -175,7 +175,7 @@ class Symmetries(Printed):
 def linear_symmetries(
     system: QuadraticSystem,
     *,
-    seconds: float = DEFAULT_SECONDS,
+    seconds: float = SECONDS["symmetries"],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Symmetries:
     """Affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.

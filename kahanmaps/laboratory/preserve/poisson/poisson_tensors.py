@@ -35,6 +35,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps
 from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.laboratory.defaults import SECONDS, tensor_degree
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import (
     Independent,
@@ -185,13 +186,13 @@ class PoissonSearch(Search):
 
 def find_poisson(
     file: SystemFile,
-    degree: int = 2,
+    degree: int | None = None,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
     denominator: RationalFunction | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
-    seconds: float = 60.0,
+    seconds: float = SECONDS["Poisson tensors"],
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> PoissonSearch:
@@ -199,7 +200,7 @@ def find_poisson(
 
     Args:
         file: the map; a system stands for its Kahan map.
-        degree: of the entries in the variables, or of their numerators.
+        degree: of the entries in the variables, or of their numerators; by default 3 in dimension 3, and else 2.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, or None for formulas that contain eps (the time step is 2 eps, where there is one).
         denominator: a function of the variables and eps by which the entries are divided; None: where there are no
@@ -222,6 +223,7 @@ def find_poisson(
     >>> [(one.text, str(one.verdict), one.rank) for one in found.tensors]
     [('{x,y} = x*y', 'proved', 2)]
     """
+    degree = tensor_degree(file.dim) if degree is None else degree
     if degree < 0 or not seconds > 0:
         raise InputError(f"found the degree {degree} and {seconds} seconds, expected at least 0 and a time above 0")
     laboratory = Laboratory(file, symbols, eps, seed)

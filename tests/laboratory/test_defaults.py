@@ -1,0 +1,96 @@
+"""A command that does one analysis alone finds no less than `analyze`, both with their defaults."""
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+import pytest
+from search_helpers import analysis_of, integrals_of
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.laboratory import analysis, defaults
+from kahanmaps.laboratory.analyses import growth
+from kahanmaps.laboratory.analyses.table import ANALYSES
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
+from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+from kahanmaps_cli.main import cli
+
+COMMANDS = {
+    "integrals": "find-integrals",
+    "densities": "find-density",
+    "Poisson tensors": "find-poisson",
+    "singularities": "singularities",
+    "degrees": "degrees",
+    "heights": "heights",
+    "symmetries": "find-symmetry",
+    "commuting systems": "find-commuting",
+}
+SHARES = {part.name: part.share for part in ANALYSES}
+
+
+def command(name: str) -> click.Command:
+    found = cli.get_command(click.Context(cli), name)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("part", defaults.SECONDS)
+def test_no_part_of_analyze_has_more_time_than_its_command(part: str) -> None:
+    longest = SHARES[part] * analysis._MOST_SECONDS
+    assert longest <= defaults.SECONDS[part]
+    [option] = [one for one in command(COMMANDS[part]).params if one.name == "seconds"]
+    assert option.default == defaults.SECONDS[part]
+
+
+@pytest.mark.parametrize("dim", range(1, 5))
+def test_degrees_have_time_for_the_singularities_too(dim: int) -> None:
+    shares = SHARES["singularities"] + SHARES["degrees"]
+    assert shares * analysis._SECONDS[dim] <= defaults.SECONDS["degrees"]
+    [option] = [one for one in command("degrees").params if one.name == "max_degree"]
+    assert option.default == defaults.ITERATE_DEGREE
+
+
+def test_heights_are_of_as_many_orbits_and_digits() -> None:
+    options = {one.name: one.default for one in command("heights").params}
+    found = analysis_of("euler_top").heights
+    assert found is not None
+    assert len(found.orbits) <= growth.height_survey.__kwdefaults__["starts"] * 2
+    assert options["max_digits"] >= 5_000
+
+
+SEARCHES: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
+    ("integrals", integrals_of, lambda found: [one.text for one in found.integrals]),
+    ("densities", lambda name: find_densities(load(name)), lambda found: [one.text for one in found.densities]),
+    ("poisson", lambda name: find_poisson(load(name)), lambda found: [one.text for one in found.tensors]),
+    (
+        "symmetries",
+        lambda name: linear_symmetries(load(name).system),
+        lambda found: [one.text for one in found.generators],
+    ),
+    ("commuting", lambda name: find_commuting(load(name).system), lambda found: [str(g.rhs) for g in found.solutions]),
+    ("degrees", lambda name: degree_growth(load(name).map), lambda found: [found.growth_text]),
+]
+
+
+@pytest.mark.parametrize("name", ["euler_top", "lotka_volterra", "volterra_periodic_3", "weierstrass"])
+@pytest.mark.parametrize(("result", "search", "texts"), SEARCHES, ids=[row[0] for row in SEARCHES])
+def test_what_analyze_finds_the_command_finds(
+    name: str, result: str, search: Callable[[str], Any], texts: Callable[[Any], list[str]]
+) -> None:
+    together = analysis_of(name)[result]
+    alone = search(name)
+    if together is None:  # tensors of the plane are densities
+        assert (result, load(name).dim) == ("poisson", 2)
+        return
+    # No integral is known of the map of Lotka and Volterra.
+    assert texts(together) or (result, name) == ("integrals", "lotka_volterra")
+    assert set(texts(together)) <= set(texts(alone))
+
+
+def test_the_three_tensors_of_the_euler_top_are_found_without_a_degree() -> None:
+    found = find_poisson(load("euler_top"), integrals=())
+    assert (found.degree, len(found.tensors)) == (3, 3)
+    assert find_poisson(load("euler_top"), 2, integrals=()).tensors == ()
