@@ -19,7 +19,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.singular.outcomes import Hypersurface
-from kahanmaps.laboratory.singular.written import name_of
+from kahanmaps.laboratory.singular.written import factors_at_finite_points, name_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import BirationalMap
 
@@ -57,12 +57,16 @@ def _named(map_: BirationalMap, eps: fmpq, stage: int | None) -> dict[str, str]:
     common = reduce(lambda P, Q: P.gcd(Q), forms)
     forms = [form / common for form in forms]
     size = max(sum(m[:-1]) for form in forms for m in form.monoms()) - 1
-    if size < 1 or comb((n + 1) * size + n, n) > _MOST_TERMS:
+    if size < 1:
         return {}
-    zero = context.constant(0)
-    critical = kernel_minors([[*(form.derivative(j) for j in range(n + 1)), zero] for form in forms])[-1]
+    if comb((n + 1) * size + n, n) <= _MOST_TERMS:
+        zero = context.constant(0)
+        critical = kernel_minors([[*(form.derivative(j) for j in range(n + 1)), zero] for form in forms])[-1]
+        factors = critical.factor()[1]
+    else:
+        factors = factors_at_finite_points(forms) or []
     affine, found = ring((*variables, "eps")), {}
-    for factor, _ in critical.factor()[1]:
+    for factor, _ in factors:
         if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
             continue
         value = factor.compose(*at_eps.gens(), at_eps.constant(eps), ctx=at_eps)

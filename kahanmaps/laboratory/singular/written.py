@@ -10,6 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
 from math import comb, prod
 from typing import Any
 
@@ -23,9 +24,11 @@ from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Followed, Hypersurface, Tracking, Written, outcome_of
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 
 _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
+_MAX_PRODUCTS = 300_000  # of terms, for the numerator of that of the affine map
 
 
 @dataclass(frozen=True)
@@ -58,14 +61,15 @@ def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
             found[str(factor)] = Written(factor, True, 0)
     if map_.degree <= 1:
         return list(found.values()), 0
-    critical = _critical(forms, map_.degree)
+    critical_degree = len(forms) * (map_.degree - 1)
+    critical = _critical_factors(forms, critical_degree)
     if critical is None:
         infinity = forms[0].context().gens()[-1]
         poles = [Written(one.form, one.is_pole, None) for one in found.values()]
         return [*poles, Written(infinity, False, None)], None
-    for factor, multiplicity in critical.factor()[1]:
+    for factor, multiplicity in critical:
         found[str(factor)] = Written(factor, str(factor) in found, int(multiplicity))
-    return list(found.values()), int(critical.total_degree())
+    return list(found.values()), critical_degree
 
 
 def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -> tuple[list[Followed], list[Followed]]:
@@ -109,7 +113,13 @@ def followed_map_by_map(
 def is_long(map_: MapOver) -> bool:
     """Whether a composition is too long for the Jacobian determinant of its forms, unless degrees drop."""
     degree = prod(equation.image_degree for equation in map_.equations)
-    return len(map_.equations) > 1 and _size(map_.dim + 1, degree) > _MAX_TERMS
+    size = map_.dim + 1
+    return len(map_.equations) > 1 and not _is_short(size, size * (degree - 1))
+
+
+def _is_short(size: int, degree: int) -> bool:
+    """Whether a form in so many variables, of this degree, has few enough terms to be expanded."""
+    return comb(degree + size - 1, size - 1) <= _MAX_TERMS
 
 
 def period_of(equations: tuple[Equation, ...]) -> int:
@@ -119,18 +129,75 @@ def period_of(equations: tuple[Equation, ...]) -> int:
     return next(k for k in range(1, size + 1) if size % k == 0 and known[k:] == known[: size - k])
 
 
-def _critical(forms: list[Any], degree: int) -> Any:
-    """The Jacobian determinant of the homogeneous map, None where it is too large."""
-    size = len(forms)
-    if _size(size, degree) > _MAX_TERMS:
+def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | None:
+    """The irreducible factors of the Jacobian determinant of forms, with multiplicities; None where it is too large.
+
+    The determinant is not zero, and has this degree.
+    """
+    size, context = len(forms), forms[0].context()
+    zero, infinity = context.constant(0), context.gens()[-1]
+    if _is_short(size, degree):
+        rows = [[*(form.derivative(j) for j in range(size)), zero] for form in forms]
+        return [(factor, int(k)) for factor, k in kernel_minors(rows)[-1].factor()[1]]
+    finite = factors_at_finite_points(forms)
+    if finite is None:
         return None
-    zero = forms[0].context().constant(0)
-    return kernel_minors([[*(form.derivative(j) for j in range(size)), zero] for form in forms])[-1]
+    found = []
+    for factor, k in finite:
+        total = int(factor.total_degree())
+        form = context.from_dict({(*m[:-1], total - sum(m)): c for m, c in factor.terms()})
+        found.append((form, k))
+        degree -= k * total
+    return [*found, (infinity, degree)] if degree else found
 
 
-def _size(size: int, degree: int) -> int:
-    """The number of terms of the determinant of so many forms of a degree, at most."""
-    return comb(size * (degree - 1) + size - 1, size - 1)
+def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
+    """The factors of the Jacobian determinant of forms at Z = 1, with multiplicities; None where it is too large.
+
+    There the determinant of n + 1 forms F_1, ..., F_n, F_0 of degree d in (X : Z) is d F_0^(n+1) det dy/dx, where
+    y_i = F_i/F_0, by Euler's relation. Of det dy/dx denominators and contents of rows are known as factors, so that
+    only the rest is expanded. Symbols may follow Z.
+    """
+    n, context = len(forms) - 1, forms[0].context()
+    affine_point = [context.constant(1) if k == n else x for k, x in enumerate(context.gens())]
+    *numerators, denominator = (form.compose(*affine_point, ctx=context) for form in forms)
+    multiplicities: dict[str, tuple[Any, int]] = {}
+
+    def multiply(polynomial: Any, power: int) -> None:
+        for factor, k in polynomial.factor()[1]:
+            _, before = multiplicities.get(str(factor), (factor, 0))
+            multiplicities[str(factor)] = factor, before + power * int(k)
+
+    multiply(denominator, n + 1)
+    rows = []
+    for numerator in numerators:
+        common = numerator.gcd(denominator)
+        P, Q = numerator / common, denominator / common
+        row = [Q * P.derivative(j) - P * Q.derivative(j) for j in range(n)]
+        content = reduce(lambda left, right: left.gcd(right), row)
+        multiply(Q, -2)
+        multiply(content, 1)
+        rows.append([*(None if entry.is_zero() else entry / content for entry in row), None])
+    products = 0
+
+    def count_products(pairs: list[tuple[Any, Any]]) -> None:
+        nonlocal products
+        products += sum(len(entry) * len(minor) for entry, minor in pairs)
+        if products > _MAX_PRODUCTS:
+            raise TooLarge("the determinant of the affine map is too large")
+
+    try:
+        determinant = kernel_minors(sorted(rows, key=_terms), foresee=count_products)[-1]
+    except TooLarge:
+        return None
+    if len(determinant) > _MAX_TERMS:
+        return None
+    multiply(determinant, 1)
+    return [(factor, k) for factor, k in multiplicities.values() if k]
+
+
+def _terms(row: list[Any]) -> int:
+    return sum(len(entry) for entry in row if entry is not None)
 
 
 def is_infinity(factor: Any) -> bool:

@@ -1,0 +1,95 @@
+"""Growth of maps that are given by formulas: exceptional hypersurfaces by the affine Jacobian, and published rates."""
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.documents.catalog import load
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.singular import written
+from kahanmaps.laboratory.singular.generic import with_eps
+from kahanmaps.laboratory.singular.outcomes import NO_TIME, POINTS_DIFFER, Hypersurface, _agreed
+from kahanmaps.laboratory.singular.singularities import patterns, singularities
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.projective import homogeneous_map
+
+
+def by_formulas(variables: str, image: str):
+    names = variables.split(",")
+    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
+
+
+POLES = [Hypersurface(f"b*c*d*e - {k}") for k in (5, 6)]
+DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
+
+
+@pytest.mark.parametrize(
+    ("variables", "image"),
+    [
+        ("x,y", "y; -x + 1/y^3"),
+        ("x,y", "y; (1 + y)/x"),
+        ("x,y", "y/1000; -1000*x + 7/(y^2 - 3)"),
+        ("x,y", "x*(1 - y)/(1 + x*y); y*(x + 1)^2/(x - y^2)"),
+        ("x,y,z", "y; z; (y + z^2)/(x*(1 + y*z))"),
+        ("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"),
+        ("x,y", "x + y^2; y"),  # contracts nothing but infinity
+    ],
+)
+def test_the_affine_jacobian_has_the_factors_of_the_homogeneous_one(variables, image, monkeypatch):
+    forms = homogeneous_map(by_formulas(variables, image).at(1))
+    expanded, degree = written.written(forms)
+    monkeypatch.setattr(written, "_is_short", lambda size, degree: False)
+    by_affine_map, same_degree = written.written(forms)
+    assert (sorted(map(repr, by_affine_map)), same_degree) == (sorted(map(repr, expanded)), degree)
+
+
+@pytest.mark.parametrize("name", ["lotka_volterra", "euler_top", "dressing_chain_3"])
+def test_the_affine_jacobian_of_kahan_maps(name):
+    forms = homogeneous_map(load(name).map.at(1)).forms
+    homogeneous = written._critical_factors(forms, len(forms) * (forms[0].total_degree() - 1))
+    finite = {str(factor.subs({"z": 1})): k for factor, k in homogeneous}
+    finite.pop("1", None)
+    assert {str(factor): k for factor, k in written.factors_at_finite_points(forms)} == finite
+
+
+def test_the_hypersurfaces_of_a_map_of_dimension_5_are_written():
+    run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1, seconds=200)
+    assert (str(run.verdict), run.critical_degree) == ("confined", 24)
+    assert [(h.polynomial, h.multiplicity) for h in run.hypersurfaces] == [(x, 6) for x in "edcb"]
+
+
+def test_exceptional_hypersurfaces_are_named_over_eps_by_the_affine_jacobian():
+    map_ = by_formulas("a,b,c,d,e", "b; c; d; (e + eps)/c; 2/(b*c*d*e - 2*eps) - a")
+    names = {h.polynomial: h.generic for h in with_eps(map_, fmpq(3), POLES)}
+    assert names["b*c*d*e - 6"] == "b*c*d*e - 2*eps"
+    assert names["b*c*d*e - 5"] == ""
+
+
+def test_too_many_products_are_reported_as_too_large(monkeypatch):
+    monkeypatch.setattr(written, "_MAX_PRODUCTS", 0)
+    run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1, seconds=200)
+    assert "too large to be written down" in run.hypersurfaces[-1].note
+
+
+@pytest.mark.parametrize(
+    ("variables", "image"),
+    [("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"), ("a,b,c,d,e", DIMENSION_5)],
+)
+def test_published_maps_of_dimension_4_and_5_have_derived_quadratic_growth(variables, image):
+    found = degree_growth(by_formulas(variables, image), max_terms=20, seconds=200)
+    assert (str(found.growth), found.explained is not None) == ("quadratic", True)
+
+
+@pytest.mark.parametrize(("k", "rate"), [(3, "3"), (5, "5"), (4, "t^2 - 4*t + 1"), (6, "t^2 - 6*t + 1")])
+def test_the_published_rates_of_a_planar_family(k, rate):
+    found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), seconds=200, enclosed=False)
+    assert found.explained is not None
+    assert found.dynamical_degree.text.endswith(rate)
+
+
+def test_orders_that_are_cut_by_the_time_do_not_differ():
+    one, other = Hypersurface(contracted_at=1), Hypersurface(contracted_at=2)
+    assert [_agreed(one, other, is_over)[1] for is_over in (True, False)] == [NO_TIME, POINTS_DIFFER]
+    assert _agreed(one, one, True) == (one, "")
+    late = patterns(by_formulas("x,y", "y; -x + 1/y^3"), None, seconds=1e-6)
+    assert late.running == "the time was over before all singularities were followed (--seconds)"
