@@ -317,10 +317,10 @@ def lorenz_along(seed, limits):
 
 def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():
     for seed in range(4):
-        found = lorenz_along(seed, Range(4, 4, 4, time.monotonic() + 20))
+        found = lorenz_along(seed, Range(4, 4, 4, time.monotonic() + 20, 4))
         assert (found.status, found.degree, len(set(found.primes))) == (NOT_CONTRACTED, 2, 2)
         assert [(step.common, step.rank) for step in found.steps] == [(0, 2)] * 4
-    late = lorenz_along(0, Range(4, 4, 4, time.monotonic() - 1))
+    late = lorenz_along(0, Range(4, 4, 4, time.monotonic() - 1, 4))
     assert (late.status, late.note) == (UNDECIDED, NO_TIME)
 
 
@@ -428,7 +428,7 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
         yield SimpleNamespace(name="last", common=0)
 
     monkeypatch.setattr("kahanmaps.laboratory.singular.following.images_of_curve", images_of_curve)
-    limits = Range(0, 0, 0, options.get("end", math.inf))
+    limits = Range(0, 0, 0, options.get("end", math.inf), 0)
     run, whole = Course((), (), (), limits).steps(steps, most=options.get("most", 4096))
     assert ([step.name for step in run], whole, tried) == found
 

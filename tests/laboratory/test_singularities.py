@@ -255,7 +255,7 @@ def test_a_curve_whose_first_step_is_not_seen_before_the_time_is_over_is_told():
     here, over = map_.at(fmpq(1)), map_.at(fmpq(1), field)
     forms = contracted._forms(here.equations[0], here.inverse.equations[0], 1)
     functions = tuple(form_order(form, field) for form in forms.all)
-    _, _, curves = contracted._on_line(over.factors[0], forms, functions, Range(1, 1, 1, 0.0), random.Random(1))
+    _, _, curves = contracted._on_line(over.factors[0], forms, functions, Range(1, 1, 1, 0.0, 1), random.Random(1))
     assert len(curves) == 2
     with pytest.raises(contracted.OrdersUnknown, match="the time was over"):
         [curve.key for curve in curves]

@@ -85,6 +85,11 @@ class Line:
         drawn = (nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(map_.dim))
         self._X = [*drawn, nmod_poly([1], p)] if start is None else list(start)
 
+    @property
+    def is_explicit(self) -> bool:
+        """Whether images are values of short forms."""
+        return all(equation.explicit is not None for equation in self._equations)
+
     def step(self, guess: int) -> None:
         """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""
         for equation in self._equations:

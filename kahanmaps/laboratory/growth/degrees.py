@@ -297,12 +297,14 @@ class _Search:
         self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
         self._rng = random.Random(f"degrees {seed_for(seed, map_.subject, eps)}")
         self._replaced = 0
+        self._is_explicit = False
         self.degrees = [1]
         self.notes: list[str] = []
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
         """Step after step until something ends it."""
         lines = [self._line() for _ in range(_LINES)]
+        self._is_explicit = lines[0].is_explicit
         try:
             while True:
                 self._look_at_fit(max_terms is None)
@@ -337,8 +339,8 @@ class _Search:
         if size < 2 or (size > _OFTEN and size % _SELDOM):
             return
         found = find_recurrence(self.degrees)
-        # Above dimension 4 series are slow and wait until degrees say something. Affine maps contract nothing.
-        soon = self._map.dim <= WRITTEN_DIMENSION or found is not None
+        # Above dimension 4 series of maps without short forms are slow and wait until degrees say something.
+        soon = self._map.dim <= WRITTEN_DIMENSION or found is not None or self._is_explicit
         if soon:
             self._follow()
         if not may_stop:

@@ -49,7 +49,8 @@ _MOST_STEPS = 120
 _DIGITS = 6
 _TRIES = 4
 _MOST_WRITTEN = 12  # iterates
-_MOST_TERMS = 300  # of a coordinate of the last one
+_MOST_TERMS = 300  # of a coordinate of the last but one
+_MOST_NEXT_TERMS = 4000  # of the last one, which has about degree^2 times as many
 
 
 @dataclass(frozen=True)
@@ -244,14 +245,19 @@ def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Itera
         terms: dict[tuple[int, ...], Any] = {(i, j, size - i - j, k): c for (i, j, k), c in entry.terms()}
         return ring.from_dict(terms).compose(*X, value, ctx=ring)
 
-    rows = [[form(entry) for entry in row] for row in map_.rows]
+    def without_common_factor(image: list[fmpq_mpoly]) -> list[fmpq_mpoly]:
+        common = reduce(fmpq_mpoly.gcd, image)
+        return [entry / common for entry in image]
+
+    # Minors of composed rows would have the same forms with a power of their common factor, of a far higher degree.
+    forms = without_common_factor(kernel_minors([[form(entry) for entry in row] for row in map_.rows]))
+    degree = max(degree_in(entry, 3) for entry in forms)
+    most_terms = min(_MOST_TERMS, _MOST_NEXT_TERMS // max(1, degree) ** 2)
     iterate = list(X)
     for _ in range(_MOST_WRITTEN):
-        image = kernel_minors([[entry.compose(*iterate, symbol, ctx=ring) for entry in row] for row in rows])
-        common = reduce(fmpq_mpoly.gcd, image)
-        iterate = [entry / common for entry in image]
+        iterate = without_common_factor([entry.compose(*iterate, symbol, ctx=ring) for entry in forms])
         yield max(degree_in(entry, 3) for entry in iterate)
-        if time.monotonic() > end or max(map(len, iterate)) > _MOST_TERMS:
+        if time.monotonic() > end or max(map(len, iterate)) > most_terms:
             return
 
 

@@ -33,7 +33,7 @@ from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
 from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
-from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, Hypersurface
+from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
 
@@ -368,8 +368,10 @@ def _followed(
         if key[0]:
             by_prime = {curve.prime: (curve, along) for curve, along in pairs}
             orders = [curve.course(along).orders(_FIRST) for curve, along in list(by_prime.values())[:2]]
-            if len(orders) < 2 or orders[0].known != orders[1].known:
-                raise OrdersUnknown("two points tell different things")
+            if len(orders) < 2:
+                raise OrdersUnknown("a hypersurface with points modulo one prime only")
+            if orders[0].known != orders[1].known:
+                raise OrdersUnknown(POINTS_DIFFER)
             found.append(_hypersurface(key, size, tuple(by_prime)[:2], orders[0].of(columns)))
     return found
 

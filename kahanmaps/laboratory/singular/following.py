@@ -24,7 +24,7 @@ from kahanmaps.laboratory.singular.orders import NOTHING, AlongCurves, Orders, T
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-_MOST_ALONG = 2048  # where series are followed far
+_FIRST_ALONG, _MOST_ALONG = 512, 2048  # where series are followed far: a step costs at least as much as their length
 _CONSTANT = 8  # so often at least is the same order repeated that goes on
 _CHECKED = 4  # further orders have to follow a recurrence than tell it
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
@@ -36,13 +36,15 @@ class Range:
 
     Memory can only come back where the image of a hypersurface meets points without a value. Beyond the first steps
     its image is therefore followed as a point, which is cheap. Where it meets such points along series again, which is
-    not: for at most `along` steps. `end` is the time of the monotonic clock at which all of it stops.
+    not: for at most `along` steps, or `enough` if orders repeat and each step uses up terms, so that series are long.
+    `end` is the time of the monotonic clock at which all of it stops.
     """
 
     shown: int
     reach: int
     along: int
     end: float
+    enough: int
 
     @property
     def is_over(self) -> bool:
@@ -121,9 +123,9 @@ class Course:
         `first` is the number of steps to begin with. The image may move on a critical hypersurface until something
         happens, so that orders have to repeat for as long as curves are followed.
         """
-        steps, limits = first, self.limits
+        steps, limits, most = first, self.limits, _FIRST_ALONG
         while True:
-            run, is_whole = self.steps(steps, most=_MOST_ALONG)
+            run, is_whole = self.steps(steps, most=most)
             rows = self.tracked.rows(run)
             last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
             hit = None
@@ -134,10 +136,14 @@ class Course:
             found = [find_recurrence(column) for column in zip(*rows, strict=True)]
             repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
             is_cut = not is_whole and not limits.is_over  # by the precision
-            if rows and repeats and (len(run) >= min(limits.reach, limits.along) or is_cut):
+            is_far = len(run) >= min(limits.reach, limits.along)
+            if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
                 laws = tuple(one.characteristic for one in found if one is not None)
                 kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
                 return Orders(rows[:kept], laws, len(run), True)
+            if is_cut and most < _MOST_ALONG:
+                most *= 2
+                continue
             longest = min(limits.reach, max(limits.along, 2 * (hit or 0)))
             if rows and is_cut and (beyond := self._met_for_ever(run[-1].limit)) is not None:
                 others = (

@@ -53,7 +53,8 @@ class Outcome(StrEnum):
 
 CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = Outcome
 NO_POINT = "no point was followed"
-NO_TIME = "no two points could be followed in time"
+NO_TIME = "the time was over before two points were followed (--seconds)"
+POINTS_DIFFER = "the orders along two curves through it modulo different primes are not the same (another --seed)"
 
 
 @dataclass(frozen=True)
@@ -201,15 +202,17 @@ def outcome_of(
             note = NO_TIME if limits.is_over else "the series lost all their terms"
             break
     if len(outcomes) == _POINTS:
-        found, note = _agreed(*outcomes.values())
+        found, note = _agreed(*outcomes.values(), limits.is_over)
     known = replace(found, polynomial=text, degree=int(one.form.total_degree()), is_pole=one.is_pole, note=note)
     return replace(known, multiplicity=one.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
-def _agreed(one: Hypersurface, other: Hypersurface) -> tuple[Hypersurface, str]:
-    """What two points tell, with a note where they do not tell the same."""
+def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
+    """The outcome at two points, with a note where it is not the same: if the time `is_over`, it may have ended one."""
     first, second = ((each.status, each.contracted_at, each.confined_at, each.orders.known) for each in (one, other))
-    return (one, "") if first == second else (Hypersurface(steps=one.steps), "two points tell different things")
+    if first == second:
+        return one, ""
+    return Hypersurface(steps=one.steps), NO_TIME if is_over else POINTS_DIFFER
 
 
 def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
@@ -319,8 +322,15 @@ def _outcome_at(
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
         return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
+    orders = NO_ORDERS
     if up is None:
         orders = course.orders(limits.shown)
+        # Beyond the steps that are shown it may be a hypersurface again, whose orders go on as those of another one do.
+        longest = min(limits.along, limits.reach)
+        while up is None and is_whole and not orders.is_settled and len(run) < longest:
+            run, is_whole = course.steps(min(2 * len(run), longest), tangents, _MOST_WITH_TANGENTS)
+            status, down, up = _by_ranks([step.rank for step in run], full)
+    if up is None:
         if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
             raise PrecisionTooLow
     else:

@@ -71,6 +71,7 @@ _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the 
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
 _LEAST_ALONG = 40
+_ENOUGH = 60  # of these where series are long and orders repeat
 _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
@@ -219,7 +220,7 @@ def singularities(
         progress("following critical points")
         too_large = "the hypersurfaces that this map contracts are too large to be written down"
         found += unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
-    stopped = critical_degree is None and limits.is_over
+    stopped = limits.is_over and (critical_degree is None or any(h.settled_at is None for h in found))
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 
 
@@ -402,7 +403,9 @@ def patterns(
             break
         values = default_eps(map_, seed + again) if eps is None else (eps,)
         part = max(0.0, end - time.monotonic()) / len(values)
-        if map_.dim <= WRITTEN_DIMENSION and all(can_be_written(map_, value, part) for value in values):
+        # What random points stand for is known of equations that are linear in both points.
+        is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
+        if is_short and all(can_be_written(map_, value, part) for value in values):
             try:
                 runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
             except TooLong:
@@ -505,8 +508,8 @@ def steps_by_default(dim: int) -> int:
 
 
 def _range(dim: int, steps: int | None, end: float) -> Range:
-    reach = steps or steps_by_default(dim)
-    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, steps or _ALONG.get(dim, _LEAST_ALONG), end)
+    reach, along = steps or steps_by_default(dim), steps or _ALONG.get(dim, _LEAST_ALONG)
+    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, end, steps or _ENOUGH)
 
 
 def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
