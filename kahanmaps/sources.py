@@ -159,6 +159,10 @@ SOURCES: dict[str, str] = {
         "S. Cantat, S. Lamy. Normal subgroups in the Cremona group. With an appendix by Y. de Cornulier. "
         "Acta Math. 210 (2013), 31-94"
     ),
+    "hasselblatt-propp-2007": (
+        "B. Hasselblatt, J. Propp. Degree-growth of monomial maps. "
+        "Ergodic Theory Dynam. Systems 27 (2007), 1375-1397. arXiv:math/0604521"
+    ),
     "nica-spakula-2016": (
         "B. Nica, J. Spakula. Strong hyperbolicity. Groups Geom. Dyn. 10 (2016), 951-964. arXiv:1406.0256"
     ),

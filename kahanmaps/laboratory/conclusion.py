@@ -117,6 +117,10 @@ def _not_birational(facts: _Facts) -> _Verdict | None:
 
 def _linearisable(facts: _Facts) -> _Verdict | None:
     """Periodic maps, those with a constant iterate, and those of bounded degrees."""
+    proof = facts.degrees.proof if facts.degrees is not None else None
+    if proof is not None and proof.is_identity:
+        sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals}."
+        return _Verdict("linearisable", sentence, ground=Known.PROVED)
     if facts.closes:
         return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.phrase}.")
     if facts.growth is Growth.ZERO:

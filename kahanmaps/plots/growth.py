@@ -180,13 +180,14 @@ def _degree_label(growth: DegreeGrowth) -> str:
     rate = growth.dynamical_degree
     if growth.growth is Growth.ZERO:
         return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
-    if growth.recurrence is None:
+    if growth.recurrence is None and growth.proof is None:
         if growth.looks_exponential:
             return rf"{name}: $\lambda \approx {float(growth.estimate or 0):.4g}$ (estimated)"
-        quotient = rf", $d_n/d_{{n-1}} = {float(growth.estimate):.4g}$ at the end" if growth.estimate else ""
+        n = len(growth.degrees) - 1
+        quotient = rf", $d_{{{n}}}^{{1/{n}}} = {float(growth.estimate):.4g}$" if growth.estimate else ""
         return f"{name}: no recurrence found{quotient}"
     parts = []
-    formula = growth.recurrence.closed_form
+    formula = growth.recurrence.closed_form if growth.recurrence is not None else None
     if formula and len(formula) <= _LONGEST_FORMULA and ";" not in formula:
         parts.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
     elif growth.growth is not Growth.EXPONENTIAL:

@@ -49,10 +49,13 @@ def test_without_a_recurrence_there_is_an_estimate_that_says_so():
     found = replace(degree_growth(load("henon_heiles").system, max_terms=6), patterns=None)
     assert (found.recurrence, found.growth, found.dynamical_degree) == (None, Growth.UNKNOWN, None)
     assert found.looks_exponential
-    assert found.growth_text == "exponential growth by a factor of about 2.31183 (estimated: no recurrence in 7 terms)"
+    assert found.growth_text == (
+        "exponential growth by a factor of about 2.31183 (estimated: the last quotients are 2.29412 to 2.38462; "
+        "no recurrence in 7 terms)"
+    )
     shorter = replace(found, degrees=found.degrees[:6])
     assert not shorter.looks_exponential
-    assert shorter.growth_text.startswith("no recurrence found in 6 terms; d_n/d_(n-1) is 2.38")
+    assert shorter.growth_text.startswith("no recurrence found in 6 terms; d_n^(1/n) is 2.47533 for n = 5")
     assert shorter.growth_text.endswith("an estimate only")
 
 

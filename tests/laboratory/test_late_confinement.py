@@ -116,7 +116,8 @@ def test_seven_degrees_are_explained_by_a_pattern_that_is_longer():
     measured = replace(found, patterns=replace(found.patterns, series=()))
     assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (None, None, Growth.UNKNOWN)
     assert measured.growth_text == (
-        f"exponential growth by a factor of about 2 (estimated: after a pattern of {length} steps {length + 2} "
+        "exponential growth by a factor of about 2 (estimated: the last quotients are 2 to 2; "
+        f"after a pattern of {length} steps {length + 2} "
         "iterates are needed (--seconds, --max-degree))"
     )
     assert measured.to_json()["unconfirmed"] == measured.unconfirmed != ""

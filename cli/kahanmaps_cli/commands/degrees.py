@@ -56,7 +56,8 @@ def command(system: str | None, **options: Any) -> int:
     than determine it, with terms enough beyond the last confinement, and else there is an estimate only. "no
     confinement" is said with the number of steps that were tried.
 
-    In the plane a dynamical degree above 1 is proved: its bounds are then exact.
+    In the plane a dynamical degree above 1 is proved: its bounds are then exact. Proved is also the growth of monomial
+    maps, by powers of the exponent matrix, and of maps with an iterate of degree 1, whose formulas are composed.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line. Values without a map are named at the end.
@@ -90,13 +91,14 @@ def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
     """Whether nothing was left open that was asked for: `terms` degrees, or (None) a recurrence."""
     if found.ended in ("terms", "constant", "singular"):
         return True
-    return terms is None and found.recurrence is not None
+    return terms is None and (found.proof is not None or found.recurrence is not None)
 
 
 def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 61 bits"
     at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
-    tell(f"# {file.name}{at}, {lines}: measured, not proved")
+    how = f"{lines}: measured, not proved" if found.primes else "powers of the exponent matrix: exact"
+    tell(f"# {file.name}{at}, {how}")
     tell(found.text)
 
 
@@ -105,7 +107,7 @@ def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrow
     return record_of(
         "degrees",
         file,
-        "modulo the primes of the lines",
+        "modulo the primes of the lines" if found.primes else "exact",
         time_step="generic" if time_step == "every" else time_step,
         **opt.given(options, "seconds", terms_asked="terms"),
         max_degree=options["max_degree"],

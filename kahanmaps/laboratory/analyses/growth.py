@@ -37,12 +37,14 @@ def statements(found: Findings) -> list[Statement]:
         shown = ", ".join(map(str, found.degrees.degrees[1 : _SHOWN_DEGREES + 1]))
         more = ", ..." if len(found.degrees.degrees) > _SHOWN_DEGREES + 1 else ""
         if shown:
-            lines.append(Statement(Known.MEASURED, f"degrees of the iterates: {shown}{more}"))
+            status = Known.MEASURED if found.degrees.primes else Known.PROVED  # by powers of a matrix
+            lines.append(Statement(status, f"degrees of the iterates: {shown}{more}"))
         unknown = found.degrees.growth is Growth.UNKNOWN and not found.degrees.looks_exponential
         known = found.degrees.known
         lines.append(Statement(Known.UNDECIDED if unknown else known, found.degrees.growth_text))
         recurrence = found.degrees.recurrence
         if recurrence is not None:
+            known = Known.MEASURED if found.degrees.explained is None else Known.EXPLAINED
             lines.append(Statement(known, f"recurrence: {recurrence.text}"))
             if recurrence.closed_form_text:
                 lines.append(Statement(known, f"d_n = {recurrence.closed_form_text}"))

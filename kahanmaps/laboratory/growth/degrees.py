@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpz_mat
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
@@ -37,6 +37,13 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import ITERATE_DEGREE, SECONDS
 from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
+from kahanmaps.laboratory.growth.proofs import (
+    GrowthProof,
+    exponent_matrix,
+    linear_iterate,
+    monomial_degree,
+    monomial_growth,
+)
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
 from kahanmaps.laboratory.known import Known
@@ -53,6 +60,7 @@ _OFTEN, _SELDOM = 64, 8  # up to so many terms a recurrence is looked for after 
 _ENOUGH_QUOTIENTS = 6
 _AGREEING = 12  # terms beyond the pattern of a singularity and as many again, which explained degrees agree in
 _LARGE = 2000  # a degree up to which they do
+_MATRIX_TERMS = 60  # of monomial maps
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
 
@@ -63,6 +71,7 @@ class DegreeGrowth(Printed):
     `eps` is None for generic eps (a random residue for each line). `patterns` is what the singularities say, None where
     they were not asked. The degrees are measured, and so is what explains them: evidence, and no proof. `enclosure` has
     bounds of the dynamical degree of planar maps that are proved, the lower one above 1; None where there are none.
+    `proof` is what proves the growth, where something does; degrees of monomial maps are exact, and no primes needed.
     """
 
     degrees: tuple[int, ...]
@@ -75,6 +84,7 @@ class DegreeGrowth(Printed):
     notes: tuple[str, ...] = ()
     patterns: Patterns | None = None
     enclosure: Enclosure | None = None
+    proof: GrowthProof | None = None
 
     @cached_property
     def fitted(self) -> Recurrence | None:
@@ -120,26 +130,37 @@ class DegreeGrowth(Printed):
 
         None also where it is not confirmed by terms beyond the last confinement, or singularities are undecided.
         """
-        return self.explained or (None if self.unconfirmed else self.fitted)
+        if self.proof is None or self.explained is not None:
+            return self.explained or (None if self.unconfirmed else self.fitted)
+        found = self.fitted
+        if found is None or found.rate is None or (found.growth, found.power) != (self.proof.growth, self.proof.power):
+            return None
+        return found if found.rate.minimal_polynomial == self.proof.rate.minimal_polynomial else None
 
     @property
     def growth(self) -> Growth:
-        """How the degrees grow if the recurrence goes on; `Growth.UNKNOWN` without one."""
+        """How the degrees grow: proved, or if the recurrence goes on; `Growth.UNKNOWN` without one."""
+        if self.proof is not None:
+            return self.proof.growth
         if self.ended == Ended.CONSTANT:
             return Growth.ZERO
         return Growth.UNKNOWN if self.recurrence is None else self.recurrence.growth
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
-        """lim d_n^(1/n) as an algebraic number if the recurrence goes on, else None."""
+        """lim d_n^(1/n) as an algebraic number, proved or if the recurrence goes on, else None."""
+        if self.proof is not None:
+            return self.proof.rate
         return None if self.recurrence is None else self.recurrence.rate
 
     @property
     def estimate(self) -> str | None:
-        """d_n/d_{n-1} for the last n, rounded: an estimate of the dynamical degree and no more."""
-        if len(self.degrees) < 3 or self.degrees[-2] == 0:
+        """An estimate of the dynamical degree and no more, rounded: the last quotient d_n/d_{n-1} where these hardly
+        change, else d_n^(1/n) for the last n, which is not below it."""
+        if len(self.degrees) < 3 or self.degrees[-1] == 0:
             return None
-        return f"{self.degrees[-1] / self.degrees[-2]:.6g}"
+        n = len(self.degrees) - 1
+        return f"{self.degrees[-1] / self.degrees[-2] if self.looks_exponential else self.degrees[-1] ** (1 / n):.6g}"
 
     @property
     def looks_exponential(self) -> bool:
@@ -160,7 +181,7 @@ class DegreeGrowth(Printed):
         """The kind of growth with its power or rate, or what can be said without a confirmed recurrence: one phrase."""
         if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
-        if (found := self.recurrence) is not None:
+        if (found := self.proof or self.recurrence) is not None:
             if found.growth is Growth.EXPONENTIAL:
                 return "exponential growth" + (
                     f", dynamical degree {found.rate.text}" if found.rate is not None else ""
@@ -170,20 +191,27 @@ class DegreeGrowth(Printed):
         terms = counted(len(self.degrees), "term")
         if self.looks_exponential:
             why = self.unconfirmed or f"no recurrence in {terms}"
-            return f"exponential growth by a factor of about {self.estimate} (estimated: {why})"
+            quotients = sorted(d / c for c, d in zip(self.degrees[-4:], self.degrees[-3:], strict=False))
+            spread = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}"
+            return f"exponential growth by a factor of about {self.estimate} (estimated: {spread}; {why})"
         if self.fitted is not None:
             return f"{terms} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
-        estimate = f"; d_n/d_(n-1) is {self.estimate} at the end, an estimate only" if self.estimate else ""
+        n = len(self.degrees) - 1
+        estimate = f"; d_n^(1/n) is {self.estimate} for n = {n}, an estimate only" if self.estimate else ""
         return f"no recurrence found in {terms}{estimate}"
 
     @property
     def basis(self) -> str:
-        """How the growth is known where there is a recurrence: explained or measured, and with which limit."""
+        """How the growth is known where it is: proved, explained or measured, and by what or with which limit."""
+        if self.proof is not None:
+            return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self._limit}" if self._limit else str(self.known)
 
     @property
     def known(self) -> Known:
-        """How the growth is known where there is a recurrence."""
+        """How the growth is known where it is."""
+        if self.proof is not None:
+            return Known.PROVED
         return Known.MEASURED if self.explained is None else Known.EXPLAINED
 
     @property
@@ -194,7 +222,8 @@ class DegreeGrowth(Printed):
     @property
     def growth_text(self) -> str:
         """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
-        return self.kind_text + (f" ({self.basis})" if self.recurrence is not None and self._limit else "")
+        with_basis = self.proof is not None or (self.recurrence is not None and self._limit)
+        return self.kind_text + (f" ({self.basis})" if with_basis else "")
 
     def rows(self) -> list[dict[str, int]]:
         """A row for each iterate, for `pandas.DataFrame(found.rows())` and the like."""
@@ -230,7 +259,7 @@ class DegreeGrowth(Printed):
             **attributes(self, "ended", "message", "seed"),
             "lines": [{"prime": str(p), "eps_residue": str(e)} for p, e in lines],
             **attributes(self, *names, singularities="patterns"),
-            **attributes(self, "enclosure", "unconfirmed", "notes"),
+            **attributes(self, "enclosure", "proof", "unconfirmed", "notes"),
         }
 
 
@@ -303,6 +332,9 @@ class _Search:
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
         """Step after step until something ends it."""
+        matrix = exponent_matrix(self._map, self._eps)
+        if matrix is not None and (proof := monomial_growth(matrix)) is not None:
+            return self._by_matrix(matrix, proof, max_terms)
         lines = [self._line() for _ in range(_LINES)]
         self._is_explicit = lines[0].is_explicit
         try:
@@ -325,10 +357,28 @@ class _Search:
             self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
         )
         found = replace(found, patterns=self._named())
+        period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
+        if period is not None:
+            found = replace(found, proof=linear_iterate(self._map, self._eps, period))
         if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
             return found
         left = max(1.0, self._deadline - time.monotonic())
         return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))
+
+    def _by_matrix(self, matrix: fmpz_mat, proof: GrowthProof, max_terms: int | None) -> DegreeGrowth:
+        """The degrees of a monomial map, exactly."""
+        count, power = _MATRIX_TERMS if max_terms is None else max_terms, matrix
+        ended = Ended.PROVED if max_terms is None else Ended.TERMS
+        message = f"degrees of {counted(count, 'iterate')} by powers of the exponent matrix"
+        while len(self.degrees) <= count:
+            degree = monomial_degree(power)
+            if degree > self._max_degree:
+                ended = Ended.DEGREE
+                message = f"the degree of iterate {len(self.degrees)} is above {self._max_degree}"
+                break
+            self.degrees.append(degree)
+            power = power * matrix
+        return replace(self._so_far(), ended=ended, message=message, proof=proof)
 
     def _so_far(self) -> DegreeGrowth:
         return DegreeGrowth(tuple(self.degrees), self._eps, Ended.TERMS, "", self._seed, (), (), (), self._patterns)

@@ -202,7 +202,8 @@ def outcome_of(
             note = NO_TIME if limits.is_over else "the series lost all their terms"
             break
     if len(outcomes) == _POINTS:
-        found, note = _agreed(*outcomes.values(), limits.is_over)
+        first, second = outcomes.values()
+        found, note = _agreed(first, second, limits.is_over)
     known = replace(found, polynomial=text, degree=int(one.form.total_degree()), is_pole=one.is_pole, note=note)
     return replace(known, multiplicity=one.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 

@@ -8,7 +8,7 @@ step, and begin where the map stands that contracts them. Powers of a word repea
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import comb, prod
@@ -196,7 +196,7 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
     return [(factor, k) for factor, k in multiplicities.values() if k]
 
 
-def _terms(row: list[Any]) -> int:
+def _terms(row: Sequence[Any]) -> int:
     return sum(len(entry) for entry in row if entry is not None)
 
 

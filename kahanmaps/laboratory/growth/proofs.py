@@ -1,0 +1,213 @@
+"""Growth of degrees that is proved: of monomial maps, and of maps some iterate of which is linear.
+
+A monomial map x~_i = c_i x^(a_i) has the exponent matrix A of its rows a_i, and its n-th iterate has A^n: degrees are
+those of matrices, and the dynamical degree is the spectral radius of A (hasselblatt-propp-2007). Where the iterate N
+has degree 1 on projective space, which is decided by composing formulas, d_(n + N) = d_n for all n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import flint
+from flint import arb, fmpq, fmpz_mat, fmpz_poly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.growth.recurrences import GrowthRate
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import BirationalMap
+
+_BUDGET = 1_000_000  # products of terms, to compose formulas
+_MAX_FACTORS = 24  # of a composition
+_MAX_DIMENSION = 8  # for the algebraic number: polynomials of degree up to 2 dim^2 are factored
+_BITS = 256
+
+
+@dataclass(frozen=True)
+class GrowthProof:
+    """What is proved about the degrees of all iterates.
+
+    `growth` with its `power` (k for n^k, times an exponential where the `rate` is more than 1), `rate` the dynamical
+    degree, and `reason` the proof in a phrase. With `period` N the iterate N is linear; `is_identity`: it is the
+    identity.
+    """
+
+    growth: Growth
+    power: int
+    rate: GrowthRate
+    reason: str
+    period: int | None = None
+    is_identity: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return attributes(self, "reason", "period", "is_identity")
+
+
+def exponent_matrix(map_: BirationalMap, eps: fmpq | None) -> fmpz_mat | None:
+    """The matrix A of a monomial map x~_i = c_i x^(a_i), at one eps or (None) over Q(eps); None for other maps.
+
+    A composition of monomial maps is one: its matrix is the product of theirs.
+
+    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.maps.explicit import explicit_map
+    >>> image = [parse_rational_function(text, ["x", "y", "eps"]) for text in ("3*y", "eps*y^2/x")]
+    >>> exponent_matrix(explicit_map(["x", "y"], image), None).tolist()
+    [[0, 1], [-1, 2]]
+    """
+    if map_.symbols or map_.root is not None:
+        return None
+    over = FunctionField(["eps"]) if eps is None and map_.has_eps else QQ
+    value = over.variables[0] if isinstance(over, FunctionField) else fmpq(1) if eps is None else eps
+    try:
+        equations = map_.at(value, over).equations
+    except (BudgetExceeded, InputError):  # of an inverse that is not known
+        return None
+    if len(equations) > _MAX_FACTORS:
+        return None
+    matrices = [_exponents(equation) for equation in equations]
+    known = [matrix for matrix in matrices if matrix is not None]
+    if len(known) < len(matrices):
+        return None
+    return reduce(lambda total, matrix: matrix * total, known)
+
+
+def _exponents(equation: Equation) -> fmpz_mat | None:
+    """Those of an equation where each row is m x~_j = r with monomials m and r."""
+    n, rows = equation.dim, {}
+    for *entries, right in equation.terms:
+        columns = [j for j, entry in enumerate(entries) if entry]
+        if len(columns) != 1 or len(entries[columns[0]]) != 1 or len(right) != 1:
+            return None
+        ((left_monomial, _),), ((right_monomial, _),) = entries[columns[0]], right
+        left, above = equation.exponents[left_monomial], equation.exponents[right_monomial]
+        rows[columns[0]] = [above[k] - left[k] for k in range(n)]
+    return fmpz_mat([rows[j] for j in range(n)]) if len(rows) == n else None
+
+
+def monomial_degree(matrix: fmpz_mat) -> int:
+    """The degree of a monomial map on projective space.
+
+    >>> monomial_degree(fmpz_mat([[0, 1], [-1, 0]])), monomial_degree(fmpz_mat([[2, 1], [1, 1]]))
+    (2, 3)
+    """
+    rows = [[int(entry) for entry in row] for row in matrix.tolist()]
+    # What X_j and Z have to be multiplied by: the last coordinate is then the product of these powers.
+    powers = [max(0, *(-entry for entry in column)) for column in zip(*rows, strict=True)]
+    return sum(powers) + max([0, *(sum(row) for row in rows)])
+
+
+def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
+    """How the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
+
+    They are those of the entries of A^n up to a factor between two constants.
+    """
+    if matrix.nrows() > _MAX_DIMENSION:
+        return None
+    rate = spectral_radius(matrix)
+    power = rate.multiplicity - 1
+    rows = [[int(entry) for entry in row] for row in matrix.tolist()]
+    if rate.minimal_polynomial != fmpz_poly([-1, 1]):
+        reason = f"the spectral radius of the exponent matrix {rows} of a monomial map"
+        return GrowthProof(Growth.EXPONENTIAL, power, rate, reason)
+    classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
+    growth = classes[power] if power < 3 else Growth.POLYNOMIAL
+    return GrowthProof(growth, power, rate, f"powers of the exponent matrix {rows} of a monomial map")
+
+
+def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
+    """The largest modulus of an eigenvalue, exactly; its multiplicity is the size of the largest Jordan block of one.
+
+    The determinant is not 0.
+
+    >>> spectral_radius(fmpz_mat([[2, 1], [1, 1]])).text
+    '2.61803398874989484820, root of t^2 - 3*t + 1'
+    >>> spectral_radius(fmpz_mat([[0, 1, 0], [0, 0, 1], [-1, -1, 0]])).text
+    '1.21060779440608593277, root of t^6 - t^4 - 1'
+    """
+    minimal = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
+    # The square of the radius is the product of an eigenvalue and its conjugate, thus the largest real root of this
+    # polynomial, the roots of which are all products of two eigenvalues. FLINT isolates roots from each other.
+    products = [factor for factor, _ in _kronecker_square(matrix).charpoly().factor()[1]]
+    radical = reduce(fmpz_poly.__mul__, products)
+    numbers = [g for factor in products for g, _ in factor(fmpz_poly([0, 0, 1])).factor()[1]]
+    bits = _BITS
+    while True:
+        with flint.ctx.workprec(bits):
+            isolated: Any = radical.complex_roots()
+            reals = [root.real for root, _ in isolated if root.imag == 0]
+            square, *others = sorted(reals, key=lambda root: root.mid().fmpq(), reverse=True)
+            radius = square.sqrt()
+            eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
+            moduli = [(_modulus_square(root), k) for roots, k in eigenvalues for root, _ in roots]
+            largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(square)]
+            candidates = [g for g in numbers if _at(g, radius).contains(0)]
+            # The square of a modulus is a root of the radical too, so that a ball that meets that of one root only
+            # is that root.
+            is_decided = all(square > other for other in others) and not any(
+                modulus.overlaps(other) for modulus, _ in largest for other in others
+            )
+        if is_decided and len(candidates) == 1:
+            (polynomial,), size = candidates, max(k for _, k in largest)
+            if polynomial.degree() == 1:
+                integer = str(-polynomial[0])
+                return GrowthRate(polynomial, integer, integer, size)
+            return GrowthRate(polynomial, radius.str(40), radius.str(21, radius=False), size)
+        bits *= 2
+
+
+def _kronecker_square(matrix: fmpz_mat) -> fmpz_mat:
+    rows = matrix.tolist()
+    return fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
+
+
+def _modulus_square(root: Any) -> arb:
+    modulus: arb = root.real * root.real + root.imag * root.imag
+    return modulus
+
+
+def _at(polynomial: fmpz_poly, x: arb) -> arb:
+    total = arb(0)
+    for c in reversed(polynomial.coeffs()):
+        total = total * x + c
+    return total
+
+
+def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> GrowthProof | None:
+    """The proof that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
+
+    Exact, by composing formulas. None where it is not, and where the formulas have too many terms.
+    """
+    if map_.symbols or map_.root is not None:
+        return None
+    is_generic = eps is None and map_.has_eps
+    field = FunctionField([*map_.variables, *(["eps"] if is_generic else [])], _BUDGET, reduces=True)
+    n = map_.dim
+    start = tuple(field.variables[:n])
+    try:
+        over = map_.at(field.variables[-1] if is_generic else fmpq(1) if eps is None else eps, field)
+        point: tuple[Any, ...] = start
+        for _ in range(period):
+            point = over.step(point)
+        is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
+    except (BudgetExceeded, SingularStep):
+        return None
+    if not is_identity and _degree([(entry.above, entry.below) for entry in point], n) != 1:
+        return None
+    iterate = "the map" if period == 1 else f"iterate {period}"
+    reason = f"Phi^{period} is the identity" if is_identity else f"{iterate} is linear on projective space"
+    return GrowthProof(Growth.BOUNDED, 0, GrowthRate(fmpz_poly([-1, 1]), "1", "1", 1), reason, period, is_identity)
+
+
+def _degree(fractions: Sequence[tuple[Any, Any]], n: int) -> int:
+    """The degree on projective space of a map with these coordinates in lowest terms, in the first n variables."""
+    common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (below for _, below in fractions))
+    forms = [above * (common / below) for above, below in fractions] + [common]
+    return max(int(sum(m[:n])) for form in forms for m in form.monoms())

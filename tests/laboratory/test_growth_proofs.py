@@ -1,0 +1,140 @@
+"""Growth that is proved: monomial maps against measured degrees and published rates, and maps of finite order."""
+
+import random
+from dataclasses import replace
+
+import pytest
+from flint import fmpq, fmpz_mat, fmpz_poly
+
+from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.documents.catalog import load
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.growth import degrees, proofs
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.proofs import exponent_matrix, linear_iterate, monomial_growth, spectral_radius
+from kahanmaps.laboratory.known import Known
+from kahanmaps.laboratory.singular.singularities import Patterns
+from kahanmaps.maps.composed import composed_map
+from kahanmaps.maps.explicit import explicit_map
+
+OPEN = Patterns((), None, False, "not looked at")
+
+
+def by_formulas(variables: str, image: str):
+    names = variables.split(",")
+    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
+
+
+@pytest.mark.parametrize(
+    ("variables", "image", "growth", "rate"),
+    [
+        ("x,y,z", "y; z; z/(x*y^2)", "exponential", "1.59587539516219187780, root of t^6 - 2*t^4 - t^2 - 1"),
+        ("x,y,z", "y; z; 1/(x*y)", "exponential", "1.21060779440608593277, root of t^6 - t^4 - 1"),
+        ("x,y,z", "7*y; -z/1000000; eps/(x*y)", "exponential", "1.21060779440608593277, root of t^6 - t^4 - 1"),
+        ("z,x,y", "1/(x*y); y; z", "exponential", "1.21060779440608593277, root of t^6 - t^4 - 1"),
+        ("x,y", "y; y^3/x", "exponential", "2.61803398874989484820, root of t^2 - 3*t + 1"),
+        ("x,y", "1/(x^2*y); 1/(x*y)", "exponential", "2.61803398874989484820, root of t^2 - 3*t + 1"),  # negative
+        ("x,y", "x*y^2; y", "linear", "1"),
+        ("x,y,z", "x*y; y*z; z", "quadratic", "1"),
+        ("x,y", "1/x; 1/y", "bounded", "1"),
+        ("x,y,z,w", "y; y^3/x*z; w; w^3/z", "exponential", "2.61803398874989484820, root of t^2 - 3*t + 1"),
+    ],
+)
+def test_the_growth_of_monomial_maps_is_proved(variables, image, growth, rate, monkeypatch):
+    map_ = by_formulas(variables, image)
+    found = degree_growth(map_, seconds=60)
+    assert (str(found.growth), found.dynamical_degree.text, found.known) == (growth, rate, Known.PROVED)
+    monkeypatch.setattr(degrees, "exponent_matrix", lambda map_, eps: None)
+    measured = degree_growth(map_, max_terms=6, seconds=60, patterns=OPEN, enclosed=False)
+    assert (measured.degrees, bool(measured.primes)) == (found.degrees[:7], True)
+
+
+def test_a_jordan_block_multiplies_exponential_growth_by_a_power():
+    proof = monomial_growth(exponent_matrix(by_formulas("x,y,z,w", "y; y^3/x*z; w; w^3/z"), None))
+    assert (proof.power, proof.rate.multiplicity) == (1, 2)
+    assert monomial_growth(exponent_matrix(by_formulas("x,y,z,w", "y; y^3/x; w; w^3/z"), None)).power == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_spectral_radius_of_random_matrices(seed):
+    rng, n = random.Random(seed), 2 + seed % 3
+    matrix = fmpz_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
+    for _ in range(6):  # a product of elementary matrices has determinant 1
+        step = fmpz_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
+        i, k = rng.sample(range(n), 2)
+        step[i, k] = rng.choice((-2, -1, 1, 2))
+        matrix = matrix * step
+    rate = spectral_radius(matrix)
+    largest = max(abs(complex(root)) for root, _ in matrix.charpoly().complex_roots())
+    assert abs(float(rate.digits) - largest) < 1e-9  # 53 bits of roots of degree 4
+    assert len(rate.minimal_polynomial.factor()[1]) == 1
+    assert spectral_radius(-matrix).minimal_polynomial == rate.minimal_polynomial
+
+
+def test_a_composition_of_monomial_maps_is_one():
+    f, g = by_formulas("x,y", "x*y; y"), by_formulas("x,y", "3*x; 5*x*y")
+    assert exponent_matrix(composed_map(f, g, (f, -1)), None) == fmpz_mat([[1, -1], [0, 1]]) * fmpz_mat(
+        [[1, 0], [1, 1]]
+    ) * fmpz_mat([[1, 1], [0, 1]])
+
+
+@pytest.mark.parametrize("image", ["y; (1 + y)/x", "y; 1/x + eps", "x + y; y"])
+def test_other_maps_have_no_exponent_matrix(image):
+    assert exponent_matrix(by_formulas("x,y", image), None) is None
+
+
+def test_a_map_that_is_monomial_at_one_eps_only():
+    map_ = by_formulas("x,y", "y; (y^3 + (eps - 1)*y)/x")
+    assert exponent_matrix(map_, fmpq(1)) == fmpz_mat([[0, 1], [-1, 3]])
+    assert exponent_matrix(map_, None) is exponent_matrix(map_, fmpq(2)) is None
+
+
+@pytest.mark.parametrize(
+    ("image", "period"),
+    [
+        ("y; (1 + y)/x", 5),
+        ("y/7000; 7*(1 + y/7)/(1000*x)", 5),  # the same in the coordinates x/1000, 7 y
+        ("y; (1 + y)/x + 0*eps", 5),
+        ("y; (2 + y)/x", None),  # integrable, of quadratic growth
+        ("y; 1/y - x", None),
+    ],
+)
+def test_maps_of_finite_order_are_proved_periodic(image, period):
+    found = degree_growth(by_formulas("x,y", image), max_terms=12, seconds=60, patterns=OPEN)
+    assert (found.proof and found.proof.period) == period
+    assert found.proof is None or (found.proof.is_identity and found.known is Known.PROVED)
+
+
+def test_a_wrong_period_is_not_proved(monkeypatch):
+    lyness = by_formulas("x,y", "y; (1 + y)/x")
+    assert [n for n in range(1, 11) if linear_iterate(lyness, None, n) is not None] == [5, 10]
+    monkeypatch.setattr(proofs, "_BUDGET", 10)
+    assert linear_iterate(lyness, None, 5) is None
+
+
+def test_a_linear_iterate_need_not_be_the_identity():
+    found = degree_growth(by_formulas("x,y", "1 + 2/y; 3/(x - 1)"), max_terms=6, patterns=OPEN)
+    assert found.degrees == (1, 2, 1, 2, 1, 2, 1)
+    assert (found.proof.reason, found.growth) == ("iterate 2 is linear on projective space", Growth.BOUNDED)
+    projective = linear_iterate(by_formulas("x,y", "(2*x + y)/(x - 1); y/(x - 1)"), None, 1)
+    assert (projective.is_identity, projective.reason) == (False, "the map is linear on projective space")
+
+
+def test_a_kahan_map_that_is_periodic_at_one_eps_only():
+    henon_heiles = load("henon_heiles").map
+    proof = linear_iterate(henon_heiles, fmpq(1), 4)
+    assert (proof.reason, proof.growth) == ("Phi^4 is the identity", Growth.BOUNDED)
+    assert linear_iterate(henon_heiles, fmpq(1, 2), 4) is None
+
+
+def test_a_recurrence_that_does_not_fit_the_proof_is_not_given():
+    found = degree_growth(by_formulas("x,y", "y; y^3/x"))
+    assert found.recurrence.text.startswith("a(n) = 3*a(n-1)-a(n-2)")
+    other = replace(found.proof, rate=replace(found.proof.rate, minimal_polynomial=fmpz_poly([-2, 1])))
+    assert replace(found, proof=other).recurrence is None
+
+
+def test_without_a_recurrence_the_estimate_is_a_root():
+    found = replace(degree_growth(by_formulas("x,y,z", "y; z; z/(x*y^2)")), proof=None)
+    assert found.recurrence is None
+    assert found.growth_text == "no recurrence found in 20 terms; d_n^(1/n) is 1.66197 for n = 19, an estimate only"
