@@ -367,10 +367,11 @@ class _Search:
 
     def _by_matrix(self, matrix: fmpz_mat, proof: GrowthProof, max_terms: int | None) -> DegreeGrowth:
         """The degrees of a monomial map, exactly."""
-        count, power = _MATRIX_TERMS if max_terms is None else max_terms, matrix
-        ended = Ended.PROVED if max_terms is None else Ended.TERMS
-        message = f"degrees of {counted(count, 'iterate')} by powers of the exponent matrix"
-        while len(self.degrees) <= count:
+        power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
+        while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
+            known = find_recurrence(self.degrees) if max_terms is None else None
+            if known is not None and known.checked >= max(6, known.order):
+                break
             degree = monomial_degree(power)
             if degree > self._max_degree:
                 ended = Ended.DEGREE
@@ -378,6 +379,7 @@ class _Search:
                 break
             self.degrees.append(degree)
             power = power * matrix
+        message = message or f"degrees of {counted(len(self.degrees) - 1, 'iterate')} by powers of the exponent matrix"
         return replace(self._so_far(), ended=ended, message=message, proof=proof)
 
     def _so_far(self) -> DegreeGrowth:

@@ -76,7 +76,8 @@ def exponent_matrix(map_: BirationalMap, eps: fmpq | None) -> fmpz_mat | None:
     known = [matrix for matrix in matrices if matrix is not None]
     if len(known) < len(matrices):
         return None
-    return reduce(lambda total, matrix: matrix * total, known)
+    product = reduce(lambda total, matrix: matrix * total, known)
+    return None if product.det() == 0 else product  # singular at a special eps only
 
 
 def _exponents(equation: Equation) -> fmpz_mat | None:
@@ -98,10 +99,11 @@ def monomial_degree(matrix: fmpz_mat) -> int:
     >>> monomial_degree(fmpz_mat([[0, 1], [-1, 0]])), monomial_degree(fmpz_mat([[2, 1], [1, 1]]))
     (2, 3)
     """
-    rows = [[int(entry) for entry in row] for row in matrix.tolist()]
+    rows: list[list[int]] = [[int(entry) for entry in row] for row in matrix.tolist()]
     # What X_j and Z have to be multiplied by: the last coordinate is then the product of these powers.
     powers = [max(0, *(-entry for entry in column)) for column in zip(*rows, strict=True)]
-    return sum(powers) + max([0, *(sum(row) for row in rows)])
+    degree: int = sum(powers) + max(0, *(sum(row) for row in rows))
+    return degree
 
 
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:

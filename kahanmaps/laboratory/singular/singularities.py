@@ -71,7 +71,7 @@ _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the 
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
 _LEAST_ALONG = 40
-_ENOUGH = 60  # of these where series are long and orders repeat
+_ENOUGH = {1: 60, 2: 60}  # of these where series would have to be long and orders repeat
 _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
@@ -509,7 +509,8 @@ def steps_by_default(dim: int) -> int:
 
 def _range(dim: int, steps: int | None, end: float) -> Range:
     reach, along = steps or steps_by_default(dim), steps or _ALONG.get(dim, _LEAST_ALONG)
-    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, end, steps or _ENOUGH)
+    enough = steps or min(along, _ENOUGH.get(dim, along))
+    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, end, enough)
 
 
 def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
