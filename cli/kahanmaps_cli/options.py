@@ -46,6 +46,23 @@ class Renamed(click.Option):
 system_argument: Callable[[F], F] = click.argument("system", required=False, shell_complete=complete_system)
 
 
+def _one_pair_each(ctx: click.Context, param: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
+    """The pairs NAME=VALUE of all -p, of which one may hold several: -p a=1,b=2."""
+    found = []
+    for name, value in pairs:
+        head, *more = value.split(",")
+        for piece in more:
+            if "=" in piece:
+                found.append((name, head.strip()))
+                name, head = (side.strip() for side in piece.split("=", 1))
+            else:
+                head += f",{piece}"
+        found.append((name, head.strip()))
+    if not all(value and name.isprintable() for name, value in found):
+        raise click.BadParameter("found a name without a value, expected NAME=VALUE", ctx, param)
+    return tuple(found)
+
+
 parameter_option: Callable[[F], F] = click.option(
     "-p",
     "--parameter",
@@ -53,7 +70,8 @@ parameter_option: Callable[[F], F] = click.option(
     type=NameValue(),
     multiple=True,
     metavar="NAME=VALUE",
-    help="Set a parameter of the system: a=2/3, or a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and checks.",
+    callback=_one_pair_each,
+    help="Set parameters of the system: a=2/3 or a=1,b=2; a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and checks.",
 )
 
 inline_options: Callable[[F], F] = stack(
@@ -200,11 +218,12 @@ def load_pair(
     """Two systems, the second one perhaps none: -p sets a parameter of both, or of the one that has it."""
     given = dict(options.get("parameters", ()))
     if other is None or not given:
-        return load_system(reference, options), None if other is None else load_system(other, {})
+        alone = {"quiet": options.get("quiet")}
+        return load_system(reference, options), None if other is None else load_system(other, alone)
     if other == "-":  # which can be read once
         raise click.UsageError("found -p with OTHER on standard input, expected a file: is the parameter one of both?")
     named = [
-        set(given) if are_equations(one) else set(load_system(one, {}).document.get("parameters", ()))
+        set(given) if are_equations(one) else set(_loaded(one, {}).document.get("parameters", ()))
         for one in (other, *([] if reference in (None, "-") else [reference]))
     ]
     of_first = [pair for pair in options["parameters"] if pair[0] not in named[0] or pair[0] in named[-1]]
@@ -214,14 +233,24 @@ def load_pair(
     both = [name for name, _ in of_second if (name, given[name]) in of_first]
     if both and not options.get("quiet"):
         say(f"-p {', '.join(both)}: set in both systems")
-    return load_system(reference, {**options, "parameters": of_first}), load_system(other, {"parameters": of_second})
+    second = {"parameters": of_second, "quiet": options.get("quiet")}
+    return load_system(reference, {**options, "parameters": of_first}), load_system(other, second)
 
 
 def load_system(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, equations, or options.
 
-    Of the options those of `inline_options` are looked at, as far as they are there.
+    Of the options those of `inline_options` are looked at, as far as they are there. What was made of equations beyond
+    their words is said, unless `quiet`.
     """
+    file = _loaded(reference, options)
+    if not options.get("quiet"):
+        for note in file.notes:
+            say(note)
+    return file
+
+
+def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
     variables, rhs = options.get("variables"), options.get("rhs", ())
     image, inverse = options.get("image", ()), options.get("inverse", ())
     parameters: Sequence[tuple[str, str]] = options.get("parameters", ())
@@ -270,7 +299,7 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
     try:
         return lib.load(reference, parameters)
     except lib.InputError as error:
-        looks_like_a_path = reference.endswith(".toml") or os.sep in reference
+        looks_like_a_path = reference.endswith((".toml", ".ode")) or os.sep in reference
         if not looks_like_a_path or os.path.lexists(reference):
             raise
         raise lib.InputError(f"{error}{_files_like(reference)}") from error

@@ -67,6 +67,7 @@ class Contents(NamedTuple):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
 
 
 class DocumentReader(CompositionReader):
@@ -75,7 +76,7 @@ class DocumentReader(CompositionReader):
     def read(self) -> Contents:
         """The contents. Raises SystemFileError with every mistake of the document."""
         try:
-            self.document = without_left_sides(self.document)
+            self.document, notes = without_left_sides(self.document)
         except InputError as error:
             raise SystemFileError(self.where, [("system.rhs", str(error))]) from error
         self._unknown_keys("", self.document)
@@ -96,7 +97,10 @@ class DocumentReader(CompositionReader):
         self._read_catalog()
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        return Contents(name, kind, self.parameters, map_, hamiltonian, member, integrals, density, self._normalised())
+        document = self._normalised()
+        return Contents(
+            name, kind, self.parameters, map_, hamiltonian, member, integrals, density, document, tuple(notes)
+        )
 
     def _read_name(self) -> Any:
         name = self.document.get("name", self._default_name())
@@ -165,14 +169,16 @@ class DocumentReader(CompositionReader):
         return self._read_bilinear(section) if kind == "bilinear" else self._read_map(section)
 
     def _default_name(self) -> str:
-        name = Path(self.where).stem if self.where.endswith(".toml") else self.where
+        name = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
         return "".join(c if c.isprintable() else "_" for c in name)
 
     def _read_parameters(self) -> None:
         for name, value in (self._table("parameters") or {}).items():
             path = f"parameters.{name}"
             if name == "eps":
-                self._mistake(path, "eps is the step of the map and cannot be a parameter")
+                self._mistake(
+                    path, "eps is half the time step of the map and cannot be a parameter: rename it, to epsilon, say"
+                )
                 continue
             try:
                 check_names([name])
@@ -248,7 +254,9 @@ class DocumentReader(CompositionReader):
             return
         clash = [name for name in given if name in self.parameters]
         if "eps" in given:
-            self._mistake("variables", "eps is the step of the map and cannot be a variable")
+            self._mistake(
+                "variables", "eps is half the time step of the map and cannot be a variable: rename it, to epsilon, say"
+            )
         elif clash:
             self._mistake("variables", f"{quoted(clash[0])} is a parameter as well, expected distinct names")
         else:
@@ -256,6 +264,7 @@ class DocumentReader(CompositionReader):
 
     def _read_system(self, section: Mapping[str, Any]) -> BirationalMap | None:
         method = section.get("discretization", "kahan")
+        method = "polarised" if method == "polarized" else method
         if method not in _DISCRETIZATIONS:
             words = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
             self._mistake("system.discretization", f"found {show(method)}, expected one of {words}")

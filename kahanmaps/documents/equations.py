@@ -1,51 +1,319 @@
-"""Right-hand sides as differential equations, as one writes them down: "x' = x*y; y' = -x", or dx/dt = x*y."""
+"""Differential equations as people write and paste them, as the right-hand sides of a system file.
+
+A text is a list of equations with ; or , or ends of lines between them, perhaps in one pair of brackets. On the left
+stands a derivative, and on the right a formula, in which x(t) is x:
+
+    x'    dx/dt    x_dot    xdot    dxdt    x'[t]    dx(t)/dt    d^2x/dt^2    diff(x(t), t)    D[x[t], t]    x[0]'
+
+The text is cut into tokens once and never evaluated; formulas are read by `kahanmaps.algebra.written.expressions`.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+import unicodedata
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 
-_EQUATION = re.compile(r"(?:d\s*(\w+)\s*/\s*d\s*t|(\w+)\s*['′])\s*=([^=]*)")
+MAX_CHARACTERS = 2_000_000  # of all equations together
+_OPEN, _CLOSE = ("(", "[", "{"), (")", "]", "}")
+_EQUALS = ("=", "==", ":=")
+_DERIVATIVES = ("diff", "Diff", "D", "der", "Derivative")  # of Maple, Mathematica, Modelica, SymPy
+# Decomposed, a dot above a letter is a character of its own; two dots, and a double quote, are two primes.
+_PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "″": 2, '"': 2, "\u0308": 2, "‴": 3}
+_TOKEN = re.compile(
+    r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
+)
+_EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 
 
-def without_left_sides(document: Mapping[str, Any]) -> dict[str, Any]:
+class Equations(NamedTuple):
+    """Right-hand sides by variable, the variables that are velocities, and which names were made, in sentences."""
+
+    sides: dict[str, str]
+    velocities: list[str]
+    notes: list[str]
+
+
+class _Derivative(NamedTuple):
+    name: str
+    order: int
+    end: int  # the place of the token after it
+
+
+def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """The document with a list of right-hand sides, and variables, where its [system] has equations or one text.
 
-    The order of the equations is that of the variables, where these are not given. Other documents come back equal.
+    The order of the equations is that of the variables, where these are not given; velocities of equations of second
+    order come last. Other documents come back equal. The notes say which names were made.
     Raises InputError for equations that are none, or of other variables than those given.
 
-    >>> without_left_sides({"system": {"rhs": "x' = x*y; dy/dt = -x"}})
-    {'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}
+    >>> without_left_sides({"system": {"rhs": "x' = x*y, dy/dt = -x"}})
+    ({'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}, [])
     """
     section = document.get("system")
     given = section.get("rhs") if isinstance(section, dict) else None
     texts = [given] if isinstance(given, str) else given
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
-        return dict(document)
+        return dict(document), []
     if isinstance(given, list) and not any(mark in text for text in texts for mark in "=;"):
-        return dict(document)
-    pieces = [piece.strip() for text in texts for piece in re.split(r"[;\n]", text) if piece.strip()]
-    if any("=" in piece for piece in pieces):
-        sides = _equations(pieces)
-        names = document.get("variables", list(sides))
-        if not isinstance(names, list) or set(sides) != set(map(str, names)):
+        return dict(document), []
+    pieces = pieces_of("\n".join(texts))
+    notes: list[str] = []
+    if any(token in piece for piece in pieces for token in _EQUALS):
+        names, parameters = document.get("variables"), document.get("parameters")
+        given = [str(name) for name in names] if isinstance(names, list) else []
+        sides, velocities, notes = read_equations(pieces, given, parameters if isinstance(parameters, dict) else ())
+        variables = list(sides) if names is None else [*given, *(v for v in velocities if v not in given)]
+        if set(variables) != set(sides):
             raise InputError(f"found equations for {', '.join(sides)}, expected one for each of the variables")
-        document = {"variables": names, **document}
-        pieces = [sides[name] for name in names]
-    return {**document, "system": {**document["system"], "rhs": pieces}}
+        document = {"variables": variables, **document}
+        document["variables"] = variables
+        rhs = [sides[name] for name in variables]
+    else:
+        rhs = ["".join(piece).strip() for piece in pieces]
+    return {**document, "system": {**document["system"], "rhs": rhs}}, notes
 
 
-def _equations(pieces: Sequence[str]) -> dict[str, str]:
-    sides: dict[str, str] = {}
+def tokens_of(text: str) -> list[str]:
+    """The tokens of a text, blanks among them. Raises InputError where it is too long."""
+    if len(text) > MAX_CHARACTERS:
+        raise InputError(f"found equations of {len(text)} characters, expected at most {MAX_CHARACTERS}")
+    decomposed = text if text.isascii() else unicodedata.normalize("NFD", text)
+    return _TOKEN.findall(decomposed)
+
+
+def pieces_of(text: str) -> list[list[str]]:
+    """The tokens of each equation, or formula, of a list. Raises InputError for brackets that do not balance."""
+    tokens = _without_outer_brackets(tokens_of(text))
+    pieces: list[list[str]] = [[]]
+    depth = 0
+    for token in tokens:
+        depth += (token in _OPEN) - (token in _CLOSE)
+        if depth < 0:
+            raise InputError(
+                f"found {quoted(_text(pieces[-1]) + token)}, where a bracket is closed that was not opened"
+            )
+        if depth == 0 and token in (";", ",", "\n"):
+            pieces.append([])
+        else:
+            pieces[-1].append(token)
+    if depth:
+        raise InputError(f"found {quoted(_text(pieces[-1]))}, where a bracket is opened that is not closed")
+    return [piece for piece in pieces if _text(piece)]
+
+
+def _without_outer_brackets(tokens: list[str]) -> list[str]:
+    """The tokens between the brackets of a list, {x' = y, y' = -x}, where there is one around all of them."""
+    places = [k for k, token in enumerate(tokens) if not token.isspace()]
+    if len(places) < 2 or tokens[places[0]] not in _OPEN or tokens[places[-1]] not in _CLOSE:
+        return tokens
+    depth = 0
+    for k in places:
+        depth += (tokens[k] in _OPEN) - (tokens[k] in _CLOSE)
+        if depth == 0:
+            return tokens[places[0] + 1 : places[-1]] if k == places[-1] else tokens
+    return tokens
+
+
+def read_equations(
+    pieces: Sequence[list[str]], variables: Sequence[str] = (), parameters: Collection[str] = ()
+) -> Equations:
+    """The right-hand sides of equations of first and second order, one for each variable.
+
+    Args:
+        pieces: the tokens of each equation.
+        variables: names for the velocities of equations of second order, beside those of the variables, if any.
+        parameters: names that are taken.
+
+    Returns:
+        The sides: of the variables as they come, then of their velocities.
+
+    Raises:
+        InputError: for an equation that is none, with what to write instead, and for two of one variable.
+    """
+    pieces, notes = _with_plain_names(pieces, parameters)
+    orders, formulas = dict[str, int](), dict[str, list[str]]()
     for piece in pieces:
-        match = _EQUATION.fullmatch(piece)
-        if match is None:
-            raise InputError(f"found {quoted(piece)}, expected an equation such as x' = x*y or dx/dt = x*y")
-        name = match[1] or match[2]
-        if name in sides:
-            raise InputError(f"found two equations for {name}, expected one")
-        sides[name] = match[3].strip()
-    return sides
+        places = [k for k, token in enumerate(piece) if token in _EQUALS]
+        left = [token for token in piece[: places[0]] if not token.isspace()] if places else []
+        found = derivative_at(left, 0)
+        if len(places) != 1 or found is None or found.end < len(left):
+            raise InputError(
+                f"found {quoted(_text(piece))}, expected an equation such as {_EXAMPLES}{_hint(left, piece)}"
+            )
+        if found.order > 2:
+            text = quoted(_text(piece))
+            raise InputError(
+                f"found {text}, of order {found.order}, expected order 1 or 2: name the derivatives, "
+                f"{found.name}' = u; u' = v; v' = ..."
+            )
+        if found.name in orders:
+            raise InputError(f"found two equations for {found.name}, expected one")
+        orders[found.name], formulas[found.name] = found.order, piece[places[0] + 1 :]
+    velocities = _velocities(orders, variables, {*parameters, *(t for piece in pieces for t in piece)})
+    notes += [f"{name}'' is read with a velocity, the variable {v}: {name}' = {v}" for name, v in velocities.items()]
+    sides = dict[str, str]()
+    for name, formula in formulas.items():
+        sides[name] = velocities.get(name, "") or _formula(name, formula, orders, velocities)
+    for name, velocity in velocities.items():
+        sides[velocity] = _formula(name, formulas[name], orders, velocities)
+    return Equations(sides, list(velocities.values()), notes)
+
+
+def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
+    """The derivative that begins at a token, blanks left out: x', dx/dt, x_dot, diff(x(t), t); None if none does."""
+    first = tokens[start] if start < len(tokens) else ""
+    if not is_name(first):
+        return None
+    rest = tokens[start + 1 : start + 12]  # longer ones have more derivatives than are read
+    if first in _DERIVATIVES and rest[:1] and rest[0] in _OPEN:
+        return _called(tokens, start)
+    if first[0] == "d" and "/" in rest[:7]:
+        found = _leibniz(tokens, start)
+        if found is not None:
+            return found
+    end = _argument(tokens, start + 1)
+    order = 0
+    while end < len(tokens) and tokens[end] in _PRIMES:
+        order, end = order + _PRIMES[tokens[end]], end + 1
+    if order:
+        return _Derivative(first, order, _argument(tokens, end))
+    for ending, order in (("_ddot", 2), ("_dot", 1), ("ddot", 2), ("dot", 1)):
+        if first.endswith(ending) and first != ending:
+            return _Derivative(first.removesuffix(ending), order, end)
+    if len(first) > 3 and first[0] == "d" and first.endswith("dt"):
+        return _Derivative(first[1:-2], 1, end)
+    return None
+
+
+def _called(tokens: Sequence[str], start: int) -> _Derivative | None:
+    """diff(x(t), t), diff(x(t), t, t), diff(x(t), t$2), D[x[t], {t, 2}], D(x)(t), der(x)."""
+    if start + 2 >= len(tokens) or not is_name(tokens[start + 2]):
+        return None
+    name, end = tokens[start + 2], _argument(tokens, start + 3)
+    inside: list[str] = []  # behind the function
+    while end < len(tokens) and tokens[end] not in _CLOSE[:2]:
+        inside.append(tokens[end])
+        end += 1
+    times = "".join(inside)
+    orders = {"": 1, ",t": 1, ",t,t": 2, ",t$2": 2, ",{t,2}": 2, ",(t,2": 2, ",{t,1}": 1}
+    if end == len(tokens) or times not in orders:
+        return None
+    end += 1 + (times == ",(t,2")  # SymPy's Derivative(x(t), (t, 2)) has one bracket more
+    return _Derivative(name, orders[times], _argument(tokens, end))
+
+
+def _leibniz(tokens: Sequence[str], start: int) -> _Derivative | None:
+    """dx/dt, d x / d t, dx(t)/dt, d^2x/dt^2."""
+    above, k, order = tokens[start][1:], start + 1, 1
+    if not above and tokens[k : k + 2] == ["^", "2"]:
+        order, k = 2, k + 2
+    elif above[:1].isdigit():  # d2x/dt2
+        order, above = int(above[0]), above[1:]
+    if not above:
+        above, k = (tokens[k] if k < len(tokens) else ""), k + 1
+    k = _argument(tokens, k)
+    if not is_name(above) or k >= len(tokens) or tokens[k] != "/":
+        return None
+    for text, count in {1: (("dt", 1), ("dt", 2)), 2: (("dt^2", 3), ("dt^2", 4), ("dt2", 1))}.get(order, ()):
+        if "".join(tokens[k + 1 : k + 1 + count]) == text:
+            return _Derivative(above, order, k + 1 + count)
+    return None
+
+
+def _argument(tokens: Sequence[str], place: int) -> int:
+    """The place behind (t) or [t], if it stands there, otherwise the same."""
+    return place + 3 if "".join(tokens[place : place + 3]) in ("(t)", "[t]") else place
+
+
+def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
+    """A right-hand side as text: x(t) as x, and x' as the velocity where there is one."""
+    words = [token for token in tokens if not token.isspace()]
+    gaps, blank = list[str](), ""  # what stands before each word: "x y" must not become "xy"
+    for token in tokens:
+        if token.isspace():
+            blank = " "
+        else:
+            gaps.append(blank)
+            blank = ""
+    found: list[str] = []
+    k = 0
+    while k < len(words):
+        derivative = derivative_at(words, k)
+        # x_dot is the derivative of x, but for a variable that is itself called x_dot.
+        if derivative and derivative.name in orders and (words[k] not in orders or words[k] == derivative.name):
+            if derivative.order != 1 or derivative.name not in velocities:
+                raise InputError(
+                    f"found a derivative of {derivative.name} on the right side of the equation for {name}, expected a "
+                    "formula in the variables: write out what it is equal to"
+                )
+            found.append(gaps[k] + velocities[derivative.name])
+            k = derivative.end
+        else:
+            found.append(gaps[k] + words[k])
+            k = _argument(words, k + 1) if words[k] in orders else k + 1
+    return "".join(found).strip()
+
+
+def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
+    """The name of the velocity of each variable with an equation of second order: one of those given, or vx for x."""
+    second = [name for name, order in orders.items() if order == 2]
+    named = [name for name in variables if name not in orders]
+    if len(named) == len(second):
+        return dict(zip(second, named, strict=True))
+    found = dict[str, str]()
+    for name in second:
+        velocity = f"v{name}"
+        while velocity in taken or velocity in found.values():
+            velocity += "_"
+        found[name] = velocity
+    return found
+
+
+def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tuple[list[list[str]], list[str]]:
+    """The pieces with x0 in the place of x[0], or x_0 where x0 is another name; and notes that say so."""
+    words = {*taken, *(token for piece in pieces for token in piece)}
+    names = dict[tuple[str, str], str]()
+    made: list[list[str]] = []
+    for piece in pieces:
+        made.append([])
+        k = 0
+        while k < len(piece):
+            word = piece[k : k + 4]
+            is_indexed = len(word) == 4 and is_name(word[0]) and word[1] == "[" and word[3] == "]"
+            is_indexed = is_indexed and word[2].isdigit() and len(word[2]) < 5
+            if is_indexed:
+                name = f"{word[0]}{word[2]}"
+                while name in words:
+                    name = f"{word[0]}_{word[2]}" if "_" not in name else f"{name}_"
+                made[-1].append(names.setdefault((word[0], word[2]), name))
+            else:
+                made[-1].append(piece[k])
+            k += 4 if is_indexed else 1
+    return made, [f"{name}[{index}] is called {short}" for (name, index), short in names.items()]
+
+
+def _hint(left: Sequence[str], piece: Sequence[str]) -> str:
+    """What to type in the place of something that people put between equations."""
+    if len(left) == 1 and left[0][0] == "d" and is_name(left[0][1:]):
+        return f"; did you mean {left[0]}/dt = ...?"
+    if len(left) == 1 and is_name(left[0]):
+        value = _text(piece).partition("=")[2].lstrip("= ")[:40]
+        return f"; a parameter is given by -p {left[0]}={value}"
+    if len(left) == 4 and left[1] in "([" and left[2] in ("0", "0.0"):
+        return "; an initial value is given by --start"
+    if "~" in left or "".join(left[1:]) in ("(t+1)", "[t+1]", "(n+1)", "[n+1]"):
+        return "; a map is given by --vars X,Y,... and one --image EXPR for each variable"
+    return ""
+
+
+def is_name(token: str) -> bool:
+    """Whether a token is a name."""
+    return (token[:1].isalpha() and token.isascii()) or token[:1] == "_"
+
+
+def _text(tokens: Sequence[str]) -> str:
+    return "".join(tokens).strip()

@@ -25,6 +25,7 @@ from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
 from kahanmaps.documents.reader import KINDS
 from kahanmaps.documents.toml_text import TomlKind, to_toml
+from kahanmaps.documents.xpp import ENDING, is_ode, read_ode
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.algebraic import AlgebraicMap
@@ -61,6 +62,7 @@ class SystemFile(Displayed):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any] = field(repr=False)
+    notes: tuple[str, ...] = ()  # what was made of equations beyond their words, for people
 
     @property
     def label(self) -> str:
@@ -250,17 +252,36 @@ def map_at(file: SystemFile, eps: Any = None) -> MapOver:
 
 
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """The system that a text in TOML describes; `where` names the text in messages.
+    """The system that a text in TOML describes, or one in lines as XPP has them; `where` names it in messages.
 
-    >>> parse_system('variables = ["x"]\\n[system]\\nrhs = ["x^3"]', "example")
+    >>> parse_system('variables = ["x"]\\n[system]\\nrhs = ["x", "x"]', "example")
     Traceback (most recent call last):
         ...
     kahanmaps.errors.SystemFileError: example: 1 mistake
-      system.rhs[1]: found a polynomial of degree 3, expected at most 2
+      system.rhs: found 2 right-hand sides, expected 1, one for each variable
     """
-    reader = DocumentReader(_TOML.document(text, where), where, parameters or {}, partial(_named, Path(where).parent))
+    document, notes = _document(text, where)
+    reader = DocumentReader(document, where, parameters or {}, partial(_named, Path(where).parent))
     reader.inside = (os.path.abspath(where),)
-    return SystemFile(*reader.read())
+    contents = reader.read()
+    return SystemFile(*contents._replace(notes=(*notes, *contents.notes)))
+
+
+def _document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
+    """The plain data of a text in TOML, or of one that has equations in lines, and notes on these."""
+    is_of_xpp = where.endswith(ENDING)
+    try:
+        if not is_of_xpp:
+            return _TOML.document(text, where), []
+    except SystemFileError:
+        is_of_xpp = not where.endswith(".toml") and is_ode(_decoded(text))
+        if not is_of_xpp:
+            raise
+    return read_ode(_decoded(text), where)
+
+
+def _decoded(text: str | bytes) -> str:
+    return text if isinstance(text, str) else text.decode("utf-8-sig", "replace")
 
 
 def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
@@ -275,7 +296,7 @@ def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
                 return _TOML.document(found.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
-    return _TOML.document(_TOML.read(path), name), os.path.abspath(path), partial(_named, path.parent)
+    return _document(_TOML.read(path), name)[0], os.path.abspath(path), partial(_named, path.parent)
 
 
 def _rows(matrix: fmpq_mat) -> list[list[str]]:

@@ -15,6 +15,7 @@ from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.written.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.errors import InputError, UnknownName, counted, quoted, show
+from kahanmaps.maps.polarised import MAX_DEGREE
 from kahanmaps.systems.quadratic import MAX_DIMENSION
 
 T = TypeVar("T")
@@ -128,7 +129,12 @@ class PartReader:
             return None
         found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
         if found > at_most and not self.unsure:
-            self._mistake(path, f"found a polynomial of degree {found}, expected at most {at_most}")
+            degree = "" if found == 3 else f" and degree = {found}"
+            polarised = (
+                f'\nfor a field of degree {found} write discretization = "polarised"{degree} into [system] of a file'
+            )
+            hint = polarised if path.startswith("system.rhs") and found <= MAX_DEGREE else ""
+            self._mistake(path, f"found a polynomial of degree {found}, expected at most {at_most}{hint}")
             return None
         return polynomial
 

@@ -146,9 +146,14 @@ def test_a_point_of_the_wrong_length_says_both_lengths(text: str, dimension: int
         parse_point(text, dimension)
 
 
+@pytest.mark.parametrize("text", ["1/2,-3", "[1/2,-3]", " (1/2, -3) ", "{1/2, -3}", "1/2 -3", "[ 1/2\t-3 ]"])
+def test_a_point_may_stand_in_brackets_and_have_blanks_for_commas(text: str):
+    assert parse_point(text) == (fmpq(1, 2), fmpq(-3))
+
+
 @pytest.mark.parametrize(
     ("text", "entry", "column"),
-    [("1,2,x", 3, 4), ("1,,2", 2, 2), ("1,2,", 3, 4), ("(1,2)", 1, 0), ("1, 2/0", 2, 5), ("1;2", 1, 1)],
+    [("1,2,x", 3, 4), ("1,,2", 2, 2), ("1,2,", 3, 4), ("(1,2", 1, 0), ("1 2 x", 3, 4), ("1, 2/0", 2, 5), ("1;2", 1, 1)],
 )
 def test_a_mistake_in_a_point_names_entry_and_column(text: str, entry: int, column: int):
     with pytest.raises(ExpressionError, match=f"^entry {entry}: ") as caught:

@@ -39,6 +39,29 @@ def test_an_inline_system_may_be_written_as_equations(kahanmaps):
     assert "or --rhs \"x' = x*y; y' = -x\"" in kahanmaps(f"orbit --rhs x*y {rest}").err
 
 
+def test_a_start_and_parameters_may_be_written_as_people_paste_them(kahanmaps):
+    rest = "--eps 1/10 --steps 2"
+    plain = kahanmaps(f"orbit 'dx/dt = a*x - x*y, dy/dt = x*y - b*y' -p a=2 -p b=1/3 --start 1,-1/2 {rest}")
+    assert plain.status == 0, plain.err
+    for start in ("'[1,-1/2]'", "'1 -1/2'", "'(1, -1/2)'"):
+        line = f"orbit 'x_dot = a*x - x*y; y_dot = x*y - b*y' -p a=2,b=1/3 --start {start} {rest}"
+        assert kahanmaps(line).out == plain.out
+
+
+def test_a_name_that_was_made_is_said_unless_quiet(kahanmaps):
+    line = "orbit \"x'' = x^2\" --start 1,2 --eps 1/10 --steps 1"
+    note = "x'' is read with a velocity, the variable vx: x' = vx\n"
+    assert kahanmaps(line).err == note
+    assert kahanmaps(f"{line} -q").err == ""
+
+
+def test_a_file_of_xpp_is_a_system(kahanmaps, tmp_path):
+    path = tmp_path / "lorenz.ode"
+    path.write_text("par s=10,r=28,b=8/3\nx'=s*(y-x)\ny'=x*(r-z)-y\nz'=x*y-b*z\ndone\n")
+    rest = "--start 1,2,3 --eps 1/10 --steps 2 --format csv"
+    assert kahanmaps(f"orbit {path} {rest}").out == kahanmaps(f"orbit lorenz {rest}").out
+
+
 def fractions(outcome: Outcome) -> list[list[Fraction]]:
     """The points of an orbit that was printed as JSON lines."""
     assert outcome.status == 0, outcome.err

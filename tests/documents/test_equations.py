@@ -1,9 +1,11 @@
 """Right-hand sides as equations, in files: what they mean, and what is told where they cannot be meant."""
 
 import pytest
+from flint import fmpq
 
 import kahanmaps as km
 from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.errors import InputError
 
 PLAIN = km.parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y", "-x"]', "plain").system
 WRITTEN = [
@@ -13,6 +15,15 @@ WRITTEN = [
     'rhs = """\nx\' = x*y\n\ny\' = -x\n"""',
     """rhs = ["x' = x*y", "y′ = -x"]""",
     """rhs = ["x'=x*y; dy/dt = -x"]""",
+    """rhs = "dx/dt = x*y, dy/dt = -x" """,
+    """rhs = "x'[t] == x[t]*y[t], y'[t] == -x[t]" """,
+    """rhs = "{x'[t] == x[t]*y[t], D[y[t], t] == -x[t]}" """,
+    """rhs = "[diff(x(t), t) = x(t)*y(t), diff(y(t), t) = -x(t)]" """,
+    """rhs = "D(x)(t) = x(t)*y(t); Derivative(y(t), t) = -x(t)" """,
+    """rhs = "x_dot = x*y; ydot = -x" """,
+    """rhs = "dx(t)/dt = x(t)*y(t); dydt = -x(t)" """,
+    """rhs = "ẋ = x*y; y’ = -x" """,
+    """rhs = "x'(t) = x*y; y(t)' = -x(t)" """,
 ]
 
 
@@ -38,3 +49,92 @@ def test_parameters_stand_in_equations():
     file = km.parse_system(text, "parameters")
     assert [str(polynomial) for polynomial in file.system.rhs] == ["2*x*y", "-x"]
     assert with_symbols(file, ["a"]).symbols == ("a",)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x'' = x^2 - x - 2*x'", "d^2x/dt^2 = x^2 - x - 2*dx/dt", "x_ddot = x^2 - x - 2*x_dot", "x″ = x^2 - x - 2*x′"],
+)
+def test_an_equation_of_second_order_has_a_velocity_and_a_note_says_its_name(text):
+    file = km.System(text)
+    assert str(file.system) == "x' = vx\nvx' = x^2 - x - 2*vx"
+    assert file.notes == ("x'' is read with a velocity, the variable vx: x' = vx",)
+
+
+def test_velocities_come_after_all_positions_under_names_that_are_free():
+    file = km.System("x'' = -vx*x; y'' = -y; z' = x", vx=2)
+    assert file.variables == ("x", "y", "z", "vx_", "vy")
+    assert [str(f) for f in file.system.rhs] == ["vx_", "vy", "x", "-2*x", "-y"]
+
+
+@pytest.mark.parametrize(("given", "order"), [("x", "x vx"), ("x,v", "x v"), ("v,x", "v x")])
+def test_the_list_of_variables_may_name_the_velocity(given, order):
+    assert km.System("x'' = -x", given).variables == tuple(order.split())
+
+
+def test_an_index_becomes_part_of_a_name_that_no_other_has():
+    file = km.System("x[0]' = x[0] - x[1]; x[1]' = x0*x[0]", x0=3)
+    assert str(file.system) == "x_0' = x_0 - x1\nx1' = 3*x_0"
+    assert file.notes == ("x[0] is called x_0", "x[1] is called x1")
+
+
+def test_a_variable_that_looks_like_a_derivative_is_a_variable_where_it_has_an_equation():
+    assert str(km.System("xdot' = -x; x' = xdot").system) == "xdot' = -x\nx' = xdot"
+
+
+def test_a_blank_between_names_is_no_part_of_a_name():
+    with pytest.raises(InputError, match=r"write x\*y"):
+        km.System("x' = x[t] y[t]; y' = x")
+
+
+REFUSED = {
+    "x''' = x": "x' = u; u' = v; v' = ...",
+    "a = 2; x' = a*x": "-p a=2",
+    "x(0) = 1, x' = x": "--start",
+    "x~ = x*y": "--image",
+    "x(t+1) = x": "--image",
+    "dx = x*y; dy = x": "did you mean dx/dt",
+    "x' = y'; y' = x": "a derivative of y on the right side of the equation for x",
+    "x' = y; x' = 1": "two equations for x",
+    "x' = x = y": "an equation such as x' = x*y",
+    "= x": "an equation such as x' = x*y",
+    "x' = (x; y' = x": "a bracket is opened that is not closed",
+    "x' = x); y' = x": "a bracket is closed that was not opened",
+    "x' = [x)*y; y' = x": "without its '('",
+    "x' =": "found nothing, expected an expression",
+    "x' = sin(x)": "looks like a function call",
+    "x' = ′": "found the character",
+    "d^2x/dt = x": "an equation such as",
+    "D[x[t], t] == __import__('os')": "found",
+    "ξ' = x": "an equation such as",
+    "x' = eps^2*x; eps' = x": "rename it",
+    "x' = x^3": 'write discretization = "polarised" into',
+    "x' = x^4": 'write discretization = "polarised" and degree = 4 into',
+    "x'" * 100_000 + " = x": "expected an equation",
+    "(" * 100_000 + "x' = x": "a bracket is opened",
+    "x' = " + "(" * 100_000 + "x" + ")" * 100_000: "characters, expected at most",
+    "x" + "'" * 100_000 + " = 1": "order 1 or 2",
+    "x' = 1;" * 300_000: "characters, expected at most",
+    "x[" + "9" * 10_000 + "]' = 1": "an equation such as",
+}
+
+
+@pytest.mark.parametrize(("text", "words"), REFUSED.items(), ids=lambda text: str(text)[:20])
+def test_what_is_no_equation_is_refused_with_what_to_write(text, words):
+    with pytest.raises(InputError) as caught:
+        km.System(text)
+    assert words in str(caught.value)
+    assert len(str(caught.value)) < 2000
+
+
+def test_a_parameter_called_eps_is_to_be_renamed():
+    with pytest.raises(InputError, match="rename it"):
+        km.System("x' = eps*x", eps=2)
+
+
+@pytest.mark.parametrize("word", ["polarised", "polarized"])
+def test_a_cubic_field_is_read_with_the_discretization_that_the_message_names(word):
+    text = f'[system]\nrhs = "x\' = x^3"\ndiscretization = "{word}"'
+    found = km.parse_system(text).map
+    assert found.title == "polarised map"
+    assert found.at("1/4").step(["1/2", "1/3"]) == (fmpq(1, 3), fmpq(3, 5))  # as in maps/polarised.py

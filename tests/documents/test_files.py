@@ -341,7 +341,8 @@ def test_the_message_names_the_file_counts_the_mistakes_and_lists_them():
     first, *rest = str(caught.value).splitlines()
     assert first == "pair.toml: 3 mistakes"
     assert rest[0] == "  system.rhs[1]: found a polynomial of degree 3, expected at most 2"
-    assert rest[1].startswith("  system.rhs[2]: found the unknown name 'y'")
+    assert rest[1].endswith('write discretization = "polarised" into [system] of a file')
+    assert rest[2].startswith("  system.rhs[2]: found the unknown name 'y'")
     assert rest[-1] == "  system.rhs: found 2 right-hand sides, expected 1, one for each variable"
 
 

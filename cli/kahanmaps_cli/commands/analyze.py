@@ -53,7 +53,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     report = _Report(as_json or markdown)
     with Progress(quiet) as progress:
         report.progress = progress

@@ -51,7 +51,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     The output is a file that runs as it stands; toml is a system file. eps is an argument of the map, where it has one:
     the time step is 2 eps. Numbers are exact, but in numpy, c and fortran.
     """
-    file = load_system(system, options)
+    file = load_system(system, {**options, "quiet": quiet})
     if language == "toml":
         if options["parts"] or options["symbolic"] or options["name"]:
             raise click.UsageError("a system file holds the whole system: leave out --what, --symbolic and --name")

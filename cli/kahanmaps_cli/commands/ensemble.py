@@ -67,7 +67,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     """
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     integrals = lib.functions_along(file, options["integrals"], in_floats=kind == "float")
     eps = opt.eps_of(file, options)
     number = lib.fmpq(1) if eps is None else eps

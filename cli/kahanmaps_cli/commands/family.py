@@ -262,7 +262,7 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
     integrals and the density that its map over Q inherits.
     """
     output = None if output == "-" else output
-    over_algebra, chi = opt.load_system(system, options), lib.parse_chi(algebra)
+    over_algebra, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)
     file = lib.tensor_file(over_algebra, chi)
     _write(file, output)
     if not quiet:

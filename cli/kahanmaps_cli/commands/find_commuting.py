@@ -42,7 +42,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
     """
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     seed, error_bits = options["seed"], options["error_bits"]
     settings = lib.Settings(seed=seed, error_bits=error_bits)
     with Progress(quiet) as progress:

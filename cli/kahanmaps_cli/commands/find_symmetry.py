@@ -36,7 +36,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the time over.
     """
-    file = load_system(system, options)
+    file = load_system(system, {**options, "quiet": quiet})
     with Progress(quiet) as progress:
         found = lib.linear_symmetries(file.system, seconds=options["seconds"], progress=progress)
     if as_json:

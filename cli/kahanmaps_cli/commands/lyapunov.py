@@ -45,7 +45,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
     _require_sense(options, steps, transient)
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
     starts = asked_starts(file, options, count=_DEFAULT_STARTS)
     with Progress(quiet) as progress:

@@ -83,7 +83,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     _require_sense(options)
     output = None if output == "-" else output
     form = _form(options, output)
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
     with interruptible(_stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"

@@ -60,7 +60,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     kind, prime = options["arithmetic"]
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
-    file = load_system(system, options)
+    file = load_system(system, {**options, "quiet": quiet})
     if not file.is_quadratic:
         raise lib.InputError(f"no period of {file.name} can be computed: {_normal_form(file)}. {_WALK}")
     eps = the_eps(options["eps"], options["time_step"])

@@ -55,7 +55,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.laboratory.singular.singularities import default_eps
 
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     with Progress(quiet) as progress:
         runs = [
             lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "seconds"), progress=progress)

@@ -131,7 +131,7 @@ class _Text:
         rows: list[list[float | int]] = []
         fresh = True
         for number, line in enumerate(text.split("\n"), start=1):
-            content = line.partition("#")[0].strip()
+            content = line.partition("#")[0].strip().strip("()[]{}")  # as people print points
             if not content:
                 continue
             cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()

@@ -59,7 +59,7 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Sca
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
         raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
-    file = opt.load_system(system, options)
+    file = opt.load_system(system, {**options, "quiet": quiet})
     has_begun, interrupted = Event(), Event()
 
     def told(sentence: str) -> None:

@@ -55,7 +55,7 @@ def table(system: str | None, options: dict[str, Any], found: Callable[[lib.Syst
     for row in rows:
         name = ", ".join(f"{name} = {value}" for name, value in row)
         try:
-            file = load_system(system, {**options, "parameters": row})
+            file = load_system(system, {**options, "parameters": row, "quiet": True})
             with Progress(quiet) as progress:
                 cell = found(file, progress)
         except KahanmapsError as error:

@@ -12,6 +12,7 @@ What is printed parses back to the same value wherever that value lies within th
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from math import prod
 
@@ -63,36 +64,58 @@ def format_number(value: fmpq) -> str:
 
 
 def parse_point(text: str, dimension: int | None = None, *, limits: Limits = LIMITS) -> tuple[fmpq, ...]:
-    """The numbers in a comma separated list; there must be `dimension` of them if that is given.
+    """The numbers in a list, with commas between them or blanks, perhaps in brackets; `dimension` of them, if given.
 
     Raises `ExpressionError`, which names the entry (counted from 1) and its column in the whole text.
 
-    >>> parse_point("1/2, -1/3, 0")
-    (1/2, -1/3, 0)
+    >>> parse_point("1/2, -1/3, 0"), parse_point("[1 2]")
+    ((1/2, -1/3, 0), (1, 2))
     >>> parse_point("1,2", 3)
     Traceback (most recent call last):
     kahanmaps.errors.ExpressionError: found 2 numbers, expected 3, separated by commas
     """
     require_text(text, "a point", "write its numbers as text, separated by commas, e.g. '1/2,-1/3,0'")
-    if not text.strip(BLANKS):
+    entries = point_entries(text)
+    if not entries:
         if dimension == 0:
             return ()
         raise ExpressionError("found nothing, expected a point: numbers separated by commas, e.g. 1/2,-1/3,0", text)
-    count = text.count(",") + 1
-    if dimension is not None and count != dimension:
-        found = "1 number" if count == 1 else f"{count} numbers"
+    if dimension is not None and len(entries) != dimension:
+        found = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
         raise ExpressionError(f"found {found}, expected {dimension}, separated by commas", text)
     point = []
-    start = 0
-    for entry in range(1, count + 1):
-        end = text.find(",", start)
-        end = len(text) if end < 0 else end
+    for entry, (start, end) in enumerate(entries, 1):
         try:
             point.append(number_in(text, start, end, limits.number_digits, limits))
         except ExpressionError as error:
             raise ExpressionError(f"entry {entry}: {error.message}", text, error.column) from None
-        start = end + 1
     return tuple(point)
+
+
+def point_entries(text: str) -> list[tuple[int, int]]:
+    """Where the entries of a point begin and end in its text: between commas, or blanks where there are no commas.
+
+    >>> point_entries("(1,2)"), point_entries("1 2"), point_entries("")
+    ([(1, 2), (3, 4)], [(0, 1), (2, 3)], [])
+    """
+    start, end = 0, len(text)
+    while start < end and text[start] in BLANKS:
+        start += 1
+    while start < end and text[end - 1] in BLANKS:
+        end -= 1
+    if text[start : start + 1] + text[end - 1 : end] in ("[]", "()", "{}"):
+        start, end = start + 1, end - 1
+    inside = text[start:end]
+    if not inside.strip(BLANKS):
+        return []
+    between = "," if "," in inside else r"[ \t\r\n]+"
+    if between != ",":
+        start += len(inside) - len(inside.lstrip(BLANKS))
+        inside = inside.strip(BLANKS)
+    places = [match.span() for match in re.finditer(between, inside)]
+    starts = [0, *(last for _, last in places)]
+    ends = [*(first for first, _ in places), len(inside)]
+    return [(start + first, start + last) for first, last in zip(starts, ends, strict=True)]
 
 
 def format_point(point: Sequence[fmpq]) -> str:

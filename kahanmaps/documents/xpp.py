@@ -1,0 +1,143 @@
+"""Files of XPP (XPPAUT, .ode) as documents: equations, parameters and definitions; what else they have is named.
+
+Read are x' = ..., dx/dt = ..., par, number, init, x(0) = ..., name = formula and !name = formula, which are put in the
+places of the names. Options (@), aux, set and boundary conditions are about the integration and left out. What would
+change the equations (functions, arrays, Markov variables, tables, maps x(t+1)) is refused with its line. XPP does not
+tell upper from lower case. Source: Ermentrout's documentation of XPPAUT 8, "Structure of ODE files".
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kahanmaps.algebra.written.numerals import LIMITS
+from kahanmaps.documents.equations import derivative_at, is_name, tokens_of
+from kahanmaps.errors import InputError, SystemFileError, quoted
+
+ENDING = ".ode"
+_VALUES = ("p", "par", "param", "params", "parameter", "parameters", "n", "num", "number", "numbers")
+_INITIAL = ("i", "init", "ic", "initial")
+_LEFT_OUT = ("a", "aux", "b", "bdry", "bndry", "set", "options", "only", "export", "command")
+_READ = "x' = ..., dx/dt = ..., par a=1, init x=0 and name = formula"
+
+
+def is_ode(text: str) -> bool:
+    """Whether a text that is not TOML has equations in lines: on the left of one stands a derivative.
+
+    >>> is_ode("x' = -x\\ny' = x"), is_ode('[system]\\nrhs = "x')
+    (True, False)
+    """
+    for line in text[: LIMITS.characters].split("\n"):
+        if line.lstrip().startswith("["):
+            return False
+        left = [token for token in tokens_of(line.partition("=")[0]) if not token.isspace()]
+        found = derivative_at(left, 0) if "=" in line else None
+        if found is not None and found.end == len(left):
+            return True
+    return False
+
+
+def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
+    """The document that the lines of a file of XPP describe, and notes on what was left out; `where` names it.
+
+    Raises SystemFileError with every line that cannot be read.
+
+    >>> read_ode("# decay\\npar a=.5 b=2\\ninit x=1\\nx'=-a*X+b\\n@ total=9\\ndone", "decay.ode")[0]
+    {'parameters': {'a': '.5', 'b': '2'}, 'system': {'rhs': ["x'=-a*x+b"]}}
+    """
+    reader = _Lines()
+    mistakes: list[tuple[str, str]] = []
+    lines = text.replace("\\\r\n", "").replace("\\\n", "").split("\n")
+    for number, line in enumerate(lines, 1):
+        if line.strip().lower() in ("d", "done"):
+            break
+        try:
+            reader.read(line.strip())
+        except InputError as error:
+            mistakes.append((f"line {number}", str(error)))
+    if not reader.equations and not mistakes:
+        mistakes.append(("file", f"found no equations, expected a system file in TOML, or one of XPP: {_READ}"))
+    if mistakes:
+        raise SystemFileError(where, mistakes)
+    try:
+        equations = [left + reader.expanded(right) for left, right in reader.equations]
+    except InputError as error:
+        raise SystemFileError(where, [("file", str(error))]) from error
+    document = {"parameters": reader.parameters, "system": {"rhs": equations}}
+    notes = list(reader.notes)
+    if reader.has_capitals:
+        notes.append("names are in lower case: XPP does not tell upper from lower case")
+    if reader.initial:
+        start = ", ".join(f"{name} = {value}" for name, value in reader.initial.items())
+        notes.append(f"the initial values {start} are left out: --start gives them, in the order of the variables")
+    if reader.left_out:
+        notes.append(f"left out, being about the integration: {', '.join(reader.left_out)}")
+    return document, notes
+
+
+class _Lines:
+    """What the lines so far say."""
+
+    def __init__(self) -> None:
+        self.equations: list[tuple[str, list[str]]] = []  # the left side, and the tokens of the right one
+        self.parameters: dict[str, str] = {}
+        self.initial: dict[str, str] = {}
+        self.left_out: dict[str, None] = {}
+        self.notes: list[str] = []
+        self.definitions: dict[str, str] = {}
+        self.has_capitals = False  # in what is read
+
+    def read(self, line: str) -> None:
+        """Read a line. Raises InputError for what cannot be read."""
+        if not line or line[0] in '#"':
+            return
+        if line[0] == "@":
+            self.left_out["@"] = None
+            return
+        self.has_capitals |= line != line.lower()
+        word, rest = [*line.lower().split(None, 1), ""][:2]
+        tokens = tokens_of(line.lower().lstrip("!"))
+        words = [token for token in tokens if not token.isspace()]
+        is_keyword = is_name(word) and is_name(rest[:1])
+        if is_keyword and word in _LEFT_OUT:
+            self.left_out[word] = None
+        elif is_keyword and word in (*_VALUES, *_INITIAL):
+            self._values(words[1:], self.parameters if word in _VALUES else self.initial)
+        elif (place := next((k for k, token in enumerate(words) if token == "="), None)) is None:
+            raise InputError(f"found {quoted(line)}, expected {_READ}")
+        elif len(words) > 5 and words[1:5] == ["(", "0", ")", "="]:
+            self.initial[words[0]] = "".join(words[5:])
+        else:
+            found = derivative_at(words[:place], 0)
+            is_equation = found is not None and found.end == place
+            if not is_equation and (place != 1 or not is_name(words[0])):
+                raise InputError(f"found {quoted(line)}, expected {_READ}: write functions, arrays and maps out")
+            split = tokens.index("=") + 1
+            if is_equation:
+                self.equations.append(("".join(tokens[:split]), tokens[split:]))
+            else:  # of what was defined before
+                self.definitions[words[0]] = f"({self.expanded(tokens[split:])})"
+
+    def _values(self, words: list[str], values: dict[str, str]) -> None:
+        """a=1,b=-2.5 c=8/3 d: pairs with commas or blanks between them; a name alone has the value 0."""
+        k = 0
+        while k < len(words):
+            name = words[k]
+            if not is_name(name):
+                raise InputError(f"found {quoted(name)}, expected NAME=NUMBER, as in par a=1, b=2.5")
+            value, k = "0", k + 1
+            if words[k : k + 1] == ["="]:
+                end = k + 1 + (words[k + 1 : k + 2] == ["-"] or words[k + 1 : k + 2] == ["+"])
+                if words[end + 1 : end + 2] == ["/"]:  # where XPP stops reading, without a word
+                    end += 2
+                    self.notes.append(f"{name} = {''.join(words[k + 1 : end + 1])} is read as it stands, unlike in XPP")
+                value, k = "".join(words[k + 1 : end + 1]), end + 1
+            values[name] = value
+            k += words[k : k + 1] == [","]
+
+    def expanded(self, tokens: list[str]) -> str:
+        """A formula with definitions in the places of their names. Raises InputError where it becomes too long."""
+        parts = [self.definitions.get(token, token) for token in tokens]
+        if sum(map(len, parts)) > LIMITS.characters:
+            raise InputError(f"found a formula of more than {LIMITS.characters} characters with its definitions put in")
+        return "".join(parts).strip()
