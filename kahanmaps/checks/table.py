@@ -91,7 +91,8 @@ _CHECKS = [
         are expected NOT to commute, and this does not change the exit status.
 
         SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p
-        sets a parameter of both, or of the one that has it.
+        sets a parameter of both, or of the one that has it. An inline system (--rhs) and a SYSTEM are f and g in the
+        order in which they stand.
         """,
         "they commute",
         is_of_pair=True,

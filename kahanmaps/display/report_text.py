@@ -19,9 +19,19 @@ def report_text(report: Report) -> str:
 
 
 def headline(report: Report) -> str:
-    """The first line: what was checked, of which systems, for which eps."""
+    """The first line: what was checked, of which systems, with which values of parameters, for which eps."""
     context = report.context
-    names = context["system"] + (f", {context['other']}" if "other" in context else "")
+    values = [
+        ", ".join(
+            f"{name} = {shorten(str(value), 60)}" for name, value in context.get(key, {}).get("parameters", {}).items()
+        )
+        for key in ("document", "other_document")
+    ]
+    if "other" in context:
+        pair = zip((context["system"], context["other"]), values, strict=True)
+        names = ", ".join(f"{name} ({text})" if text else name for name, text in pair)
+    else:
+        names = ", ".join(filter(None, (context["system"], values[0])))
     eps = eps_words(context)
     if "eps2" in context:
         eps += f", second map at eps2 = {context['eps2']}"

@@ -17,6 +17,7 @@ from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import print_report
 
+_ARGUMENT_IS_FIRST = "kahanmaps: the argument stands before the inline system"
 _STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
 
 
@@ -25,12 +26,16 @@ def command(name: str) -> click.Command:
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
+        swapped = False
         if check.is_of_pair:
             system, other = _pair(system, other, options)
+            swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)
         with Progress(options["quiet"]) as progress:
             settings = opt.settings_from(options, progress)
             if check.is_of_pair:
                 file, second = opt.load_pair(system, other, options)
+                if swapped and second is not None:
+                    file, second = second, file
                 report = check(file, second, settings, eps2)
             else:
                 file = opt.load_system(system, options)
@@ -48,8 +53,24 @@ def command(name: str) -> click.Command:
     else:
         run = _option(check.claim)(run) if check.claim is not None else run
         run = opt.system_options(run)
-    made: click.Command = click.command(name, help=_help(check))(run)
+    kind = _PairCommand if check.is_of_pair else click.Command
+    made: click.Command = click.command(name, cls=kind, help=_help(check))(run)
     return made
+
+
+class _PairCommand(click.Command):
+    """A command with an argument and an inline system, which are f and g in the order in which they are typed.
+
+    click keeps the order of options, but takes arguments after all of them.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        flags = ("--vars", "--rhs", "--image", "--inverse")
+        inline = next((k for k, word in enumerate(args) if word.partition("=")[0] in flags), len(args))
+        if inline < len(args):
+            before, _, _ = self.make_parser(ctx).parse_args(args[:inline])
+            ctx.meta[_ARGUMENT_IS_FIRST] = isinstance(before.get("system"), str)
+        return super().parse_args(ctx, args)
 
 
 def _option(claim: ClaimOption) -> Any:
@@ -67,7 +88,7 @@ def _help(check: Check) -> str:
 
 
 def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tuple[str | None, str | None]:
-    """An inline system is the first, and the argument the second."""
+    """An inline system in the place of the first, and the argument as the second."""
     if opt.is_inline(options) and system is not None and other is None:
         system, other = None, system
     if system == other == "-":

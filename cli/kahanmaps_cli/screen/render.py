@@ -43,7 +43,9 @@ def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet
         tell(str(report))
     status = exit_status(report)
     if status == 3 and report.ended_early and not quiet:
-        say(f"the orbit that was asked for ended early: {report.context['orbit']['message']}")
+        orbit = report.context["orbit"]
+        hint = "; --max-digits N raises the budget" if orbit["status"] == "budget" else ""
+        say(f"the orbit that was asked for ended early: {orbit['message']}{hint}")
     return status
 
 
