@@ -17,7 +17,7 @@ from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.experiments.grid import Grid, RationalRange, Values, has_repeats, read_values
 from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
-from kahanmaps.experiments.results.recipes import family_recipe, find_file, recipe_of
+from kahanmaps.experiments.results.recipes import ENDINGS, family_recipe, find_file, recipe_of
 from kahanmaps.experiments.results.records import Limits, Task, canonical
 from kahanmaps.experiments.shape import SpecDocument, read_memory, read_time
 
@@ -40,6 +40,7 @@ class Experiment:
     fixed: Mapping[str, Any]
     grid: Grid
     limits: Limits
+    skipped: Sequence[tuple[str, str]] = ()  # systems that cannot be used, and why
 
     @property
     def size(self) -> int:
@@ -123,11 +124,16 @@ class ExperimentReader:
         self.raw: dict[str, Any] = spec.document["experiments"][name]  # as it was written, whatever its shape
         self.kind: TaskKind | None = None
         self.files: list[SystemFile] = []
+        self.skipped: list[tuple[str, str]] = []
         self.is_family = False
 
     def read(self) -> Experiment | None:
         """The experiment, or None after telling what is wrong with it."""
         told_before = len(self.spec.mistakes)
+        on_error = self.sound("on_error") or self.spec.sound("on_error") or "refuse"
+        if on_error not in ("refuse", "skip"):
+            self.mistake("on_error", f'found {show(on_error)}, expected "refuse" or "skip"')
+        self._skips = self.spec.skip_bad or on_error == "skip"
         if (name := self.sound("task")) is not None:
             with self._at("task"):
                 self.kind = task_kind(name)
@@ -148,7 +154,7 @@ class ExperimentReader:
             constant["system"] = recipes[0]
         elif recipes:
             grid_axes = {"system": recipes, **axes}
-        return Experiment(self.name, kind, recipes, constant, Grid(grid_axes, zips), limits)
+        return Experiment(self.name, kind, recipes, constant, Grid(grid_axes, zips), limits, tuple(self.skipped))
 
     @contextmanager
     def _at(self, key: str) -> Iterator[None]:
@@ -362,41 +368,52 @@ class ExperimentReader:
         for number, reference in enumerate(references, start=1):
             place = f"{key}[{number}]" if len(references) > 1 else key
             with self._at(place):
-                for file in self._find(reference):
-                    recipe = recipe_of(file, self.spec.documents)
+                for name in self._names(reference):
+                    try:
+                        file = find_file(name, self.spec.folder)
+                        recipe = recipe_of(file, self.spec.documents)
+                        if self._skips and key == "system":
+                            self._require_kind(file)
+                    except InputError as error:  # the other files are read as well: all mistakes are told together
+                        if self._skips and key == "system":
+                            self.skipped.append((name, str(error)))
+                        else:
+                            self.mistake(place, f"{error}{suggestion(name, [_FAMILY_WORD])}")
+                        continue
                     if recipe["document"] in recipes:
                         self.mistake(place, f"found {file.name} twice, expected every system once")
                     recipes[recipe["document"]] = recipe
                     if key == "system":
                         self.files.append(file)
-                        self._require_kind(place, file)
+                        with self._at(place):
+                            self._require_kind(file)
+        if self.skipped and not recipes:
+            name, reason = self.skipped[0]
+            self.mistake(key, f"found no system that can be used, expected one at least; {name} is skipped: {reason}")
         return list(recipes.values())
 
-    def _find(self, reference: str) -> list[SystemFile]:
-        """The system of a reference, or all those that match a pattern such as members/*.toml."""
-        if any(mark in reference for mark in "*?["):
-            if Path(reference).is_absolute() or not reference.endswith(".toml"):
-                raise InputError(
-                    f"found {show(reference)}, expected a pattern that ends in .toml and is relative to the folder of "
-                    "the spec, e.g. members/*.toml"
-                )
-            try:
-                paths = sorted(self.spec.folder.glob(reference))
-            except (ValueError, NotImplementedError) as error:
-                raise InputError(f"found {show(reference)}, which is no pattern: {error}") from error
-            if not paths or len(paths) > _FILES_AT_MOST:
-                raise InputError(f"found {len(paths)} files like {show(reference)}, expected 1 to {_FILES_AT_MOST}")
-            return [find_file(str(path.relative_to(self.spec.folder)), self.spec.folder) for path in paths]
+    def _names(self, reference: str) -> list[str]:
+        """The reference itself, or the files that match a pattern such as members/*.toml."""
+        if not any(mark in reference for mark in "*?["):
+            return [reference]
+        if Path(reference).is_absolute() or not reference.endswith(ENDINGS):
+            raise InputError(
+                f"found {show(reference)}, expected a pattern that ends in .toml and is relative to the folder of "
+                "the spec, e.g. members/*.toml"
+            )
         try:
-            return [find_file(reference, self.spec.folder)]
-        except InputError as error:
-            hint = suggestion(reference, [_FAMILY_WORD])
-            raise InputError(f"{error}{hint}") from error
+            paths = sorted(self.spec.folder.glob(reference))
+        except (ValueError, NotImplementedError) as error:
+            raise InputError(f"found {show(reference)}, which is no pattern: {error}") from error
+        if not paths or len(paths) > _FILES_AT_MOST:
+            raise InputError(f"found {len(paths)} files like {show(reference)}, expected 1 to {_FILES_AT_MOST}")
+        return [str(path.relative_to(self.spec.folder)) for path in paths]
 
-    def _require_kind(self, place: str, file: SystemFile) -> None:
+    def _require_kind(self, file: SystemFile) -> None:
+        """Raises InputError where the task is about members of the family and the file has none."""
         if self.kind is None or file.member is not None or self.kind.needs not in (MEMBER, MEMBER_OR_OTHER):
             return
         if self.kind.needs == MEMBER_OR_OTHER and OTHER in self.given():
             return
         also = ", or a second system as the option other" if self.kind.needs == MEMBER_OR_OTHER else ""
-        self.mistake(place, f"{file.name} is of kind [{file.kind}], expected one of kind [family]{also}")
+        raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]{also}")

@@ -149,10 +149,12 @@ class SpecDocument:
     """A whole spec; paths of systems in it are relative to `folder`.
 
     `mistakes` are pairs of key and sentence, those of the shape first. `documents` are of the systems found on the way.
+    With `skip_bad` systems that cannot be read are left out of all experiments, as with on_error = "skip".
     """
 
-    def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
+    def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:
         self.document = document
+        self.skip_bad = skip_bad
         self.folder = folder
         self.mistakes: list[tuple[str, str]] = []
         self.documents: dict[str, str] = {}

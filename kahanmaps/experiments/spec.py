@@ -67,18 +67,24 @@ class Spec:
         return sum(experiment.size for experiment in self.experiments)
 
 
-def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS) -> Spec:
+def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
     """The spec in a TOML file; paths of systems in it are relative to its folder.
 
+    With `skip_bad` systems that cannot be read, or are of the wrong kind for the task, are left out and listed.
     Raises SpecError with every mistake, InputError where the file cannot be read.
     """
     data = _TOML.read(path)
     with reading(path):
-        return parse_spec(data, str(path), folder=Path(path).parent, max_tasks=max_tasks)
+        return parse_spec(data, str(path), folder=Path(path).parent, max_tasks=max_tasks, skip_bad=skip_bad)
 
 
 def parse_spec(
-    text: str | bytes, where: str = "spec", *, folder: Path | None = None, max_tasks: int = MAX_TASKS
+    text: str | bytes,
+    where: str = "spec",
+    *,
+    folder: Path | None = None,
+    max_tasks: int = MAX_TASKS,
+    skip_bad: bool = False,
 ) -> Spec:
     """The spec that a text in TOML describes; `where` names it in messages.
 
@@ -92,7 +98,7 @@ def parse_spec(
     kahanmaps.experiments.spec.SpecError: spec: 1 mistake
       experiments.a.task: there is no task 'orbot', expected one of ...; did you mean orbit?
     """
-    return _read(SpecDocument(_TOML.document(text, where), folder or Path()), where, max_tasks)
+    return _read(SpecDocument(_TOML.document(text, where), folder or Path(), skip_bad), where, max_tasks)
 
 
 def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:

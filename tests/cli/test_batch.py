@@ -373,3 +373,17 @@ def test_a_source_that_is_not_there_is_told_before_a_target_is_made(kahanmaps, t
     outcome = kahanmaps(f"batch merge {tmp_path}/all.db {tmp_path}/no.db")
     assert (outcome.status, "no.db" in outcome.err) == (2, True)
     assert not (tmp_path / "all.db").exists()
+
+
+def test_bad_files_are_named_together_or_skipped_with_a_list(kahanmaps, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, rhs in (("a", "x' = x"), ("b", "x' = z"), ("c", "x' =")):
+        (tmp_path / f"{name}.toml").write_text(f'[system]\nrhs = "{rhs}"\n')
+    (tmp_path / "spec").write_text('[experiments.o]\ntask = "orbit"\nsystem = "*.toml"\noptions = {eps = 1}\n')
+    refused = kahanmaps("batch run spec --dry-run")
+    assert refused.status == 2
+    assert all(f"{name}.toml: 1 mistake" in refused.err for name in "bc")
+    assert "skipped\tb.toml" in kahanmaps("batch run spec --dry-run --skip-bad").out
+    assert kahanmaps("batch run spec --skip-bad -j 1 --db o.db").status == 0
+    [one] = kahanmaps("batch status --db o.db --json").json["experiments"]
+    assert (one["tasks"], [skipped["system"] for skipped in one["skipped"]]) == (1, ["b.toml", "c.toml"])

@@ -78,6 +78,11 @@ def command() -> None:
 @click.option("--retry-failed", is_flag=True, help="Do failed tasks again as well.")
 @click.option("--dry-run", is_flag=True, help="Check the spec, show how many tasks there are and the first few.")
 @click.option(
+    "--skip-bad",
+    is_flag=True,
+    help='Leave out systems that cannot be read, and list them in the database (on_error = "skip" in the spec).',
+)
+@click.option(
     "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more tasks (default 1000000)."
 )
 @click.option(

@@ -25,7 +25,7 @@ _SHOWN = 3  # tasks of each experiment in a dry run
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
-    spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS)
+    spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
     missing = _missing(db, spec, options)
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
@@ -41,6 +41,7 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
                     {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
                     for task in map(experiment.__getitem__, range(min(_SHOWN, experiment.size)))
                 ],
+                "skipped": [{"system": system, "reason": reason} for system, reason in experiment.skipped],
             }
             for experiment in chosen
         ]
@@ -65,13 +66,16 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
             tell(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given)}")
         if experiment.size > _SHOWN:
             tell(f"\t... and {experiment.size - _SHOWN} more")
+        for system, reason in experiment.skipped:
+            tell(f"\tskipped\t{system}\t{reason}")
     tell(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
     return 0
 
 
 def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
-    spec = None if path is None else lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS)
+    limits = {"max_tasks": options["max_tasks"] or lib.MAX_TASKS, "skip_bad": options["skip_bad"]}
+    spec = None if path is None else lib.read_spec(path, **limits)
     if spec is not None:
         require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     with lib.Store.open(db, create=spec is not None) as store:
@@ -80,6 +84,9 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
         todo = store.count_pending(**which, retry_failed=options["retry_failed"])
         if not options["quiet"]:
+            for experiment in spec.experiments if spec is not None else ():
+                if experiment.skipped:
+                    say(f"{experiment.name}: {counted(len(experiment.skipped), 'system')} skipped (see batch status)")
             _tell_plan(planned, todo, db)
         was_interrupted = False
         with BatchProgress(todo, options["quiet"]) as progress:

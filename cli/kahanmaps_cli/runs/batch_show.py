@@ -34,6 +34,7 @@ def status_data(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
                 "outcomes": {str(outcome): count for outcome, count in one.outcomes.items() if count},
                 "verdicts": dict(one.verdicts),
                 "seconds": round(one.seconds, 3),
+                "skipped": [{"system": system, "reason": reason} for system, reason in one.skipped],
             }
             for one in found
             if not only or one.name in only
@@ -65,6 +66,9 @@ def print_status(data: Mapping[str, Any]) -> None:
         numbers += [row["verdicts"].get(verdict, 0) for verdict in given]
         table.append([row["name"], *map(str, numbers), duration(row["seconds"])])
     print_table(table)
+    for row in rows:
+        for one in row["skipped"]:
+            echo(f"{row['name']} skips {one['system']}: {one['reason']}")
     if data["unplanned"]:
         click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
 

@@ -60,6 +60,7 @@ def _merge_plans(database: Database, source: Database) -> int:
         tasks = ((key, text) for rows in chunks for _, key, text in rows)
         _, _, added = tables.fill_plan(database, id, definition, canonical(asdict(experiment.limits)), tasks)
         new += added
+        tables.put_skipped(database, experiment.name, tables.skipped_of(source, experiment.id))
     return new
 
 

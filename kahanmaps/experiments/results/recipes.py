@@ -41,9 +41,12 @@ def document_text(file: SystemFile) -> str:
     return canonical({key: value for key, value in file.document.items() if key != "catalog"})
 
 
+ENDINGS = (".toml", ".ode")  # of system files
+
+
 def find_file(reference: str, folder: Path) -> SystemFile:
-    """The system of a name of the catalogue or of a path ending in .toml, which is relative to `folder`."""
-    if reference.endswith(".toml"):
+    """The system of a name of the catalogue or of a path ending in .toml or .ode, which is relative to `folder`."""
+    if reference.endswith(ENDINGS):
         return load(folder / reference)
     # Any other path would give its system a name with folders in it, and another one on every machine.
     if reference not in names() and ("/" in reference or os.path.exists(reference)):

@@ -6,6 +6,9 @@ from __future__ import annotations
 FORMATS = (1, 2)
 APPLICATION_ID = 0x4B61684D  # "KahM": by this a file is known to be ours
 
+SKIPPED = """CREATE TABLE IF NOT EXISTS skipped (
+    experiment INTEGER NOT NULL, system TEXT NOT NULL, reason TEXT NOT NULL, PRIMARY KEY (experiment, system)
+) WITHOUT ROWID"""
 SCHEMA = f"""
 CREATE TABLE document (digest TEXT PRIMARY KEY NOT NULL, text TEXT NOT NULL);
 CREATE TABLE task (id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, text TEXT NOT NULL);
@@ -18,6 +21,8 @@ CREATE TABLE experiment (
 CREATE TABLE plan (
     experiment INTEGER NOT NULL, number INTEGER NOT NULL, task INTEGER NOT NULL, PRIMARY KEY (experiment, number)
 ) WITHOUT ROWID;
+-- Systems of an experiment that could not be used when it was planned. Databases of earlier versions lack the table.
+{SKIPPED};
 CREATE INDEX plan_of_task ON plan (task, experiment, number);
 CREATE TABLE result (
     task INTEGER PRIMARY KEY, outcome TEXT NOT NULL, verdict TEXT, seconds REAL NOT NULL, attempts INTEGER NOT NULL,

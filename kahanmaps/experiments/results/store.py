@@ -62,6 +62,7 @@ class ExperimentStatus:
     outcomes: Mapping[Outcome, int]
     verdicts: Mapping[str, int]
     seconds: float
+    skipped: Sequence[tuple[str, str]] = ()  # systems that were left out when it was planned, and why
 
 
 class Found(NamedTuple):
@@ -116,16 +117,25 @@ class Store(Displayed):
         ]
 
     def plan(
-        self, experiment: str, definition: str, limits: Limits, tasks: Iterable[Task], documents: Mapping[str, str]
+        self,
+        experiment: str,
+        definition: str,
+        limits: Limits,
+        tasks: Iterable[Task],
+        documents: Mapping[str, str],
+        skipped: Iterable[tuple[str, str]] = (),
     ) -> Planned:
         """Plan these tasks in this order; a kill or an exception on the way leaves the plan there was.
 
         `definition` is what the tasks were made from: if it is the one planned before, `tasks` is not even begun, and
         only the limits are set. If it is another one, this plan replaces the old; results stay, planned or not.
-        `documents` (digest to text) is read after `tasks`, so whoever makes the tasks may fill it meanwhile.
+        `documents` (digest to text) is read after `tasks`, so whoever makes the tasks may fill it meanwhile. `skipped`
+        are systems that are left out, and why.
         """
         with self._database.transaction():
-            return tables.replace_plan(self._database, experiment, definition, limits, tasks, documents)
+            planned = tables.replace_plan(self._database, experiment, definition, limits, tasks, documents)
+            tables.put_skipped(self._database, experiment, skipped)
+            return planned
 
     def merge(self, other: str | os.PathLike[str]) -> Merged:
         """Take over what another database has, all or nothing; doing it again changes nothing.
@@ -276,7 +286,14 @@ class Store(Displayed):
                     verdicts[verdict] += count
         missing = experiment.tasks - outcomes.total()
         return ExperimentStatus(
-            experiment.name, experiment.total, experiment.tasks, missing, dict(outcomes), dict(verdicts), seconds
+            experiment.name,
+            experiment.total,
+            experiment.tasks,
+            missing,
+            dict(outcomes),
+            dict(verdicts),
+            seconds,
+            tables.skipped_of(self._database, experiment.id),
         )
 
     def find(self, prefix: str) -> list[Found]:

@@ -24,6 +24,7 @@ from kahanmaps.experiments.results.records import (
     digest,
     encodable,
 )
+from kahanmaps.experiments.results.schema import SKIPPED
 
 PLAN_CHUNK = 1000  # rows of the plan that one read takes: they are short
 RESULT_CHUNK = 50  # rows with their results, which may be megabytes
@@ -169,6 +170,23 @@ def replace_plan(
     )
     database.execute("DROP TABLE earlier")
     return Planned(total, different - new, new, dropped)
+
+
+def put_skipped(database: Database, experiment: str, skipped: Iterable[tuple[str, str]]) -> None:
+    """Set the systems that a planned experiment leaves out, and why."""
+    database.execute(SKIPPED)  # databases of earlier versions lack the table
+    id = database.execute("SELECT id FROM experiment WHERE name = ?", (experiment,)).fetchone()[0]
+    database.execute("DELETE FROM skipped WHERE experiment = ?", (id,))
+    rows = ((id, system, reason) for system, reason in skipped)
+    database.execute_many("INSERT OR REPLACE INTO skipped VALUES (?, ?, ?)", rows)
+
+
+def skipped_of(database: Database, id: int) -> list[tuple[str, str]]:
+    """The systems that an experiment leaves out, and why."""
+    if not database.fetch("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'skipped'"):
+        return []
+    rows = database.fetch("SELECT system, reason FROM skipped WHERE experiment = ? ORDER BY system", (id,))
+    return [(system, reason) for system, reason in rows]
 
 
 def add_experiment(database: Database, name: str) -> int:

@@ -80,7 +80,12 @@ def plan(spec: Spec, store: Store) -> dict[str, Planned]:
     """Plan every experiment of a spec in a store; what was done before stays done."""
     return {
         experiment.name: store.plan(
-            experiment.name, experiment.definition, experiment.limits, experiment.tasks(), spec.documents
+            experiment.name,
+            experiment.definition,
+            experiment.limits,
+            experiment.tasks(),
+            spec.documents,
+            experiment.skipped,
         )
         for experiment in spec.experiments
     }
