@@ -52,6 +52,8 @@ from kahanmaps.documents.files import MAX_FILE_BYTES as MAX_FILE_BYTES
 from kahanmaps.documents.files import SystemFile as SystemFile
 from kahanmaps.documents.files import parse_system as parse_system
 from kahanmaps.documents.inline import inline_file as inline_file
+from kahanmaps.documents.iterates import iterates_in as iterates_in
+from kahanmaps.documents.iterates import with_iterates as with_iterates
 from kahanmaps.documents.structured_facts import KEYS as KEYS
 from kahanmaps.documents.structured_facts import relations as relations
 from kahanmaps.documents.tensor import tensor_file as tensor_file

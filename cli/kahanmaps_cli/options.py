@@ -71,7 +71,8 @@ parameter_option: Callable[[F], F] = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     callback=_one_pair_each,
-    help="Set parameters of the system: a=2/3 or a=1,b=2; a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and checks.",
+    help="Set parameters of the system: a=2/3 or a=1,b=2; a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and "
+    "checks.",
 )
 
 inline_options: Callable[[F], F] = stack(

@@ -84,6 +84,8 @@ def _read_seconds(text: str) -> float:
 
 def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
     left, equals, right = (piece.strip() for piece in text.partition("="))
+    if name_is_optional and "," in left:  # a formula without a name, with letters that are defined behind it
+        return "", text.strip()
     if equals and left and right and left.isprintable():
         return left, right
     if name_is_optional and not equals and left:

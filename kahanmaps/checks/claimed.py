@@ -7,10 +7,10 @@ from itertools import count
 from typing import Any
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.expressions import formula_text
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.iterates import parse_with_iterates
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.poisson import GivenTensor
 
@@ -25,10 +25,14 @@ def settings_and_claim(settings: Settings | Any, extra: Any) -> tuple[Settings, 
 
 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
-    """A formula in the variables of a file, its parameters and eps, as a function of the variables and eps."""
+    """A formula in the variables of a file, its parameters and eps, as a function of the variables and eps.
+
+    With x~ in it, it is one of the variables, their iterates and eps.
+    """
     if isinstance(claim, RationalFunction):
         return claim
-    return parse_rational_function(formula_text(claim), file.claim_names, file.parameters)
+    names = file.claim_names
+    return parse_with_iterates(formula_text(claim), names[: file.dim], names[file.dim :], file.parameters)
 
 
 def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFunction]:
@@ -36,7 +40,7 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):
-        free = (f"I{k}" for k in count(1) if f"I{k}" not in file.integrals)
+        free = (f"I{k}" for k in count(1) if f"I{k}" not in {**file.integrals, **file.integrals_in_iterates})
         claims = dict(zip(free, claims if isinstance(claims, list | tuple) else [claims], strict=False))
     return {name: claimed_function(file, claim) for name, claim in claims.items()}
 

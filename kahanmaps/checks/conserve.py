@@ -20,6 +20,7 @@ from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.invariants.integrals import (
@@ -30,7 +31,7 @@ from kahanmaps.invariants.integrals import (
     PaperIntegral,
     is_constant,
 )
-from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
+from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, orbit_about
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -44,6 +45,8 @@ def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunctio
     """I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
     map_ = as_map(system)
 
+    if isinstance(integral, ClaimedFunction) and integral.iterates:
+        return _conservation_in_iterates(map_, integral, eps)
     last: list[Any] = []  # along an orbit I(x~) at one point is I(x) at the next
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -56,6 +59,19 @@ def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunctio
 
     subject = (map_.subject, integral.subject)
     return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", has_eps=map_.has_eps, root=map_.root, subject=subject)
+
+
+def _conservation_in_iterates(map_: BirationalMap, integral: ClaimedFunction, eps: fmpq | None) -> Identity:
+    """I(x, x~, ...) has the same value a step later, stated for x in the middle of the piece of orbit."""
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        points = orbit_about(map_.at(eps_value, field), point, integral.iterates + 1)
+        before, after = (integral.on(field, eps_value, points[k:]) for k in (0, 1))
+        return None if after is None or before is None else ([after], [before])
+
+    subject = (map_.subject, integral.subject)
+    labels = ("I on the orbit of x, a step later", "I on the orbit of x")
+    return Identity(map_.dim, sides, eps, *labels, has_eps=map_.has_eps, root=map_.root, subject=subject)
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
@@ -83,7 +99,7 @@ def functions_along(
     found: list[PhaseFunction] = []
     for k, (name, text) in enumerate(asked, start=1):
         if text == "known" and not name:
-            claims = file.integrals
+            claims = {**file.integrals, **file.integrals_in_iterates}
             known = [integral for integral, _, _ in known_integrals(file)]
             if not known and not claims:
                 raise InputError(f"--integral known: no integral of {file.name} is known or claimed")
@@ -92,12 +108,16 @@ def functions_along(
                     "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
                 )
             found += known
-        elif text in file.integrals:
-            claims = {name or text: file.integrals[text]}
+        elif text in (every := {**file.integrals, **file.integrals_in_iterates}):
+            claims = {name or text: every[text]}
         else:
             short = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
             claims = {name or short: claimed_function(file, text)}
-        found += [ClaimedFunction(name, function, file.map.root) for name, function in claims.items()]
+        if in_floats and (moved := [name for name, function in claims.items() if iterates_in(*function.names)]):
+            raise InputError(
+                f"found {', '.join(moved)} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
+            )
+        found += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
     names = [*taken, *(function.name for function in found)]
     for name in names:
         if names.count(name) > 1:
@@ -122,8 +142,8 @@ def check_integrals(file: SystemFile, settings: Settings | Any = None, extra: Ma
     candidates = known_integrals(file)
     for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)
-    for name, function in {**file.integrals, **claims}.items():
-        candidates.append((ClaimedIntegral(name, function, settings.eps, file.map.root), None, ""))
+    for name, function in {**file.integrals, **file.integrals_in_iterates, **claims}.items():
+        candidates.append((ClaimedIntegral(name, function, settings.eps, file.map.root, file.map), None, ""))
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "

@@ -117,7 +117,10 @@ _CHECKS = [
         """,
         "conserved",
         ClaimOption(
-            "--integral", "[NAME=]EXPR", "A claimed integral: a rational function of the variables and eps.", many=True
+            "--integral",
+            "[NAME=]EXPR",
+            "A claimed integral: a rational function of x, its images x~, x~~ and eps.",
+            many=True,
         ),
     ),
     Check(

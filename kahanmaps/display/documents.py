@@ -23,7 +23,7 @@ def file_html(file: SystemFile) -> str:
         rows.append(("Hamiltonian", formula(file.hamiltonian.H, "H", CHARACTERS)))
     rows += [
         (f"integral {markup.shortened(name)}".strip(), formula(function, characters=CHARACTERS))
-        for name, function in list(file.integrals.items())[:10]
+        for name, function in [*file.integrals.items(), *file.integrals_in_iterates.items()][:10]
     ]
     if file.density is not None:
         rows.append(("density (claimed)", formula(file.density, "phi", CHARACTERS)))

@@ -19,6 +19,7 @@ from kahanmaps.algebra.written.text import format_number, parse_polynomial
 from kahanmaps.documents.composition import CompositionReader
 from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.expressions import number
+from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.documents.reader import KINDS, json_like
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, quoted, show, suggestion
@@ -68,6 +69,7 @@ class Contents(NamedTuple):
     density: RationalFunction | None
     document: Mapping[str, Any]
     notes: tuple[str, ...] = ()
+    integrals_in_iterates: Mapping[str, RationalFunction] = {}
 
 
 class DocumentReader(CompositionReader):
@@ -92,14 +94,26 @@ class DocumentReader(CompositionReader):
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
         map_, hamiltonian, member = self._read_section(kind, self._table(kind) if kind else None)
-        integrals = self._read_integrals()
+        claims = self._read_integrals()
+        in_iterates = {name: function for name, function in claims.items() if iterates_in(*function.names)}
+        integrals = {name: function for name, function in claims.items() if name not in in_iterates}
         density = self._read_density()
         self._read_catalog()
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
         document = self._normalised()
         return Contents(
-            name, kind, self.parameters, map_, hamiltonian, member, integrals, density, document, tuple(notes)
+            name,
+            kind,
+            self.parameters,
+            map_,
+            hamiltonian,
+            member,
+            integrals,
+            density,
+            document,
+            tuple(notes),
+            in_iterates,
         )
 
     def _read_name(self) -> Any:

@@ -23,6 +23,7 @@ from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
+from kahanmaps.documents.iterates import iterates_in, with_iterates
 from kahanmaps.documents.reader import KINDS
 from kahanmaps.documents.toml_text import TomlKind, to_toml
 from kahanmaps.documents.xpp import ENDING, is_ode, read_ode
@@ -63,6 +64,7 @@ class SystemFile(Displayed):
     density: RationalFunction | None
     document: Mapping[str, Any] = field(repr=False)
     notes: tuple[str, ...] = ()  # what was made of equations beyond their words, for people
+    integrals_in_iterates: Mapping[str, RationalFunction] = field(default_factory=dict)  # claims that contain x~
 
     @property
     def label(self) -> str:
@@ -149,7 +151,8 @@ class SystemFile(Displayed):
     def require_claim(self, what: str, function: RationalFunction) -> None:
         """Raises InputError unless the function is one of the system's variables and eps, in this order."""
         expected = self.claim_names
-        if function.names != expected:
+        n = self.dim
+        if function.names != with_iterates(expected[:n], iterates_in(*function.names), expected[n:]):
             raise InputError(
                 f"found {what} in the variables {', '.join(function.names)}, expected a rational function of "
                 f"{', '.join(expected)}: make it with parse_rational_function(text, {list(expected)})"
@@ -225,6 +228,7 @@ class SystemFile(Displayed):
             and self.hamiltonian == other.hamiltonian
             and self.member == other.member
             and self.integrals == other.integrals
+            and self.integrals_in_iterates == other.integrals_in_iterates
             and self.density == other.density
         )
 

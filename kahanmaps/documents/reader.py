@@ -13,6 +13,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.written.text import format_number, parse_constant, parse_polynomial, parse_rational_function
+from kahanmaps.documents.iterates import parse_with_iterates
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.errors import InputError, UnknownName, counted, quoted, show
 from kahanmaps.maps.polarised import MAX_DEGREE
@@ -188,7 +189,10 @@ class PartReader:
         text = self._text(path, value)
         if text is None or self.variables is None:
             return None
-        return self._made(path, parse_rational_function, text, (*self.variables, *self.symbols, "eps"), self.parameters)
+        others = (*self.symbols, "eps")
+        if path.startswith("integrals."):
+            return self._made(path, parse_with_iterates, text, self.variables, others, self.parameters)
+        return self._made(path, parse_rational_function, text, (*self.variables, *others), self.parameters)
 
 
 def json_like(value: Any) -> Any:

@@ -21,7 +21,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
@@ -126,9 +126,14 @@ class ClaimedIntegral(ClaimedFunction):
     """
 
     def __init__(
-        self, name: str, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None
+        self,
+        name: str,
+        function: RationalFunction,
+        eps: fmpq | None = None,
+        root: Root | None = None,
+        map_: BirationalMap | None = None,
     ) -> None:
-        super().__init__(name, function, root)
+        super().__init__(name, function, root, map_)
         dim = len(function.names) - 1 - (root is not None)
         self.condition = integral_condition(function, dim, eps, root)
         above, below = at_eps(function, eps, root, dim)

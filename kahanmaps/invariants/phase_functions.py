@@ -19,6 +19,9 @@ from kahanmaps.algebra.polynomials import (
 )
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
+from kahanmaps.documents.iterates import iterates_in
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 _LONGEST_CONDITION = 200  # characters
 
@@ -43,23 +46,58 @@ class PhaseFunction(ABC):
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) that somebody makes a claim about.
 
-    Where there is a `root`, the variable before eps stands for it.
+    Where there is a `root`, the variable before eps stands for it. Where it contains x~, the image of x, it is a
+    function of x under the map, which is needed then.
     """
 
-    def __init__(self, name: str, function: RationalFunction, root: Root | None = None) -> None:
+    def __init__(
+        self, name: str, function: RationalFunction, root: Root | None = None, map_: BirationalMap | None = None
+    ) -> None:
         self.name = name
         self.root = root
+        self.map = map_
         self.function = function
+        self.iterates = iterates_in(*function.names)
         self.formula = format_rational_function(function)
+        if self.iterates and map_ is None:
+            raise InputError(f"found {name}, a function of x and its iterates, expected one of x alone here")
 
     @property
     def subject(self) -> tuple[Any, ...]:
         return ("claimed", self.function)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        points = [tuple(point)]
+        if self.map is not None and self.iterates:
+            over = self.map.at(eps, field)
+            while len(points) <= self.iterates:
+                points.append(over.step(points[-1]))
+        return self.on(field, eps, points)
+
+    def on(self, field: Field, eps: Any, points: Sequence[Sequence[Any]]) -> Any:
+        """The value on successive points of an orbit, one more than it has iterates; None at a pole."""
         with field.working():
             values = () if self.root is None else (self.root.over(field),)
-            return self.function.value(field, (*point, *values, field.convert(eps)))
+            coordinates = [entry for point in points[: self.iterates + 1] for entry in point]
+            return self.function.value(field, (*coordinates, *values, field.convert(eps)))
+
+
+def orbit_about(over: MapOver, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
+    """The points of an orbit: length steps, x in the middle or, where the inverse is not known, first.
+
+    Formulas of points on both sides of x have lower degrees than those of as many points ahead of it.
+    """
+    points, before = [x], 0
+    try:
+        inverse = over.inverse
+        before = length // 2
+    except InputError:
+        inverse = over
+    for _ in range(before):
+        points.insert(0, inverse.step(points[0]))
+    while len(points) <= length:
+        points.append(over.step(points[-1]))
+    return points
 
 
 def at_eps(

@@ -66,7 +66,7 @@ class Formulas:
         H = None
         if file.kind == "hamiltonian":
             H = parse_polynomial(str(document["hamiltonian"]["H"]), names, constants)
-        integrals = {name: claim(text) for name, text in document.get("integrals", {}).items()}
+        integrals = {name: claim(document["integrals"][name]) for name in file.integrals}
         density = claim(document["density"]["phi"]) if "density" in document else None
         return cls(file, map_, rhs, integrals, density, H)
 

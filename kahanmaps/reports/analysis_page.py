@@ -73,7 +73,8 @@ def system_html(file: SystemFile) -> str:
 def _catalogue(file: SystemFile) -> list[Section]:
     """What the catalogue says of the system; empty for others."""
     facts = [text(fact) for fact in file.catalog.get("facts", [])]
-    claims = [formula(function, name or "I", CHARACTERS) for name, function in file.integrals.items()]
+    every = {**file.integrals, **file.integrals_in_iterates}
+    claims = [formula(function, name or "I", CHARACTERS) for name, function in every.items()]
     if file.density is not None:
         claims.append(formula(file.density, "phi", CHARACTERS))
     sources = [text(source(key)) for key in file.catalog.get("sources", [])]

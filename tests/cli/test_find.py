@@ -177,7 +177,15 @@ def test_integrals_in_iterates_are_shown_with_the_others(kahanmaps):
     assert one["name"] == "I4"
     assert "p1*m1~*eps^2" in one["integral"]
     assert r"\tilde{p_1}" in one["latex"]
-    assert f"# I4: {one['integral']}" in kahanmaps("find-integrals lagrange_top --max-degree 2 --toml").out
+    assert f'I4 = "{one["integral"]}"' in kahanmaps("find-integrals lagrange_top --max-degree 2 --toml").out
+
+
+def test_a_hirota_kimura_basis_may_contain_images(kahanmaps):
+    basis = kahanmaps("find-integrals \"q' = p; p' = -q\" --monomials 'q*p~,p*q~,q^2,p^2' --json").json["bases"][0]
+    # On an orbit q p~ - p q~ and q^2 + p^2 are constants, and one is a multiple of the other.
+    assert (basis["dimension"], basis["functions"]) == (1, ["q*p~", "p*q~", "q^2", "p^2"])
+    none = kahanmaps("find-integrals lorenz --monomials 'x*y~,y*x~,1' --json").json["bases"][0]
+    assert none["dimension"] == 0
 
 
 def test_commuting_systems_that_stay_open_give_3(kahanmaps):

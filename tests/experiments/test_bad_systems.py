@@ -9,7 +9,7 @@ from kahanmaps.experiments.spec import SpecError, read_spec
 GOOD = "[system]\nrhs = \"x' = y; y' = -x\"\n"
 FILES = {
     "a.toml": GOOD,
-    "b.toml": "[system]\nrhs = \"x' = z\"\n",
+    "b.toml": '[system]\nrhs = "x\' = z"\n',
     "c.toml": "nonsense",
     "d.toml": GOOD.replace("-x", "x*y"),
 }

@@ -110,8 +110,9 @@ def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tupl
 
     The bare name of an integral of the file adds nothing: all of these are checked anyway.
     """
-    claims = [(name, text) for name, text in claims if name or text not in file.integrals]
-    taken = [*file.integrals, *(name for name, _ in claims if name)]
+    of_file = {**file.integrals, **file.integrals_in_iterates}
+    claims = [(name, text) for name, text in claims if name or text not in of_file]
+    taken = [*of_file, *(name for name, _ in claims if name)]
     for name in taken:
         if taken.count(name) > 1:
             raise click.UsageError(f"found two integrals of the name {name}, expected a name of its own for each")

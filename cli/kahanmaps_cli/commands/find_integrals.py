@@ -31,7 +31,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     "sets",
     metavar="LIST",
     multiple=True,
-    help="A Hirota-Kimura basis of these polynomials instead, e.g. 'x^2,y^2,1'.",
+    help="A Hirota-Kimura basis of these polynomials instead, e.g. 'x^2,y^2,1'; x~ is the image of x.",
 )
 @click.option(
     "--darboux",
@@ -144,7 +144,8 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
             raise lib.InputError(
                 f"found the set {lib.quoted(text)}, expected polynomials with commas between them: 'x^2,y^2,1'"
             )
-        functions = [lib.parse_polynomial(part, file.variables, file.parameters) for part in parts]
+        letters = lib.with_iterates(file.variables, lib.iterates_in(text))
+        functions = [lib.parse_polynomial(part, letters, file.parameters) for part in parts]
         for k, function in enumerate(functions):
             if function.is_zero():
                 raise lib.InputError(

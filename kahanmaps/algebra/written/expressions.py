@@ -23,7 +23,7 @@ from kahanmaps.algebra.written.numerals import BLANKS, Limits, is_name, number_i
 from kahanmaps.errors import ExpressionError, UnknownName, quoted
 
 _TOKEN = re.compile(
-    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*)|\*\*|[-+*/^()]"
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*~*)|\*\*|[-+*/^()]"
 )
 _END = "end"
 

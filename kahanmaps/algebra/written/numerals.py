@@ -53,8 +53,8 @@ def is_name(text: str) -> bool:
     return isinstance(text, str) and _NAME.fullmatch(text) is not None
 
 
-def check_names(names: Sequence[str]) -> None:
-    """Raise `InputError` unless `names` are distinct and all of them can name a variable.
+def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
+    """Raise `InputError` unless `names` are distinct and all of them can name a variable, with `iterates` also x~.
 
     >>> check_names(["x", "y", "x"])
     Traceback (most recent call last):
@@ -64,7 +64,7 @@ def check_names(names: Sequence[str]) -> None:
         raise InputError(f"found the text {quoted(names)}, expected a list of names such as ['x', 'y']")
     seen = set()
     for name in names:
-        if not is_name(name):
+        if not is_name(name.rstrip("~") if iterates and isinstance(name, str) else name):
             found = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
             raise InputError(f"found {found}, expected a name: ASCII letters, digits and _, not starting with a digit")
         if name in seen:

@@ -328,8 +328,8 @@ def _term(coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> s
 
 def _check_expression(text: object, variables: Sequence[str], constants: Mapping[str, fmpq]) -> None:
     require_text(text, "an expression", "write it as text, e.g. '1/10*x^2'")
-    check_names(variables)
-    check_names([*variables, *constants])
+    check_names(variables, iterates=True)
+    check_names([*variables, *constants], iterates=True)
     for name, value in constants.items():
         if not isinstance(value, fmpq):
             raise wrong_kind(value, f"an exact number (fmpq) as {name}", "make one with parse_number('1/10')")

@@ -22,7 +22,7 @@ from flint import fmpq_mpoly, nmod_mat
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, rank, split_columns
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import evaluate, names_of
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.laboratory.modular_points import (
     Exponent,
@@ -262,7 +262,7 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
 
     Args:
         maps: maps of one system, with different primes.
-        functions: exact polynomials in the variables of the system, at least one.
+        functions: exact polynomials in the variables of the system, or in these and their iterates, at least one.
         names: what to call them.
 
     Returns:
@@ -283,16 +283,19 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     bases: list[list[list[int]]] = []
     periods: set[int | None] = set()
     count = len(functions) + _SPARE
+    iterates = len(names_of(functions[0])) // maps[0].dim - 1
     constant: list[list[bool]] | None = None
     for map_ in maps:
         field = GF(map_.prime)
         pair: list[list[list[int]]] = []
         for _ in range(2):
-            points = map_.orbit(count)
-            periods.add(len(points) if len(points) < count else None)
+            points = map_.orbit(count + iterates)
+            closed = len(points) < count + iterates
+            periods.add(len(points) if closed else None)
+            ahead = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
             rows = [
-                [int(evaluate(function, field, [field.convert(c) for c in x])) for function in functions]
-                for x in points
+                [int(evaluate(function, field, [field.convert(c) for x in piece for c in x])) for function in functions]
+                for piece in zip(*(ahead[k : k + len(ahead) - iterates] for k in range(iterates + 1)), strict=True)
             ]
             pair.append(null_space(rows, len(functions), map_.prime))
         bases += pair

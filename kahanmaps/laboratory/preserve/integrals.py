@@ -216,13 +216,12 @@ class IntegralSearch(Search):
     def toml_section(self) -> str:
         """The integrals as a section [integrals] of a system file, which `check-integrals` accepts.
 
-        Empty where there are none; for a given eps a comment says that they hold there only. Those in iterates are
-        comments.
+        Empty where there are none; for a given eps a comment says that they hold there only.
         """
-        if not self.integrals:
+        every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
+        if not every:
             return ""
-        lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
-        lines += [f"# {one.name}: {one.text}" for one in self.in_iterates]
+        lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in every)]
         return "\n".join([*self.toml_comments, *lines]) + "\n"
 
 

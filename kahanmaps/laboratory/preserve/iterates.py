@@ -33,7 +33,7 @@ from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError
+from kahanmaps.invariants.phase_functions import orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.branches import pattern
@@ -41,7 +41,7 @@ from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integr
 from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
 from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import BirationalMap
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def verdict_on_ratio(
     def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
         values = (*place[n:], step)
         try:
-            points = _orbit_about(map_.at(step, field, place[n:]), place[:n], ratio.length)
+            points = orbit_about(map_.at(step, field, place[n:]), place[:n], ratio.length)
         except BudgetExceeded:
             hopeless.add(ratio.length)
             raise
@@ -166,21 +166,6 @@ def verdict_on_ratio(
     return judged(
         identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in hopeless)
     )
-
-
-def _orbit_about(over: MapOver, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
-    """The points of an orbit from x: length steps, x in the middle or, where the inverse is not known, first."""
-    points, before = [x], 0
-    try:
-        inverse = over.inverse
-        before = length // 2
-    except InputError:
-        inverse = over
-    for _ in range(before):
-        points.insert(0, inverse.step(points[0]))
-    while len(points) <= length:
-        points.append(over.step(points[-1]))
-    return points
 
 
 def integrals_in_iterates(

@@ -1,0 +1,114 @@
+"""Functions of a point and its iterates in text: x~ is the image of x, x~~ that of x~, as integrals are printed.
+
+Minors have letters for the functions that they are made of, which are told behind them: F0*F1~ - F1*F0~, F0 = x*y~,
+F1 = y. Then F0~ is F0 with one ~ more at every variable.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from math import prod
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.written.numerals import is_name
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
+from kahanmaps.errors import InputError, quoted
+
+MAX_ITERATES = 16
+_MAX_PRODUCTS = 1_000_000  # of terms, where letters are replaced
+
+
+def iterates_in(*texts: str) -> int:
+    """How many ~ follow a name at most.
+
+    >>> iterates_in("x*y~ - x~~", "x")
+    2
+    """
+    return max((len(run) for text in texts for run in re.findall("~+", text)), default=0)
+
+
+def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = ()) -> tuple[str, ...]:
+    """The variables, those with ~, ~~, ... up to `count`, then the others.
+
+    >>> with_iterates(["x", "y"], 1, ["eps"])
+    ('x', 'y', 'x~', 'y~', 'eps')
+    """
+    return (*(name + "~" * k for k in range(count + 1) for name in variables), *others)
+
+
+def parse_with_iterates(
+    text: str, variables: Sequence[str], others: Sequence[str], constants: Mapping[str, fmpq]
+) -> RationalFunction:
+    """The function of the variables, as many of their iterates as the text has, and the other names.
+
+    Args:
+        text: a formula, perhaps with letters, which are defined behind it.
+        variables: names of the coordinates.
+        others: names without iterates, as those of symbols and eps.
+        constants: names that stand for numbers.
+
+    Returns:
+        A function of the names that `with_iterates` gives.
+
+    Raises:
+        InputError: for a text that cannot be read, and where replacing letters takes too much work.
+
+    >>> minor = parse_with_iterates("F*G~ - G*F~, F = x, G = y", ["x", "y"], ["eps"], {})
+    >>> minor == parse_with_iterates("x*y~ - y*x~", ["x", "y"], ["eps"], {})
+    True
+    """
+    if not isinstance(text, str) or "~" not in text:
+        return parse_rational_function(text, (*variables, *others), constants)
+    formula, *behind = _at_commas(text)
+    definitions = dict(_definition(piece) for piece in behind)
+    outer, inner = iterates_in(formula), iterates_in(*definitions.values())
+    count = outer + (inner if definitions else 0)
+    if count > MAX_ITERATES:
+        raise InputError(f"found a function of {count} iterates of a point, expected at most {MAX_ITERATES}")
+    names = with_iterates(variables, count, others)
+    if not definitions:
+        return parse_rational_function(formula, names, constants)
+    if len(definitions) < len(behind) or {*definitions} & {*variables, *others, *constants}:
+        found = ", ".join(definitions)
+        raise InputError(f"found the letters {found}, expected each once, and no names of something else")
+    context, n = ring(names), len(variables)
+    functions = [parse_polynomial(one, names, constants) for one in definitions.values()]
+    letters = with_iterates(tuple(definitions), outer)
+    function = parse_rational_function(formula, (*letters, *names), constants)
+    parts = (function.numerator, function.denominator)
+    sizes = [len(P) for P in functions] * (outer + 1)
+    monomials = [monomial for part in parts for monomial in part.monoms()]
+    if sum(prod(size ** int(e) for size, e in zip(sizes, m, strict=False)) for m in monomials) > _MAX_PRODUCTS:
+        raise InputError("found a formula whose letters, replaced, have too many terms")
+    gens, coordinates = context.gens(), (count + 1) * n
+
+    def later(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
+        # What would move beyond the last iterate does not occur in P.
+        moved = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
+        return P.compose(*moved, *gens[coordinates:], ctx=context)
+
+    values = [later(P, steps) for steps in range(outer + 1) for P in functions]
+    above, below = (part.compose(*values, *gens, ctx=context) for part in parts)
+    return RationalFunction(above, below)
+
+
+def _at_commas(text: str) -> list[str]:
+    """The pieces of a text between commas that are in no brackets."""
+    pieces, depth = [""], 0
+    for character in text:
+        depth += (character == "(") - (character == ")")
+        if character == "," and depth <= 0:
+            pieces.append("")
+        else:
+            pieces[-1] += character
+    return pieces
+
+
+def _definition(text: str) -> tuple[str, str]:
+    name, equals, formula = (piece.strip() for piece in text.partition("="))
+    if not equals or not is_name(name):
+        raise InputError(f"found {quoted(text.strip())} behind a comma, expected what a letter stands for: F0 = x*y~")
+    return name, formula
