@@ -11,6 +11,9 @@ from numpy.typing import NDArray as NDArray
 from kahanmaps.algebra.fields import GF as GF
 from kahanmaps.algebra.fields import QQ as QQ
 from kahanmaps.algebra.fields import rational as rational
+from kahanmaps.algebra.roots import AlgebraicPoint as AlgebraicPoint
+from kahanmaps.algebra.roots import parse_algebraic_point as parse_algebraic_point
+from kahanmaps.algebra.roots import parse_root as parse_root
 from kahanmaps.algebra.written.plain import attributes as attributes
 from kahanmaps.algebra.written.plain import json_float as json_float
 from kahanmaps.algebra.written.plain import plain as plain
@@ -144,6 +147,7 @@ from kahanmaps.laboratory.singular.singularities import symbolic_denominator as 
 from kahanmaps.laboratory.symmetry.commuting_over import find_commuting as find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as linear_symmetries
 from kahanmaps.languages.convert import convert as convert
+from kahanmaps.maps.algebraic import over_number_field as over_number_field
 from kahanmaps.maps.convention import CONVENTION as CONVENTION
 from kahanmaps.maps.convention import convention as convention
 from kahanmaps.maps.convention import eps_record as eps_record

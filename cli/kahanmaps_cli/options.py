@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -171,7 +172,10 @@ verbose_option: Callable[[F], F] = click.option(
 check_options: Callable[[F], F] = stack(
     eps_options,
     click.option(
-        "--start", type=PointText(), metavar="X", help="Start of the exact orbit that is tried (default: a random one)."
+        "--start",
+        type=PointText(True),
+        metavar="X",
+        help="Start of the exact orbit that is tried (default: a random one); may contain t with -p 't = root of ...'.",
     ),
     click.option("--steps", type=int, metavar="N", help="Steps of that orbit (default 10)."),
     evidence_options,
@@ -295,6 +299,35 @@ def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile
     return load_reference(reference, given)
 
 
+def load_with_start(
+    options: dict[str, Any], load: Callable[[Mapping[str, Any]], Any], *references: str | None
+) -> tuple[Any, Any]:
+    """What `load` makes of the options, a file or a pair of files, and the start, in which parameters may stand.
+
+    An algebraic number that -p gives need not be a parameter of the system: then it is for the start alone.
+    """
+    text = options["start"]
+    if not isinstance(text, str):
+        return load(options), text
+    words = set(re.findall(r"[A-Za-z_]\w*", text))
+    roots = {name: lib.parse_root(value) for name, value in options["parameters"] if name in words}
+    known = set[str]()
+    for one in references:
+        if one is not None and one != "-" and not are_equations(one):
+            known |= set(_loaded(one, {}).document.get("parameters", ()))
+    inline = " ".join([*map(str, filter(are_equations, references)), *options["rhs"], *options["image"]])
+    # What - holds is not known: it may have every parameter.
+    known |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
+    of_start = {name: root for name, root in roots.items() if root is not None and name not in known}
+    made = load({**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in of_start]})
+    constants = dict[str, Any]()
+    for file in made if isinstance(made, tuple) else (made,):
+        if file is not None:
+            constants |= file.parameters
+            of_start |= dict.fromkeys(file.claim_names[file.dim : -1], file.map.root)
+    return made, lib.parse_algebraic_point(text, of_start, constants)
+
+
 def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemFile:
     """The system of that name or in that file; where there is no such file, those that are named like it are told."""
     try:
@@ -324,12 +357,14 @@ def _list(texts: Sequence[str]) -> list[str]:
     return [part.strip() for text in texts for part in text.split(";")]
 
 
-def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> lib.Settings:
-    """The settings of a check from the values of `check_options`."""
+def settings_from(options: dict[str, Any], progress: Callable[[str], None], start: Any) -> lib.Settings:
+    """The settings of a check from the values of `check_options`, and the start that these have."""
     steps = options["steps"]
+    if isinstance(start, lib.AlgebraicPoint):
+        start = start.over(start.root.number_field)
     return lib.Settings(
         eps=the_eps(options["eps"], options["time_step"], required=False),
-        start=options["start"],
+        start=start,
         steps=10 if steps is None else steps,
         seed=options["seed"],
         error_bits=options["error_bits"],

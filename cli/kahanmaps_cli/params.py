@@ -20,6 +20,7 @@ else:
 
 
 HELP_OPTIONS = ["-h", "--help"]
+_NAME = re.compile(r"(?<![0-9.A-Za-z_])[A-Za-z_]")
 _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
 _MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
@@ -48,7 +49,9 @@ def _read_number(text: str) -> Any:
     return lib.parse_number(text)
 
 
-def _read_point(text: str) -> Any:
+def _read_point(text: str, has_names: bool = False) -> Any:
+    if has_names and _NAME.search(text):
+        return text  # what the names stand for is known when the system is
     return lib.parse_point(text)
 
 

@@ -7,9 +7,10 @@ every root of g. Modulo a prime any root there stands for it; real numbers need 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import flint
 from flint import arb, fmpq, fmpq_mpoly, fmpq_poly, fmpz, nmod_poly
@@ -18,8 +19,9 @@ from kahanmaps.algebra.bounds import Bound, BoundField, Size, log2
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, ComplexBallField, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
-from kahanmaps.algebra.written.text import format_univariate, parse_number, parse_polynomial
-from kahanmaps.errors import BadPrime, InputError, quoted
+from kahanmaps.algebra.polynomials import evaluate, ring
+from kahanmaps.algebra.written.text import format_univariate, parse_number, parse_polynomial, point_entries
+from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 
 MAX_DEGREE = 12
 _FORM = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
@@ -147,6 +149,65 @@ class Root:
     def __repr__(self) -> str:
         near = f" near {self._near_text}" if self._near_text else ""
         return f"root of {format_univariate(self.polynomial)}{near}"
+
+
+class AlgebraicPoint(NamedTuple):
+    """A point over Q[t]/g, its coordinates polynomials in t, a `root` of g.
+
+    >>> point = parse_algebraic_point("1, 2*t/3", {"t": parse_root("root of t^2 + 1")}, {})
+    >>> point.over(point.root.number_field), point.over(PrimeField(5))
+    ((1, 2/3*t), (1, 3))
+    """
+
+    root: Root
+    entries: tuple[fmpq_mpoly, ...]
+
+    def over(self, field: Field) -> tuple[Any, ...]:
+        """The point over a field with such a root. Raises BadPrime, InputError as `Root.over` does."""
+        root = self.root.over(field)
+        return tuple(evaluate(entry, field, (root,)) for entry in self.entries)
+
+    def rounded(self) -> tuple[fmpq, ...]:
+        """A rational point next to it. Raises InputError where the root is not real."""
+        root = self.root.rounded()
+        return tuple(evaluate(entry, QQ, (root,)) for entry in self.entries)
+
+
+def parse_algebraic_point(
+    text: str, roots: Mapping[str, Root], constants: Mapping[str, fmpq]
+) -> AlgebraicPoint | tuple[fmpq, ...]:
+    """The point whose coordinates are polynomials in one algebraic number and constants; rational where it lacks.
+
+    Args:
+        text: as `parse_point` has it, with names in the coordinates.
+        roots: algebraic numbers by name.
+        constants: rational numbers by name.
+
+    Returns:
+        The point, exact.
+
+    Raises:
+        InputError: for a text that cannot be read, with the number of the entry, and for two algebraic numbers.
+    """
+    entries = []
+    for number, (start, end) in enumerate(point_entries(text), 1):
+        try:
+            entries.append(parse_polynomial(text[start:end], tuple(roots), constants))
+        except UnknownName as error:
+            hint = "an algebraic number in a point is given by -p NAME='root of t^2 - 2'"
+            raise InputError(f"entry {number}: {error}\n{hint}") from None
+        except InputError as error:
+            raise InputError(f"entry {number}: {error}") from None
+    used = [k for k, name in enumerate(roots) if any(name not in entry.unused_gens() for entry in entries)]
+    if len(used) > 1:
+        names = " and ".join(list(roots)[k] for k in used)
+        raise InputError(f"found the algebraic numbers {names} in a point, expected one")
+    if not used:
+        return tuple(entry.leading_coefficient() if entry else fmpq(0) for entry in entries)
+    name, root = list(roots.items())[used[0]]
+    generator = ring([name]).gens()[0]
+    values = [generator if k == used[0] else generator * 0 for k in range(len(roots))]
+    return AlgebraicPoint(root, tuple(entry.compose(*values, ctx=generator.context()) for entry in entries))
 
 
 def parse_root(text: str) -> Root | None:

@@ -10,7 +10,8 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.etale import EtaleElement
+from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
@@ -30,13 +31,14 @@ MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 class Settings:
     """How to check: at one `eps` or (None) for every eps; `steps` of an exact orbit from `start` (None: a random one).
 
-    `eps` and the coordinates of `start` may be given as any exact number: 1, Fraction(1, 10), "1/10".
+    `eps` and the coordinates of `start` may be given as any exact number: 1, Fraction(1, 10), "1/10"; coordinates also
+    as elements of one number field.
     `max_digits` (None: by dimension). `orbit_is_asked` says that the user gave the start or the number of steps, so
     that an orbit cut short is to be told.
     """
 
     eps: fmpq | None = None
-    start: tuple[fmpq, ...] | None = None
+    start: tuple[Any, ...] | None = None
     steps: int = 10
     seed: int = 0
     error_bits: int = DEFAULT_ERROR_BITS
@@ -48,12 +50,13 @@ class Settings:
         if self.eps is not None:
             object.__setattr__(self, "eps", rational(self.eps))
         if self.start is not None:
-            object.__setattr__(self, "start", tuple(rational(entry) for entry in self.start))
+            start = tuple(entry if isinstance(entry, EtaleElement) else rational(entry) for entry in self.start)
+            object.__setattr__(self, "start", start)
         if self.eps == 0:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
         if not 0 <= self.steps <= MAX_STEPS:
             raise InputError(f"found {self.steps} steps, expected 0 to {MAX_STEPS}")
-        require_short(self.eps, self.start or (), self.max_digits)
+        require_short(self.eps, [x for x in self.start or () if isinstance(x, fmpq)], self.max_digits)
         if not 1 <= self.error_bits <= 10_000:
             raise InputError(f"found an error bound of {self.error_bits} bits, expected 1 to 10000")
 
@@ -81,8 +84,8 @@ class Settings:
 class OrbitRun:
     """An exact orbit on which identities are tried: its points, how it ended, where it started."""
 
-    start: tuple[fmpq, ...]
-    points: tuple[tuple[fmpq, ...], ...]
+    start: tuple[Any, ...]
+    points: tuple[tuple[Any, ...], ...]
     eps: fmpq
     end: OrbitEnd
 
@@ -123,7 +126,8 @@ def run_orbit(
     seed = seed_for(settings.seed, as_map(system).subject, settings.eps, subject)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
-    kahan = as_map(system).at(eps)
+    of_field = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
+    kahan = as_map(system).at(eps, of_field[0] if of_field else QQ)
     # A claim that takes two more steps of a map without a normal form multiplies the digits by dim^2, and elimination
     # by dim once more; for the family numbers hardly grow from one step to the next.
     by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
@@ -148,14 +152,16 @@ def run_orbit(
 def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
     tried = poles = 0
+    of_field = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
+    ground = of_field[0] if of_field else identity.ground
     for exact in run.points:
-        point, eps = tuple(map(identity.ground.convert, exact)), identity.ground.convert(run.eps)
-        sides = identity.at(identity.ground, point, eps)
+        point, eps = tuple(map(ground.convert, exact)), ground.convert(run.eps)
+        sides = identity.at(ground, point, eps)
         if sides is None:
             poles += 1
             continue
         tried += 1
-        witness = witness_of(identity, identity.ground, point, eps, sides)
+        witness = witness_of(identity, ground, point, eps, sides)
         if witness is not None:
             text = f"fails at step {tried + poles - 1} of an exact orbit"
             return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), witness

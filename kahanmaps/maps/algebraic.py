@@ -12,7 +12,7 @@ from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 
 class AlgebraicMap(BirationalMap):
-    """The map `given`, whose only symbol has the value `root`; over Q it is one over the number field Q[t]/g.
+    """The map `given`, whose only symbol, if any, has the value `root`; over Q it is one over the number field Q[t]/g.
 
     `at_number` gives the map with a rational number for the symbol: for floats, where the root is rounded first.
 
@@ -61,13 +61,29 @@ class AlgebraicMap(BirationalMap):
         over = self.root.number_field if over is QQ else over
         if self._last is None or self._last[0] is not over:
             self._last = over, self.root.over(over)
-        return self.given.at(eps, over, [*values, self._last[1]])
+        return self.given.at(eps, over, [*values, self._last[1]] if self.given.symbols else values)
+
+    @property
+    def _name(self) -> str:
+        """What stands for the root: of a map that does not contain it the t of Q[t]/g."""
+        return self.given.symbols[0] if self.given.symbols else "t"
 
     def written(self) -> dict[str, Any]:
-        return {**self.given.written(), "algebraic": {self.given.symbols[0]: str(self.root)}}
+        return {**self.given.written(), "algebraic": {self._name: str(self.root)}}
 
     def __str__(self) -> str:
-        return f"{self.given}\nwhere {self.given.symbols[0]} is a {self.root}"
+        return f"{self.given}\nwhere {self._name} is a {self.root}"
 
     def __repr__(self) -> str:
-        return f"AlgebraicMap({self.given!r}, {self.given.symbols[0]} = {self.root})"
+        return f"AlgebraicMap({self.given!r}, {self._name} = {self.root})"
+
+
+def over_number_field(map_: BirationalMap, root: Root) -> BirationalMap:
+    """The map with points over Q[t]/g, t the root. Raises InputError where it has another one in its coefficients."""
+    if map_.root is None:
+        return AlgebraicMap(map_, root, lambda _: map_)
+    if map_.root != root:
+        raise InputError(
+            f"found a {map_.root} in the map and a {root} in the point, expected the same algebraic number"
+        )
+    return map_

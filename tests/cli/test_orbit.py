@@ -404,3 +404,23 @@ def test_the_budget_is_kept_by_every_method(kahanmaps, method):
     run = kahanmaps(f"{MEMBER} --at 0,5,30 --max-digits 10 --format jsonl --method {method}")
     assert run.status == 3
     assert ([point["step"] for point in points(run)], run.records[-1]["status"]) == ([0], "budget")
+
+
+@pytest.mark.parametrize("system", ["paper_m2", "henon_heiles"])
+def test_a_start_may_lie_in_a_number_field(kahanmaps, system):
+    line = f"orbit {system} --start 1,t,1,2 -p 't = root of t^2 + 1' --eps 1/3 --steps 2"
+    outcome = kahanmaps(line)
+    assert outcome.status == 0, outcome.err
+    assert outcome.out.splitlines()[0].endswith("exact arithmetic, t = root of t^2 + 1")
+    assert outcome.out.splitlines()[2] == "0\t1\tt\t1\t2"
+    header, *points, end = kahanmaps(f"{line} --format jsonl").records
+    assert (header["start"], header["algebraic"]) == (["1", "t", "1", "2"], {"t": "root of t^2 + 1"})
+    assert (len(points), end["status"]) == (3, "completed")
+    check = kahanmaps(f"check-integrals {system} --start 1,t,1,2 -p 't = root of t^2 + 1' --eps 1/3 --steps 2")
+    assert "also: held exactly at 3 points of an orbit, eps = 1/3" in check.out
+
+
+@pytest.mark.parametrize(("arithmetic", "second"), [("float", "1.4142135623730951"), ("mod:7", "3")])
+def test_an_algebraic_start_has_an_image_in_every_arithmetic(kahanmaps, arithmetic, second):
+    line = f"orbit \"x' = y^2; y' = x^2\" --start 1,s -p s='sqrt(2)' --eps 1/3 --steps 1 --arithmetic {arithmetic}"
+    assert kahanmaps(line).out.splitlines()[2].split("\t")[2] == second

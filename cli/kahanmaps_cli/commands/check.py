@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from inspect import cleandoc
 from itertools import count
 from typing import Any
@@ -31,14 +32,16 @@ def command(name: str) -> click.Command:
             system, other = _pair(system, other, options)
             swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)
         with Progress(options["quiet"]) as progress:
-            settings = opt.settings_from(options, progress)
             if check.is_of_pair:
-                file, second = opt.load_pair(system, other, options)
+                pair, start = opt.load_with_start(options, partial(opt.load_pair, system, other), system, other)
+                settings = opt.settings_from(options, progress, start)
+                file, second = pair
                 if swapped and second is not None:
                     file, second = second, file
                 report = check(file, second, settings, eps2)
             else:
-                file = opt.load_system(system, options)
+                file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
+                settings = opt.settings_from(options, progress, start)
                 report = check(file, settings, _claimed(file, check.claim, claim))
         return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 

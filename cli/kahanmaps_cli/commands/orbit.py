@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,13 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 @click.command("orbit")
 @opt.system_options
-@click.option("--start", type=PointText(), required=True, metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
+@click.option(
+    "--start",
+    type=PointText(True),
+    required=True,
+    metavar="X",
+    help="The start, e.g. 1/2,-1/3,0.25, or 1,t with -p 't = root of t^2 + 1'.",
+)
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", help="How many steps to take.")
 @click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
@@ -83,14 +90,18 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     _require_sense(options)
     output = None if output == "-" else output
     form = _form(options, output)
-    file = opt.load_system(system, {**options, "quiet": quiet})
+    options["quiet"] = quiet
+    file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
     eps = opt.eps_of(file, options)
+    map_ = file.map
+    if isinstance(start, lib.AlgebraicPoint):
+        map_, start = lib.over_number_field(map_, start.root), _numbers(start, options["arithmetic"])
     with interruptible(_stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
         functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
         walk = lib.orbit(
-            file.map,
-            options["start"],
+            map_,
+            start,
             eps,
             hamiltonian=file.hamiltonian,
             member=file.member,
@@ -129,6 +140,17 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     elif end.status not in _STATUS and not (quiet or unread or is_table):  # whose last line says it
         say(end.text)
     return 3 if unread else _STATUS.get(end.status, 3)
+
+
+def _numbers(start: lib.AlgebraicPoint, arithmetic: lib.Arithmetic) -> Any:
+    """The coordinates in the numbers that the orbit is computed in."""
+    if arithmetic.kind == "float":
+        return start.rounded()
+    if arithmetic == ("ball", 0):
+        raise click.UsageError(
+            "found an algebraic start with --arithmetic ball:auto, expected exact, mod:P or ball:BITS"
+        )
+    return start.over(start.root.number_field if arithmetic.kind == "exact" else arithmetic.field)
 
 
 def _require_sense(options: dict[str, Any]) -> None:

@@ -125,7 +125,8 @@ def orbit(
         return _orbit_at_one_eps(asked._replace(map=phi, eps=None), field)
     asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
     if arithmetic.kind == "exact":
-        require_short(asked.eps, [rational(entry) for entry in start], max_digits)
+        numbers = [entry for entry in start if not isinstance(entry, EtaleElement)]
+        require_short(asked.eps, [rational(entry) for entry in numbers], max_digits)
     if normal_form is None:
         normal_form = _normal_form(asked, method, arithmetic, hamiltonian, member)
     chosen = choose_method(method, arithmetic.kind, normal_form, at)

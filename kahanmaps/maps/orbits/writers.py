@@ -239,7 +239,7 @@ def title(header: Mapping[str, Any]) -> str:
     t = "t = " if header["arithmetic"] == "exact" else ""
     return (
         f"# {header['system']}{eps_words(header)}, {header['arithmetic']} arithmetic"
-        + "".join(f", {t}{name} = {root}" for name, root in header.get("algebraic", {}).items())
+        + "".join(f", {t if name != 't' else ''}{name} = {root}" for name, root in header.get("algebraic", {}).items())
         + (f" ({header['kernel']})" if "kernel" in header else "")
         + (", backward" if header["direction"] == "backward" else "")
     )
