@@ -1,4 +1,4 @@
-"""Orbits and checks of maps over Q whose start has coordinates in a number field: exact, and the same in every field."""
+"""Orbits and checks of maps over Q from points over a number field: exact, and the same in every field."""
 
 import pytest
 from flint import fmpq
