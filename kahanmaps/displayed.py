@@ -26,7 +26,20 @@ class Displayed:
         return _font() + html if "<math" in html else html
 
 
-class Printed(Displayed):
+class WithoutTruthValue:
+    """A result of which `if result:` is an error: it would be true for a refuted claim and an empty search as well."""
+
+    __slots__ = ()
+
+    def __bool__(self) -> bool:
+        if hasattr(self, "holds"):
+            hint = "use .holds, which is True, False or None (undecided)"
+        else:
+            hint = "use one of its attributes, or `is not None`"
+        raise TypeError(f"the truth value of a {type(self).__name__} is ambiguous: {hint}")
+
+
+class Printed(Displayed, WithoutTruthValue):
     """A result that `print` shows as the lines of its command too."""
 
     __slots__ = ()

@@ -27,11 +27,13 @@ def settings_and_claim(settings: Settings | Any, extra: Any) -> tuple[Settings, 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
     """A formula in the variables of a file, its parameters and eps, as a function of the variables and eps.
 
-    With x~ in it, it is one of the variables, their iterates and eps.
+    With x~ in it, it is one of the variables, their iterates and eps. The name of an integral of the file stands for it.
     """
     if isinstance(claim, RationalFunction):
         return claim
-    names = file.claim_names
+    of_file, names = {**file.integrals, **file.integrals_in_iterates}, file.claim_names
+    if isinstance(claim, str) and claim in of_file and claim not in names:
+        return of_file[claim]
     return parse_with_iterates(formula_text(claim), names[: file.dim], names[file.dim :], file.parameters)
 
 
@@ -40,8 +42,17 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):
-        free = (f"I{k}" for k in count(1) if f"I{k}" not in {**file.integrals, **file.integrals_in_iterates})
-        claims = dict(zip(free, claims if isinstance(claims, list | tuple) else [claims], strict=False))
+        unnamed, of_file = (
+            claims if isinstance(claims, list | tuple) else [claims],
+            {
+                **file.integrals,
+                **file.integrals_in_iterates,
+            },
+        )
+        free = (f"I{k}" for k in count(1) if f"I{k}" not in of_file)
+        claims = {c if isinstance(c, str) and c in of_file else next(free): c for c in unnamed}
+    if not claims:
+        raise InputError(f"found {claims!r}, expected at least one claim, or None for those of theorems and the file")
     return {name: claimed_function(file, claim) for name, claim in claims.items()}
 
 

@@ -13,11 +13,11 @@ from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
-from kahanmaps.displayed import Displayed, Printed
+from kahanmaps.displayed import Displayed, Printed, WithoutTruthValue
 
 
-class Verdict(Displayed, StrEnum):
-    """How much is known of a claim."""
+class Verdict(Displayed, WithoutTruthValue, StrEnum):
+    """How much is known of a claim; its truth value is `holds`, and `bool` of it an error."""
 
     PROVED = "proved"
     REFUTED = "refuted"
@@ -67,7 +67,7 @@ class Witness:
 
 
 @dataclass(frozen=True)
-class Finding(Displayed):
+class Finding(Displayed, WithoutTruthValue):
     """One claim with its verdict. A `control` is a claim that is expected to be refuted and proves the check alive."""
 
     claim: str
@@ -80,6 +80,11 @@ class Finding(Displayed):
     control: bool = False
     place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
     applies: bool = True  # False: stated for generic input, and this is special; it does not count
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the claim holds; None where that is undecided."""
+        return self.verdict.holds
 
     @property
     def is_as_expected(self) -> bool:

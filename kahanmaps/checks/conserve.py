@@ -126,24 +126,39 @@ def functions_along(
     return {function.name: function for function in found}
 
 
-def check_integrals(file: SystemFile, settings: Settings | Any = None, extra: Mapping[str, Any] | Any = None) -> Report:
-    """Are the known integrals, the claimed ones of the file and `extra` ones conserved: identically, on an orbit?
+def check_integrals(
+    file: SystemFile,
+    settings: Settings | Any = None,
+    extra: Mapping[str, Any] | Any = None,
+    *,
+    known: bool = False,
+) -> Report:
+    """Are the integrals `extra` conserved; without them, those of theorems and of the file: identically, on an orbit?
 
     `extra` are rational functions of the system's variables and eps, by name, or one, or a list; functions, text or
-    expressions of SymPy, in the place of the settings if there are none. Raises InputError where there is nothing to
-    check.
+    expressions of SymPy, in the place of the settings if there are none. The name of an integral of the file stands for
+    it. They come first in the report, and alone unless those of theorems and of the file are requested by `known`.
+    Raises InputError where there is nothing to check, and for two integrals of one name.
 
     >>> from kahanmaps.documents.inline import System
     >>> str(check_integrals(System("x' = y; y' = -x"), "x^2 + y^2").verdict)
     'proved'
     """
     settings, extra = settings_and_claim(settings, extra)
-    claims = claimed_functions(file, extra)
-    candidates = known_integrals(file)
+    claims, of_file = claimed_functions(file, extra), {**file.integrals, **file.integrals_in_iterates}
     for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)
-    for name, function in {**file.integrals, **file.integrals_in_iterates, **claims}.items():
-        candidates.append((ClaimedIntegral(name, function, settings.eps, file.map.root, file.map), None, ""))
+        if known and of_file.get(name, function) != function:
+            raise InputError(f"found two integrals of the name {name}, expected a name of its own for each")
+
+    def stated(functions: Mapping[str, RationalFunction]) -> list[tuple[PhaseFunction, Evidence | None, str]]:
+        map_ = file.map
+        return [(ClaimedIntegral(k, one, settings.eps, map_.root, map_), None, "") for k, one in functions.items()]
+
+    candidates = stated(claims)
+    if known or extra is None:
+        candidates += known_integrals(file)
+        candidates += stated({name: one for name, one in of_file.items() if name not in claims})
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "

@@ -83,28 +83,40 @@ def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:
     return image
 
 
-def check_measure(file: SystemFile, settings: Settings | Any = None, extra: RationalFunction | Any = None) -> Report:
-    """Is dx/phi invariant: for phi = det(I - eps f') of Hamiltonian systems, for the file's [density], for `extra`?
+def check_measure(
+    file: SystemFile,
+    settings: Settings | Any = None,
+    extra: RationalFunction | Any = None,
+    *,
+    known: bool = False,
+) -> Report:
+    """Is dx/phi invariant for phi = `extra`; without it, for det(I - eps f') of Hamiltonian systems and the [density]?
 
-    `extra` is a function, text or an expression of SymPy, in the place of the settings if there are none. Raises
-    InputError where no density is known or claimed.
+    `extra` is a function, text or an expression of SymPy, in the place of the settings if there are none. It comes
+    first in the report, and alone unless the others are requested by `known`. Raises InputError where no density is
+    known or claimed.
 
     >>> from kahanmaps.documents.inline import System
     >>> str(check_measure(System("x' = x*(1 - y); y' = y*(x - 2)"), "x*y").verdict)
     'proved'
     """
     settings, extra = settings_and_claim(settings, extra)
-    extra = None if extra is None else claimed_function(file, extra)
     candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
-    if file.hamiltonian is not None:
-        proof = theorems.cubic_hamiltonian(file.hamiltonian)
-        candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))
+
+    def add(function: RationalFunction) -> None:
+        proof = theorems.product_density_invariant(file.system, function) if file.is_quadratic else None
+        candidates.append((ClaimedDensity(function, settings.eps, file.map.root), proof, ""))
+
     if extra is not None:
-        file.require_claim("a density", extra)
-    for function in (file.density, extra):
-        if function is not None:
-            proof = theorems.product_density_invariant(file.system, function) if file.is_quadratic else None
-            candidates.append((ClaimedDensity(function, settings.eps, file.map.root), proof, ""))
+        phi = claimed_function(file, extra)
+        file.require_claim("a density", phi)
+        add(phi)
+    if known or extra is None:
+        if file.hamiltonian is not None:
+            proof = theorems.cubic_hamiltonian(file.hamiltonian)
+            candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))
+        if file.density is not None:
+            add(file.density)
     if not candidates:
         raise InputError(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "

@@ -24,7 +24,8 @@ def _as_it_is(file: SystemFile, text: str) -> Any:
 class ClaimOption:
     """The option of a command that takes a claim; `read` makes of its text what the check takes as `extra`.
 
-    With `many` it may be given several times, as EXPR or NAME=EXPR, and the check takes texts by name.
+    With `many` it may be given several times, as EXPR or NAME=EXPR, and the check takes texts by name; the word known
+    stands for what is checked without the option.
     """
 
     flag: str
@@ -58,10 +59,10 @@ class Check:
         """The name of its command and of its task."""
         return f"check-{self.name}"
 
-    def __call__(self, *arguments: Any) -> Report:
+    def __call__(self, *arguments: Any, **options: Any) -> Report:
         """The report. Raises InputError where the check does not apply."""
         module, _, name = self.function.partition(":")
-        report: Report = getattr(import_module(module), name)(*arguments)
+        report: Report = getattr(import_module(module), name)(*arguments, **options)
         return report
 
 
@@ -112,14 +113,14 @@ _CHECKS = [
         Without --eps the question is asked for every eps.
 
         Known ones: the modified Hamiltonian of Hamiltonian systems, in both normalisations of the paper, and for
-        members of the family the K~ of all rational associated systems. Claimed ones: the [integrals] of the file, and
-        --integral.
+        members of the family the K~ of all rational associated systems. Claimed ones: the [integrals] of the file.
+        With --integral those given are checked instead; --integral known adds the others.
         """,
         "conserved",
         ClaimOption(
             "--integral",
             "[NAME=]EXPR",
-            "A claimed integral: a rational function of x, its images x~, x~~ and eps.",
+            "A claimed integral: a rational function of x, its images x~, x~~ and eps; one of the file by its name, or 'known'.",
             many=True,
         ),
     ),
@@ -134,8 +135,8 @@ _CHECKS = [
             "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y",
         ),
         """
-        Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)); otherwise
-        the [density] of the file, or --density.
+        Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)), and the
+        [density] of the file; with --density that one instead.
         """,
         "invariant",
         ClaimOption("--density", "EXPR", "A claimed density phi: a rational function of the variables and eps."),

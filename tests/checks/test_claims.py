@@ -18,6 +18,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.version import __version__
 
@@ -37,6 +38,18 @@ def finding(verdict: Verdict, control: bool = False) -> Finding:
 @pytest.mark.parametrize(("verdict", "holds"), [(P, True), (S, True), (R, False), (U, None)])
 def test_a_verdict_says_whether_the_claim_holds(verdict, holds):
     assert verdict.holds is holds
+
+
+@pytest.mark.parametrize("result", [*Verdict, finding(R), Report("integrals", (finding(P),))])
+def test_a_result_has_no_truth_value_and_says_what_to_ask_instead(result):
+    with pytest.raises(TypeError, match=r"truth value of a (Verdict|Finding|Report) is ambiguous: use \.holds"):
+        bool(result)
+    assert result.holds in (True, False, None)
+
+
+def test_a_search_has_no_truth_value_either():
+    with pytest.raises(TypeError, match="truth value of a DegreeGrowth is ambiguous: use one of its attributes"):
+        bool(degree_growth(system_of("x", "x^2"), max_terms=2))
 
 
 # By hand: refuted before undecided before supported before proved.

@@ -250,11 +250,26 @@ def test_a_class_of_many_systems_lists_the_single_minus_signs(monkeypatch):
 # What is told
 
 
-def test_claims_of_the_file_and_of_the_caller_are_both_checked():
+def test_claims_of_the_caller_come_first_and_alone_unless_the_known_ones_are_requested():
+    file = SystemFile.from_hamiltonian(hamiltonian_of("q p", "q^3 - q*p^2"))
+    names = [integral.name for integral, _, _ in known_integrals(file)]
+    for options, expected in (({}, ["K"]), ({"known": True}, ["K", *names])):
+        report = check_integrals(file, QUICK, {"K": "q"}, **options)
+        assert [found.claim for found in report.findings] == [f"{name} is conserved" for name in expected]
+        assert (report.findings[0].verdict, report.findings[0].holds) == (REFUTED, False)
     file = file_of(LOTKA_VOLTERRA, I="x", J="y")
-    report = check_integrals(file, QUICK, {"K": claim("x*y", "x y")})
-    assert [found.claim for found in report.findings] == [f"{name} is conserved" for name in "IJK"]
-    assert verdicts(report) == [REFUTED] * 3
+    for extra, expected in (("J", "J"), (["x*y", "I"], ["I1", "I"]), ({"K": "x*y"}, "K")):
+        assert [found.claim.split()[0] for found in check_integrals(file, QUICK, extra).findings] == [*expected]
+    report = check_integrals(file, QUICK, {"K": "x*y"}, known=True)
+    assert [found.claim.split()[0] for found in report.findings] == ["K", "I", "J"]
+
+
+def test_two_integrals_of_one_name_and_no_claims_at_all_are_wrong_use():
+    file = file_of(LOTKA_VOLTERRA, I="x")
+    with pytest.raises(InputError, match="two integrals of the name I"):
+        check_integrals(file, QUICK, {"I": "y"}, known=True)
+    with pytest.raises(InputError, match="expected at least one claim"):
+        check_integrals(file, QUICK, [])
 
 
 @pytest.mark.parametrize(

@@ -143,11 +143,13 @@ def test_a_density_that_is_right_at_one_eps_is_supported_there_only(eps, verdict
     assert check_density(PLANE.system, "1 - 2*eps*q", Settings(eps=eps, steps=2)).verdict is verdict
 
 
-def test_the_density_of_the_file_and_that_of_the_caller_are_both_checked():
+def test_a_density_of_the_caller_comes_first_and_alone_unless_the_known_ones_are_requested():
     own = file_of(LOTKA_VOLTERRA, phi="x*y")
-    report = check_measure(own, QUICK, claim("x", "x y"))
-    assert verdicts(report) == [SUPPORTED, REFUTED]
+    assert verdicts(check_measure(own, QUICK, claim("x", "x y"))) == [REFUTED]
+    report = check_measure(own, QUICK, claim("x", "x y"), known=True)
+    assert verdicts(report) == [REFUTED, SUPPORTED]
     assert report.verdict is REFUTED
+    assert verdicts(check_measure(file(PLANE), QUICK, "q")) == [REFUTED]
 
 
 def test_a_density_that_is_zero_at_the_eps_in_force_is_wrong_use():

@@ -68,18 +68,33 @@ def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanm
 # check-integrals
 
 
-def test_integrals_of_the_file_and_of_the_command_line_are_checked(kahanmaps):
-    report = kahanmaps("check-integrals euler_top --integral G=x1 --integral x2 --integral 1/x3 --json").json
-    verdicts = {claim: found["verdict"] for claim, found in claims(report).items()}
-    assert set(verdicts) == {f"{name} is conserved" for name in ("F1", "F2", "G", "I1", "I2")}
-    assert [name for name in ("G", "I1", "I2") if verdicts[f"{name} is conserved"] != "refuted"] == []
-    assert "refuted" not in (verdicts["F1 is conserved"], verdicts["F2 is conserved"])
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("", "F1 F2"),
+        ("--integral known", "F1 F2"),
+        ("--integral F2", "F2"),
+        ("--integral F2 --integral known", "F2 F1"),
+        ("--integral F1=x1", "-F1"),
+        ("--integral G=x1 --integral x2 --integral 1/x3", "-G -I1 -I2"),
+        ("--integral G=x1 --integral known --integral x2", "-G -I1 F1 F2"),
+    ],
+)
+def test_integrals_of_the_command_line_are_checked_first_and_those_known_where_they_are_named(
+    kahanmaps, options, expected
+):
+    report = kahanmaps(f"check-integrals euler_top {options} --json").json
+    signs = {"refuted": "-", "proved": ""}
+    told = [signs[one["verdict"]] + one["claim"].removesuffix(" is conserved") for one in report["claims"]]
+    assert told == expected.split()
 
 
 def test_an_integral_without_a_name_does_not_take_one_of_the_file(kahanmaps, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('variables = ["x"]\n[system]\nrhs = ["0"]\n[integrals]\nI1 = "x"\nI3 = "2*x"\n')
-    report = kahanmaps("check-integrals", path, "--integral x^2 --integral x^3 --integral E=1/x --json").json
+    report = kahanmaps(
+        "check-integrals", path, "--integral x^2 --integral x^3 --integral E=1/x --integral known --json"
+    ).json
     formulas = {claim: found["formula"] for claim, found in claims(report).items()}
     assert formulas == {
         "I1 is conserved": "x",

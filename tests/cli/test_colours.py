@@ -9,7 +9,7 @@ from cli_helpers import terminal
 import kahanmaps_cli
 
 ESCAPE = "\x1b["
-CHECK = "check-integrals euler_top --integral x1"
+CHECK = "check-integrals euler_top --integral x1 --integral known"
 GREEN, RED = "\x1b[32m", "\x1b[31m"
 
 

@@ -42,7 +42,10 @@ def command(name: str) -> click.Command:
             else:
                 file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
                 settings = opt.settings_from(options, progress, start)
-                report = check(file, settings, _claimed(file, check.claim, claim))
+                options_of_check = {}
+                if check.claim is not None and check.claim.many:
+                    options_of_check["known"] = ("", "known") in claim
+                report = check(file, settings, _claimed(file, check.claim, claim), **options_of_check)
         return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
     run = opt.check_options(run)
@@ -101,23 +104,24 @@ def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tup
 
 def _claimed(file: lib.SystemFile, option: ClaimOption | None, claim: Any) -> Any:
     """What the check takes, from what was given on the line."""
-    if option is None or claim is None:
+    if option is None or not claim:
         return None
     if option.many:
-        return {name: option.read(file, text) for name, text in _named(claim, file)}
+        return {name: option.read(file, text) for name, text in _named(claim, file)} or None
     return option.read(file, claim)
 
 
 def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
-    """The claims with their names; those without one are called I1, I2, ..., as far as these are free.
+    """The claims but for the word known, with their names.
 
-    The bare name of an integral of the file adds nothing: all of these are checked anyway.
+    An integral of the file keeps its name; others without one are called I1, I2, ..., as far as these are free.
     """
     of_file = {**file.integrals, **file.integrals_in_iterates}
-    claims = [(name, text) for name, text in claims if name or text not in of_file]
-    taken = [*of_file, *(name for name, _ in claims if name)]
+    claims = [(name or text if text in of_file else name, text) for name, text in claims]
+    claims = [claim for claim in claims if claim != ("", "known")]
+    taken = [name for name, _ in claims if name]
     for name in taken:
         if taken.count(name) > 1:
             raise click.UsageError(f"found two integrals of the name {name}, expected a name of its own for each")
-    free = (f"I{k}" for k in count(1) if f"I{k}" not in taken)
+    free = (f"I{k}" for k in count(1) if f"I{k}" not in {*taken, *file.integrals})
     return [(name or next(free), text) for name, text in claims]
