@@ -27,7 +27,8 @@ def settings_and_claim(settings: Settings | Any, extra: Any) -> tuple[Settings, 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
     """A formula in the variables of a file, its parameters and eps, as a function of the variables and eps.
 
-    With x~ in it, it is one of the variables, their iterates and eps. The name of an integral of the file stands for it.
+    With x~ in it, it is one of the variables, their iterates and eps. The name of an integral of the file stands for
+    it.
     """
     if isinstance(claim, RationalFunction):
         return claim
@@ -42,13 +43,8 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):
-        unnamed, of_file = (
-            claims if isinstance(claims, list | tuple) else [claims],
-            {
-                **file.integrals,
-                **file.integrals_in_iterates,
-            },
-        )
+        unnamed = claims if isinstance(claims, list | tuple) else [claims]
+        of_file = {**file.integrals, **file.integrals_in_iterates}
         free = (f"I{k}" for k in count(1) if f"I{k}" not in of_file)
         claims = {c if isinstance(c, str) and c in of_file else next(free): c for c in unnamed}
     if not claims:

@@ -11,7 +11,7 @@ from flint import fmpq
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.polynomials import linear_combinations
+from kahanmaps.algebra.polynomials import RationalFunction, linear_combinations
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claimed import claimed_function, claimed_functions, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict

@@ -44,12 +44,12 @@ def judge(
             return Finding(claim, decision.verdict, decision.evidence, (), None, formula, source, control)
         verdict, evidence, witness = Verdict.PROVED, proof, None
         if decision.verdict is Verdict.SUPPORTED:
-            also.append(decision.evidence)
+            also.append(_without_bound(decision.evidence))
     elif not control:
         settled = settle(identity, decision, settings.seed)
         verdict, evidence, witness = settled.verdict, settled.evidence, settled.witness
         if verdict is Verdict.PROVED:
-            also.append(decision.evidence)
+            also.append(_without_bound(decision.evidence))
     if orbit is not None:
         experience, failure = along(identity, orbit)
         also.append(experience)
@@ -58,6 +58,12 @@ def judge(
                 raise Contradiction(f"{claim}: {evidence.summary}, but it {experience.summary} {failure}")
             verdict, evidence, witness = Verdict.REFUTED, experience, failure
     return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)
+
+
+def _without_bound(evidence: Evidence) -> Evidence:
+    """Points at which a proved claim was tried as well: what is proved is not false with any probability."""
+    held = evidence.summary.partition("; false with probability")[0]
+    return Evidence(evidence.method, held, {k: v for k, v in evidence.data.items() if k != "error_bound"})
 
 
 def settle(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:

@@ -57,7 +57,7 @@ class _Facts:
         self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
         self.grown = degrees.known if degrees is not None else Known.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
-        self.basis = f" ({degrees.basis})" if degrees is not None and degrees.basis else ""
+        self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
         self.integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
         period = found.integrals.profile.period if found.integrals is not None else None
         self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
@@ -78,7 +78,7 @@ def conclude(found: Findings) -> Conclusion:
     if facts.liouville:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
     sense, ground, growth = verdict.sense or verdict.kind, str(verdict.ground or ""), facts.growth
-    if verdict.kind == "not integrable" and ground != Known.PROVED:
+    if verdict.kind == "not integrable":
         growth = Growth.EXPONENTIAL  # also where that is estimated only
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
@@ -141,7 +141,7 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
     where = "" if found.eps is not None or not found.file.map.has_eps else ", for all eps but countably many"
     sentence = (
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
-        f"function is an integral; {facts.phrase}{facts.basis if facts.growth is Growth.EXPONENTIAL else ''}."
+        f"function is an integral; {facts.phrase}{facts.basis}."
     )
     return _Verdict("not integrable", sentence, _confining(found), Known.PROVED)
 

@@ -206,3 +206,24 @@ def test_progress_is_told_along_the_way():
     check_integrals(MEMBER, Settings(steps=2, progress=told.append))
     assert "orbit: step 2 of 2" in told
     assert "integral 4 of 4" in told  # modified H, H~, K~_+-, H~_1
+
+
+# Bounds of an error
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        lambda settings: check_commute(SystemFile.from_member(draw_with_eigenvalues([1, -2], seed=1)), None, settings),
+        lambda settings: check_measure(LOTKA_VOLTERRA, settings),
+        lambda settings: check_poisson(SystemFile.from_member(MEMBER.member), settings),
+    ],
+)
+def test_what_is_proved_has_no_bound_for_an_error_and_what_is_supported_the_one_asked_for(check):
+    report = check(Settings(steps=1, error_bits=200))
+    for one in report.findings:
+        for evidence in (one.evidence, *one.also):
+            bound = evidence.data.get("error_bound")
+            assert (bound is not None) == ("false with probability" in evidence.summary)
+            assert bound is None or (one.verdict is S and int(bound.removeprefix("2^-")) >= 200)
+    assert {one.verdict for one in report.findings} & {P, S}

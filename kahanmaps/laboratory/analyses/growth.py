@@ -39,9 +39,8 @@ def statements(found: Findings) -> list[Statement]:
         if shown:
             status = Known.MEASURED if found.degrees.primes else Known.PROVED  # by powers of a matrix
             lines.append(Statement(status, f"degrees of the iterates: {shown}{more}"))
-        unknown = found.degrees.growth is Growth.UNKNOWN and not found.degrees.looks_exponential
         known = found.degrees.known
-        lines.append(Statement(Known.UNDECIDED if unknown else known, found.degrees.growth_text))
+        lines.append(Statement(known, found.degrees.growth_text))
         recurrence = found.degrees.recurrence
         if recurrence is not None:
             known = Known.MEASURED if found.degrees.explained is None else Known.EXPLAINED

@@ -139,12 +139,14 @@ class DegreeGrowth(Printed):
 
     @property
     def growth(self) -> Growth:
-        """How the degrees grow: proved, or if the recurrence goes on; `Growth.UNKNOWN` without one."""
+        """How the degrees grow: proved, or if the recurrence goes on; else exponential if that is proved, or unknown."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:
             return Growth.ZERO
-        return Growth.UNKNOWN if self.recurrence is None else self.recurrence.growth
+        if self.recurrence is None:
+            return Growth.UNKNOWN if self.enclosure is None else Growth.EXPONENTIAL
+        return self.recurrence.growth
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
@@ -193,7 +195,8 @@ class DegreeGrowth(Printed):
             why = self.unconfirmed or f"no recurrence in {terms}"
             quotients = sorted(d / c for c, d in zip(self.degrees[-4:], self.degrees[-3:], strict=False))
             spread = f"the last quotients are {quotients[0]:.6g} to {quotients[-1]:.6g}"
-            return f"exponential growth by a factor of about {self.estimate} (estimated: {spread}; {why})"
+            growth = "exponential growth" if self.enclosure is None else "exponential growth (proved),"
+            return f"{growth} by a factor of about {self.estimate} (estimated: {spread}; {why})"
         if self.fitted is not None:
             return f"{terms} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
         n = len(self.degrees) - 1
@@ -202,17 +205,21 @@ class DegreeGrowth(Printed):
 
     @property
     def basis(self) -> str:
-        """How the growth is known where it is: proved, explained or measured, and by what or with which limit."""
+        """How the growth is known, by what proof, or how far confinement was looked for where it was not seen."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self._limit}" if self._limit else str(self.known)
 
     @property
     def known(self) -> Known:
-        """How the growth is known where it is."""
+        """How the growth is known; the bounds of `enclosure` are proved whatever this says."""
         if self.proof is not None:
             return Known.PROVED
-        return Known.MEASURED if self.explained is None else Known.EXPLAINED
+        if self.explained is not None:
+            return Known.EXPLAINED
+        if self.recurrence is not None or self.ended == Ended.CONSTANT:
+            return Known.MEASURED
+        return Known.ESTIMATED if self.looks_exponential else Known.UNDECIDED
 
     @property
     def _limit(self) -> str:

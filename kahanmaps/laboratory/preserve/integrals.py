@@ -55,6 +55,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
+_CLOSING_POINTS = 64  # of an orbit at the values of the file: as many as relations of some degree take
 Formula = tuple[RationalFunction, str, str]  # where it comes from; in factors, where it is known so
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 
@@ -135,6 +136,7 @@ class IntegralSearch(Search):
     formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits show (measured);
     `by_theorems` is how many independent integrals the Kahan map has by the theorems of inherited.py, and `theorems`
     says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is.
+    `period_at_values` is the number of points of orbits that close where the symbols have the values of the file.
     """
 
     integrals: tuple[FoundIntegral, ...]
@@ -144,10 +146,16 @@ class IntegralSearch(Search):
     theorems: str = ""
     in_time: tuple[TimedIntegral, ...] = ()
     in_iterates: tuple[IntegralInIterates, ...] = ()
+    period_at_values: int | None = None
 
     @property
     def note(self) -> str:
         """What is special about the orbits: that they close; empty where they do not."""
+        if self.profile.period is None and self.period_at_values is not None:
+            values = ", ".join(f"{name} = {self.file.parameters[name]}" for name in self.symbols)
+            if self.flow:
+                return f"at {values} the right-hand side is 0, and every function an integral"
+            return f"at {values} {closing_note(self.period_at_values, self.eps, self.file.map)}"
         return closing_note(self.profile.period, self.eps, self.file.map)
 
     @property
@@ -174,7 +182,8 @@ class IntegralSearch(Search):
         they close.
         """
         dim, measured = self.profile.dim, bool(self.profile.nullities)
-        return self.codimension >= (dim - 1 if measured and self.profile.period is None else dim)
+        closes = self.profile.period is not None or self.period_at_values is not None
+        return self.codimension >= (dim - 1 if measured and not closes else dim)
 
     @property
     def count_text(self) -> str:
@@ -275,7 +284,7 @@ def find_integrals(
         by_theorems = known.count if known is not None and not laboratory.defect else 0
         found = tuple(collected.integrals), profile, reason, by_theorems, theorems
         more = tuple(collected.in_time), tuple(collected.in_iterates)
-        return IntegralSearch(*laboratory.asked, *found, *more, flow=flow)
+        return IntegralSearch(*laboratory.asked, *found, *more, _period_at_the_values(laboratory), flow=flow)
 
     empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
@@ -365,10 +374,9 @@ class _Known:
 def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
     """That formulas with symbols depend on each other, or vanish, where these have the values that the file gives."""
     values = [laboratory.file.parameters.get(name) for name in laboratory.symbols]
-    if not values or None in values:
+    map_ = _map_at_the_values(laboratory)
+    if map_ is None:
         return ""
-    prime = laboratory.maps[0].prime
-    map_ = laboratory.map_at(prime, [int(GF(prime).convert(value)) for value in values], laboratory.maps[0].eps)
     there = Independent(map_)
     rows = [there.gradient(one.function) for one in search.integrals]
     rows += [gradient_of(one.ratio, laboratory.map, map_, there.point) for one in search.in_iterates]
@@ -377,6 +385,25 @@ def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
         return ""
     told = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
     return f"at {told} only {left} of the {len(rows)} formulas are independent: without --symbolic others may be found"
+
+
+def _period_at_the_values(laboratory: Laboratory) -> int | None:
+    """How many points orbits have that close where the symbols have the values of the file; None where they do not."""
+    map_ = None if laboratory.defect else _map_at_the_values(laboratory)
+    try:
+        points = [] if map_ is None else map_.orbit(_CLOSING_POINTS)
+    except NoPoint:
+        return None
+    return len(points) if 0 < len(points) < _CLOSING_POINTS else None
+
+
+def _map_at_the_values(laboratory: Laboratory) -> ModularMap | None:
+    """The map modulo the first prime with the values that the file gives to the symbols; None without such values."""
+    values = [laboratory.file.parameters.get(name) for name in laboratory.symbols]
+    if not values or None in values:
+        return None
+    prime = laboratory.maps[0].prime
+    return laboratory.map_at(prime, [int(GF(prime).convert(value)) for value in values], laboratory.maps[0].eps)
 
 
 def _unfinished(profile: Profile, max_degree: int | None, deadline: float) -> str:
