@@ -31,6 +31,7 @@ from kahanmaps.invariants.integrals import (
     PaperIntegral,
     is_constant,
 )
+from kahanmaps.invariants.normalize import measured_integrals
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, orbit_about
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
@@ -93,13 +94,13 @@ def functions_along(
     """What is watched along orbits, in floats or not, by name, for pairs of a name, which may be empty, and a text.
 
     A text is an expression, the name of an integral of the file, or the word known, which stands for all that theorems
-    give and the file claims. Raises InputError for the same name twice, or one that is `taken` by another column.
+    give and the file claims, this as `measured_integrals` has it. Raises InputError for the same name twice, or one that is `taken` by another column.
     """
     file = file.rounded if in_floats else file
     found: list[PhaseFunction] = []
     for k, (name, text) in enumerate(asked, start=1):
         if text == "known" and not name:
-            claims = {**file.integrals, **file.integrals_in_iterates}
+            claims = {**measured_integrals(file), **file.integrals_in_iterates}
             known = [integral for integral, _, _ in known_integrals(file)]
             if not known and not claims:
                 raise InputError(f"--integral known: no integral of {file.name} is known or claimed")

@@ -26,6 +26,7 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
+from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
@@ -466,7 +467,7 @@ class _Collected:
 
     def offer(self, formulas: Sequence[Formula]) -> None:
         """Take those that do not depend on others and pass as identities, short ones first."""
-        for function, origin, product in sorted(formulas, key=_size):
+        for function, origin, product in sorted(map(self._normalized, formulas), key=_size):
             row = self._gradients.gradient(function)
             if not self._gradients.adds(row):
                 continue
@@ -474,6 +475,15 @@ class _Collected:
             verdict, evidence = self._judged(function)
             if verdict.holds:
                 self._add(row, function, origin, verdict, evidence, product)
+
+    def _normalized(self, formula: Formula) -> Formula:
+        """The formula as it is shown: with its limit eps -> 0, an integral of the flow, where there is one."""
+        laboratory, (function, origin, product) = self._laboratory, formula
+        of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
+        if not of_flow or laboratory.eps is not None or laboratory.root is not None:
+            return formula
+        shown = normalized(function, laboratory.map.dim).function
+        return shown, origin, product if shown == function else ""
 
     def _add(self, row: list[int], *known: Any) -> None:
         self._gradients.add(row)
@@ -496,7 +506,8 @@ class _Collected:
             if k < affine:
                 self._add(row, *_affine(laboratory, inherited.quotient.integrals[k]))
             elif time.monotonic() <= self._deadline and (written := _modified(laboratory, inherited, k - affine)):
-                self._add(row, *written)
+                function, origin, *known = written
+                self._add(row, *self._normalized((function, origin, ""))[:2], *known)
 
     def add_products(self, cofactors: Sequence[Cofactor]) -> None:
         """Products of powers of known polynomials, and such that depend on time."""

@@ -90,8 +90,8 @@ def survey_drift(
     >>> from kahanmaps.documents.catalog import load
     >>> top = load("euler_top")
     >>> found = survey_drift(top.system, "1/10", [1, "1/2", "1/3"], 1000, known_functions(top, fmpq(1, 10)))
-    >>> [f"{curve.errors.max():.0e}" for curve in found.curves if curve.function == "F1"][1:]
-    ['5e-05', '1e-05']
+    >>> [f"{curve.errors.max():.0e}" for curve in found.curves if curve.function == "(-F1 + 1)/eps^2"][1:]
+    ['1e-02', '2e-03']
     """
     eps = rational(eps)
     point = tuple(rational(entry) for entry in start)

@@ -13,6 +13,7 @@ from kahanmaps.algebra.written.text import format_polynomial, parse_rational_fun
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.normalize import measured_integrals
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.plots.point_functions import PointFunction
@@ -96,10 +97,11 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
     """A choice of these without repetition: the claims of the file, or where there are none what follows; and H.
 
-    Raises InputError where nothing is known.
+    The claims are those of `measured_integrals`: a constant limit eps -> 0 would make their drift small by itself. Raises InputError where nothing is known.
     """
     every = functions_of(file, eps)
-    chosen = list(file.integrals) or [name for name in every if name != "H"]
+    every |= {name: PointFunction(name, one, eps) for name, one in measured_integrals(file).items() if name not in every}
+    chosen = list(measured_integrals(file)) or [name for name in every if name != "H"]
     if "H" in every:
         chosen.append("H")
     if not chosen:

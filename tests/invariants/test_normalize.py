@@ -1,0 +1,135 @@
+"""Normalized integrals: conserved as before, with a limit eps -> 0 that is an integral of the flow, and unchanged."""
+
+import random
+
+import pytest
+from flint import fmpq
+
+import kahanmaps as km
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, substitute
+from kahanmaps.algebra.written.text import format_factored, parse_rational_function
+from kahanmaps.invariants.normalize import measured_integrals, normalized
+from kahanmaps.laboratory.laboratory import Laboratory
+
+CLAIMED = [
+    (name, claim)
+    for name in km.names()
+    if km.load(name).map.has_eps and km.load(name).map.time_steps
+    for claim in km.load(name).integrals
+]
+POLARISED = "duffing_polarised"  # a map of two points, whose limit is no function of one
+
+
+def is_primitive(function: RationalFunction) -> bool:
+    parts = function.numerator, function.denominator
+    return all(c.q == 1 for P in parts for c in P.coeffs()) and all(P.leading_coefficient() > 0 for P in parts)
+
+
+def disguised(function: RationalFunction, rng: random.Random, constant: bool) -> RationalFunction:
+    """The integral times a function of eps, plus one: with a constant limit or, without `constant`, with another."""
+    P, Q = function.numerator, function.denominator
+    eps = P.context().gens()[-1]
+    a, b, c, d = (rng.choice([-1, 1]) * rng.randint(1, 9) for _ in range(4))
+    if constant:
+        return RationalFunction((a + b * eps) * eps**4 * P + (c + d * eps**2) * Q, (d + a * eps) * Q)
+    return RationalFunction((a + b * eps) * eps**3 * P, (c - d * eps**2) * Q)
+
+
+@pytest.mark.parametrize(("name", "claim"), CLAIMED)
+def test_claims_of_the_catalogue_are_normalized_to_integrals_that_tend_to_those_of_the_flow(name, claim):
+    file = km.load(name)
+    found = normalized(file.integrals[claim], file.dim)
+    alpha, beta, gamma = found.coefficients
+    I = file.integrals[claim]
+    combined = RationalFunction(alpha * I.numerator + beta * I.denominator, gamma * I.denominator)
+    assert combined == found.function
+    assert all(degree_in(P, file.dim) == 0 and not P.is_zero() or P is beta for P in (alpha, beta, gamma))
+    assert found.leading is not None
+    assert is_primitive(found.leading)
+    assert normalized(found.function, file.dim).function == found.function
+    if name != POLARISED:
+        assert Laboratory(file, flow=True).verdict_on(found.leading)[0].holds
+    rng = random.Random(f"{name} {claim}")
+    for constant in (True, False):
+        assert normalized(disguised(found.function, rng, constant), file.dim).function == found.function
+
+
+def test_a_function_that_is_not_conserved_does_not_tend_to_an_integral_of_the_flow():
+    # The control of the last but one assertion.
+    file = km.load("euler_top")
+    wrong = parse_rational_function("(1 - eps^2*x1^2)/(1 + eps^2*x2^2)", [*file.variables, "eps"])
+    leading = normalized(wrong, 3).leading
+    assert format_factored(leading) == "x1^2 + x2^2"
+    assert not Laboratory(file, flow=True).verdict_on(leading)[0].holds
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("-3 - 2*eps^2 - eps^4*(24*x - 18*y)/(1 + eps^2*x)", "(4*x - 3*y)/(x*eps^2 + 1)"),
+        ("-x*y/2", "x*y"),
+        ("eps*x/((1 + eps)*y)", "x/y"),
+        ("(a + a*eps*x)/(2 + eps*y)", "(4*x - 2*y)/(y*eps + 2)"),  # a(1 + eps x)/(2 + eps y) - a/2
+        ("x/(1 - eps^2*x)", "-x/(x*eps^2 - 1)"),
+        ("7*a/eps", "7*a/eps"),
+    ],
+)
+def test_what_is_subtracted_and_divided_out(text, shown):
+    found = normalized(parse_rational_function(text, ["x", "y", "a", "eps"]), 2)
+    assert found.function == parse_rational_function(shown, ["x", "y", "a", "eps"])
+
+
+SYSTEMS = [
+    "weierstrass",
+    "euler_top",
+    "nahm_octahedral",
+    "zhukovski_volterra_1",
+    "volterra_periodic_4",
+    "henon_heiles",
+    # The image of weierstrass under x -> 1000 x, y -> y/7, and a planar cubic without symmetry.
+    "x' = 7000*y; y' = 6*x^2/7000000 - 2/7",
+    "x' = x^2 - y; y' = 1 - 2*x*y",
+]
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_integrals_are_found_normalized(system):
+    found = km.find_integrals(system)
+    assert found.integrals
+    for one in found.integrals:
+        again = normalized(one.function, found.file.dim)
+        assert (again.function, again.is_shifted) == (one.function, False)
+        assert is_primitive(again.leading)
+        assert Laboratory(found.file, flow=True).verdict_on(again.leading)[0].holds
+        assert one.verdict.holds
+        assert km.check_integrals(found.file, one.text).holds
+
+
+@pytest.mark.parametrize("symbols", [[], ["a1", "a2", "a3"]])
+def test_integrals_of_the_euler_top_are_no_constants_for_any_values(symbols):
+    # x1^2 a2 - x2^2 a1 over 1 - eps^2 a2 a3 x1^2, where the published form is 1 for a3 = 0.
+    found = km.find_integrals("euler_top", symbols=symbols)
+    for one in found.integrals:
+        values = {name: fmpq(value) for name, value in zip(symbols, (2, -3, 0), strict=False)}
+        assert degree_in(substitute(one.function.numerator, values), 3) == 2
+
+
+def test_maps_without_a_flow_and_formulas_for_one_eps_keep_their_scale():
+    file = km.load("qrt_symmetric")
+    assert measured_integrals(file) == file.integrals
+    at_one_eps = km.find_integrals("weierstrass", eps="1/5")
+    assert at_one_eps.integrals[0].verdict.holds
+
+
+def test_values_along_orbits_are_those_of_combinations_with_a_limit():
+    file = km.load("euler_top")
+    measured = measured_integrals(file)
+    assert list(measured) == ["(-F1 + 1)/eps^2", "(-F2/2 + 1/2)/eps^2"]
+    names = [*file.variables, "eps"]
+    for text, name in (("F1", "(-F1 + 1)/eps^2"), ("F2", "(-F2/2 + 1/2)/eps^2")):
+        x = [km.QQ.convert(k) for k in (2, 3, 5)]
+        e = km.QQ.convert("1/7")
+        F = file.integrals[text].value(km.QQ, [*x, e])
+        expected = (1 - F) / e**2 if text == "F1" else (1 - F) / (2 * e**2)
+        assert measured[name].value(km.QQ, [*x, e]) == expected
+        assert measured[name].names == tuple(names)
