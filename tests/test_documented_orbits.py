@@ -73,9 +73,9 @@ def test_the_orbit_of_5_1_leaves_the_positive_quadrant_at_step_139(monkeypatch):
     # Balls of 2,000 bits, for the digits of exact points double at every step.
     monkeypatch.setattr(ctx, "prec", 2000)
     x, y, e = arb(5), arb(1), arb(1) / 5
-    for step in range(140):
-        if not (x > 0 and y > 0):
-            break
+    step = 0
+    while x > 0 and y > 0 and step < 200:
+        step += 1
         # (I - eps f') (x~ - x) = 2 eps f by Cramer's rule
         a, b, c, d = 1 - e * (1 - y), e * x, -e * y, 1 - e * (x - 1)
         f, g, det = 2 * e * x * (1 - y), 2 * e * y * (x - 1), a * d - b * c

@@ -94,7 +94,8 @@ def functions_along(
     """What is watched along orbits, in floats or not, by name, for pairs of a name, which may be empty, and a text.
 
     A text is an expression, the name of an integral of the file, or the word known, which stands for all that theorems
-    give and the file claims, this as `measured_integrals` has it. Raises InputError for the same name twice, or one that is `taken` by another column.
+    give and the file claims, this as `measured_integrals` has it. Raises InputError for the same name twice, or one
+    that is `taken` by another column.
     """
     file = file.rounded if in_floats else file
     found: list[PhaseFunction] = []

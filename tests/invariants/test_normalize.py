@@ -43,7 +43,7 @@ def test_claims_of_the_catalogue_are_normalized_to_integrals_that_tend_to_those_
     I = file.integrals[claim]
     combined = RationalFunction(alpha * I.numerator + beta * I.denominator, gamma * I.denominator)
     assert combined == found.function
-    assert all(degree_in(P, file.dim) == 0 and not P.is_zero() or P is beta for P in (alpha, beta, gamma))
+    assert all((degree_in(P, file.dim) == 0 and not P.is_zero()) or P is beta for P in (alpha, beta, gamma))
     assert found.leading is not None
     assert is_primitive(found.leading)
     assert normalized(found.function, file.dim).function == found.function

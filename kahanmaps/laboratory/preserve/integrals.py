@@ -270,7 +270,7 @@ def find_integrals(
     >>> from kahanmaps.documents.catalog import load
     >>> found = find_integrals(load("nahm_tetrahedral"))
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
-    ([('y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
+    ([('-y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
     require_time(seconds)
     if max_degree is not None and max_degree < 1:
@@ -478,12 +478,18 @@ class _Collected:
 
     def _normalized(self, formula: Formula) -> Formula:
         """The formula as it is shown: with its limit eps -> 0, an integral of the flow, where there is one."""
-        laboratory, (function, origin, product) = self._laboratory, formula
-        of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
-        if not of_flow or laboratory.eps is not None or laboratory.root is not None:
+        function, origin, product = formula
+        if not self._has_limit:
             return formula
-        shown = normalized(function, laboratory.map.dim).function
+        shown = normalized(function, self._laboratory.map.dim).function
         return shown, origin, product if shown == function else ""
+
+    @property
+    def _has_limit(self) -> bool:
+        """Whether the map approximates a flow, for every eps; or it is the flow itself."""
+        laboratory = self._laboratory
+        of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
+        return of_flow and laboratory.eps is None and laboratory.root is None
 
     def _add(self, row: list[int], *known: Any) -> None:
         self._gradients.add(row)
@@ -542,7 +548,8 @@ class _Collected:
             return
         self.offer(plain)
         too_long = set[int]()
-        for ratio, origin in ratios:
+        for found, origin in ratios:
+            ratio = found.with_limit(2 * laboratory.map.dim) if self._has_limit else found
             verdict, evidence = verdict_on_ratio(laboratory, ratio, too_long)
             if verdict.holds:
                 name = f"I{len(self.integrals) + len(self.in_iterates) + 1}"

@@ -34,6 +34,8 @@ from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.phase_functions import orbit_about
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.branches import pattern
@@ -61,6 +63,14 @@ class RatioOfIterates:
     def length(self) -> int:
         """How many successive points it is a function of."""
         return self.lift.shift + self.lift.rank
+
+    def with_limit(self, count: int) -> RatioOfIterates:
+        """The ratio of two functions that tend to one constant normalized, the first `count` letters being points."""
+        if self.lift.rank > 1:
+            return self
+        found = normalized(self.formula[0], count)
+        parts = found.function.numerator, found.function.denominator
+        return RatioOfIterates(self.lift, parts, (0,), (1,)) if found.is_shifted else self
 
     @property
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:

@@ -97,10 +97,13 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
     """A choice of these without repetition: the claims of the file, or where there are none what follows; and H.
 
-    The claims are those of `measured_integrals`: a constant limit eps -> 0 would make their drift small by itself. Raises InputError where nothing is known.
+    The claims are those of `measured_integrals`: a constant limit eps -> 0 would make their drift small by itself.
+    Raises InputError where nothing is known.
     """
     every = functions_of(file, eps)
-    every |= {name: PointFunction(name, one, eps) for name, one in measured_integrals(file).items() if name not in every}
+    every |= {
+        name: PointFunction(name, one, eps) for name, one in measured_integrals(file).items() if name not in every
+    }
     chosen = list(measured_integrals(file)) or [name for name in every if name != "H"]
     if "H" in every:
         chosen.append("H")
