@@ -137,7 +137,7 @@ def test_integrals_of_the_flow(kahanmaps):
     assert lines[1].startswith("F1\tproved\t6*q1^2*q2 - 2*q2^3")
     record = kahanmaps("find-integrals euler_top --flow --json -q").json
     assert record["flow"] is True
-    assert [one["combination"] for one in record["beside_map"]["limits"]] == ["(I1 + 1)/eps^2", "(-I2/2 + 1/2)/eps^2"]
+    assert [one["combination"] for one in record["beside_map"]["limits"]] == ["I1", "I2"]
     assert mistakes("find-integrals", record) == []
 
 

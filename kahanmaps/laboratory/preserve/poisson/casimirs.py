@@ -1,4 +1,4 @@
-"""Casimirs of a tensor that are functions of known integrals: products of their powers, and polynomials in them.
+"""Casimirs of a tensor that are functions of known integrals: products of powers, polynomials, Moebius functions.
 
 C is a Casimir if P grad C = 0. For C = prod I^k that is sum k_i P grad I_i / I_i = 0, for a polynomial a sum of
 multiples of the P grad I_i: equations at random points modulo a prime, linear in the exponents k or the coefficients,
@@ -7,10 +7,11 @@ which may contain eps and the symbols. What comes out is to be put to the proof.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
 from math import comb, lcm, prod
 
-from flint import fmpq_mpoly_ctx
+from flint import fmpq_mpoly, fmpq_mpoly_ctx
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
@@ -43,8 +44,8 @@ def casimir_candidates(
         deadline: for the coefficients of polynomials, a value of time.monotonic().
 
     Yields:
-        Products of powers, then polynomials of degree 2 at most: right modulo a prime. Functions of single Casimirs may
-        be among them.
+        Products of powers, polynomials of degree 2 at most, then quotients of affine functions: right modulo a prime.
+        Functions of single Casimirs may be among them.
     """
     names = [one.name for one in integrals]
     if set(names) & {*laboratory.symbols, "eps"}:
@@ -56,6 +57,7 @@ def casimir_candidates(
         found = [
             *_products(laboratory.maps[0], tensor, integrals, context),
             *_polynomials(laboratory, tensor, integrals, deadline),
+            *_fractions(laboratory, tensor, integrals, deadline),
         ]
     except NoPoint:
         return
@@ -100,37 +102,92 @@ def _polynomials(
 ) -> Iterator[RationalFunction]:
     """A basis of the polynomials of degree at most 2 in the integrals whose gradients the tensor kills."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MOST_TERMS else 1
+    powers = exponents_up_to(len(integrals), degree)[1:]
+
+    def columns(values: list[int], moved: list[list[int]], p: int) -> list[list[int]]:
+        found = []
+        for exponents in powers:
+            weights = [
+                e * prod(pow(I, k - (i == j), p) for j, (I, k) in enumerate(zip(values, exponents, strict=True)) if k)
+                if e
+                else 0
+                for i, e in enumerate(exponents)
+            ]
+            found.append([sum(w * v for w, v in zip(weights, row, strict=True)) for row in zip(*moved, strict=True)])
+        return found
+
+    for P in _forms(laboratory, tensor, integrals, powers, columns, deadline):
+        if degree_in(P, len(integrals)) > 1 or len(P) > 1:
+            yield RationalFunction(P, P.context().constant(1))
+
+
+def _fractions(
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+) -> Iterator[RationalFunction]:
+    """Quotients of affine functions of the integrals whose gradients the tensor kills.
+
+    With J = (1, I_1, ...) the gradient of (u.J)/(v.J) is killed if sum w_ab (J_a P grad J_b - J_b P grad J_a) = 0 for
+    w = u ^ v: linear equations for w. Any two independent rows of w are combinations of u and v.
+    """
+    count = len(integrals)
+    if comb(count + 2, 2) > _MOST_TERMS:
+        return
+    pairs = list(combinations(range(count + 1), 2))
+    powers = [tuple(int(k in (a - 1, b - 1)) for k in range(count)) for a, b in pairs]
+
+    def columns(values: list[int], moved: list[list[int]], p: int) -> list[list[int]]:
+        J, P = [1, *values], [[0] * len(moved[0]), *moved]
+        return [[J[a] * y - J[b] * x for x, y in zip(P[a], P[b], strict=True)] for a, b in pairs]
+
+    for form in _forms(laboratory, tensor, integrals, powers, columns, deadline):
+        letters = [form.context().constant(1), *form.context().gens()[:count]]
+        w = {pair: form * 0 for pair in pairs}
+        for monomial, value in form.terms():
+            pair = pairs[powers.index(tuple(map(int, monomial[:count])))]
+            w[pair] += form.context().from_dict({(*([0] * count), *map(int, monomial[count:])): value})
+        a, b = next(pair for pair in pairs if not w[pair].is_zero())
+        u, v = (
+            sum((w.get((k, c), form * 0) - w.get((c, k), form * 0)) * J for c, J in enumerate(letters)) for k in (a, b)
+        )
+        common = u.gcd(v)
+        yield RationalFunction(u / common, v / common)
+
+
+def _forms(
+    laboratory: Laboratory,
+    tensor: GivenTensor,
+    integrals: Sequence[FoundIntegral],
+    powers: Sequence[tuple[int, ...]],
+    columns: Callable[[list[int], list[list[int]], int], list[list[int]]],
+    deadline: float,
+) -> Sequence[fmpq_mpoly]:
+    """The relations among columns, one for each of the monomials `powers` in the integrals, as combinations of these.
+
+    `columns` makes them from what `_moved` gives at a point, and a prime. Coefficients may contain eps and the symbols.
+    """
+    count, degree = len(integrals), max(map(sum, powers))
+    every = exponents_up_to(count, degree)
+    places = [every.index(exponents) for exponents in powers]
 
     def space(map_: ModularMap) -> DarbouxSpace:
         p, rows = map_.prime, list[list[int]]()
-        powers = exponents_up_to(len(integrals), degree)[1:]
         for _ in range(_SPARE + len(powers)):
-            values, moved = _moved(map_, tensor, integrals)
-            columns = []
-            for exponents in powers:
-                weights = [
-                    e
-                    * prod(pow(I, k - (i == j), p) for j, (I, k) in enumerate(zip(values, exponents, strict=True)) if k)
-                    if e
-                    else 0
-                    for i, e in enumerate(exponents)
-                ]
-                columns.append(
-                    [sum(w * v[k] for w, v in zip(weights, moved, strict=True)) % p for k in range(map_.dim)]
-                )
-            rows += [list(row) for row in zip(*columns, strict=True)]
-        vectors = [[0, *vector] for vector in null_space(rows, len(powers), p)]
-        return DarbouxSpace.spanned_by(len(integrals), degree, vectors, p)
+            found = columns(*_moved(map_, tensor, integrals), p)
+            rows += [[entry % p for entry in row] for row in zip(*found, strict=True)]
+        vectors = []
+        for relation in null_space(rows, len(powers), p):
+            vectors.append([0] * len(every))
+            for place, entry in zip(places, relation, strict=True):
+                vectors[-1][place] = entry
+        return DarbouxSpace.spanned_by(count, degree, vectors, p)
 
     model = space(laboratory.maps[0])
     if not model.basis:
-        return
+        return ()
     eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
     names = [one.name for one in integrals]
     forms = laboratory.formulas([model], lambda map_: [space(map_)], deadline, names, eps_enters)
-    for P in forms.bases[0] if forms.bases is not None else ():
-        if degree_in(P, len(integrals)) > 1 or len(P) > 1:
-            yield RationalFunction(P, P.context().constant(1))
+    return forms.bases[0] if forms.bases is not None else ()
 
 
 def _moved(
