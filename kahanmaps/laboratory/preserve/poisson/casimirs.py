@@ -141,7 +141,7 @@ def _fractions(
 
     for form in _forms(laboratory, tensor, integrals, powers, columns, deadline):
         letters = [form.context().constant(1), *form.context().gens()[:count]]
-        w = {pair: form * 0 for pair in pairs}
+        w = dict.fromkeys(pairs, form * 0)
         for monomial, value in form.terms():
             pair = pairs[powers.index(tuple(map(int, monomial[:count])))]
             w[pair] += form.context().from_dict({(*([0] * count), *map(int, monomial[count:])): value})
