@@ -140,14 +140,15 @@ def _fractions(
         return [[J[a] * y - J[b] * x for x, y in zip(P[a], P[b], strict=True)] for a, b in pairs]
 
     for form in _forms(laboratory, tensor, integrals, powers, columns, deadline):
-        letters = [form.context().constant(1), *form.context().gens()[:count]]
-        w = dict.fromkeys(pairs, form * 0)
+        letters, zero = [form.context().constant(1), *form.context().gens()[:count]], form.context().constant(0)
+        w = dict.fromkeys(pairs, zero)
         for monomial, value in form.terms():
             pair = pairs[powers.index(tuple(map(int, monomial[:count])))]
             w[pair] += form.context().from_dict({(*([0] * count), *map(int, monomial[count:])): value})
         a, b = next(pair for pair in pairs if not w[pair].is_zero())
         u, v = (
-            sum((w.get((k, c), form * 0) - w.get((c, k), form * 0)) * J for c, J in enumerate(letters)) for k in (a, b)
+            sum(((w.get((k, c), zero) - w.get((c, k), zero)) * J for c, J in enumerate(letters)), start=zero)
+            for k in (a, b)
         )
         common = u.gcd(v)
         yield RationalFunction(u / common, v / common)
