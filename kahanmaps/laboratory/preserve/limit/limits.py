@@ -204,7 +204,7 @@ def flow_and_map(
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines()[0])
-    proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow that the map deforms: (I1/3 + 1/3)/eps^2 = L1 + ...
+    proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow that the map deforms: I1 = L1 + ...
     """
     if not isinstance(search, IntegralSearch):
         raise wrong_kind(search, "what km.find_integrals found", "km.flow_and_map(km.find_integrals(...))")
