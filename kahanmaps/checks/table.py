@@ -120,7 +120,7 @@ _CHECKS = [
         ClaimOption(
             "--integral",
             "[NAME=]EXPR",
-            "A claimed integral: a rational function of x, its images x~, x~~ and eps; one of the file by name; 'known'.",
+            "A claimed integral: a rational function of x, its images x~, x~~ and eps; one of the file by name; known.",
             many=True,
         ),
     ),

@@ -21,6 +21,7 @@ WORDS = {
     "supported": ("≈", "#0e8fa8"),
     "explained": ("≋", "#0e8fa8"),
     "measured": ("~", "#3f7ae0"),
+    "estimated": ("?", "#b8860b"),
     "refuted": ("✗", "#e0353f"),
     "undecided": ("?", "#b8860b"),
 }

@@ -139,7 +139,7 @@ class DegreeGrowth(Printed):
 
     @property
     def growth(self) -> Growth:
-        """How the degrees grow: proved, or if the recurrence goes on; else exponential if that is proved, or unknown."""
+        """How the degrees grow: proved, or if the recurrence goes on; else exponential if proved, or unknown."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:

@@ -33,9 +33,8 @@ from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.invariants.phase_functions import orbit_about
-from kahanmaps.errors import InputError
 from kahanmaps.invariants.normalize import normalized
+from kahanmaps.invariants.phase_functions import orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.branches import pattern
