@@ -163,13 +163,6 @@ SOURCES: dict[str, str] = {
         "B. Hasselblatt, J. Propp. Degree-growth of monomial maps. "
         "Ergodic Theory Dynam. Systems 27 (2007), 1375-1397. arXiv:math/0604521"
     ),
-    "nica-spakula-2016": (
-        "B. Nica, J. Spakula. Strong hyperbolicity. Groups Geom. Dyn. 10 (2016), 951-964. arXiv:1406.0256"
-    ),
-    "coornaert-delzant-papadopoulos-1990": (
-        "M. Coornaert, T. Delzant, A. Papadopoulos. Geometrie et theorie des groupes: les groupes hyperboliques de "
-        "Gromov. Lecture Notes in Math. 1441, Springer 1990"
-    ),
     "diller-favre-2001": (
         "J. Diller, C. Favre. Dynamics of bimeromorphic maps of surfaces. Amer. J. Math. 123 (2001), 1135-1169"
     ),

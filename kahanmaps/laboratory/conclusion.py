@@ -138,7 +138,7 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
     bound = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
-    where = "" if found.eps is not None or not found.file.map.has_eps else ", for all eps but countably many"
+    where = "" if found.eps is not None or not found.file.map.has_eps else ", for all but finitely many eps"
     sentence = (
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
         f"function is an integral; {facts.phrase}{facts.basis}."

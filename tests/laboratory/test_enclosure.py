@@ -3,7 +3,7 @@
 import random
 
 import pytest
-from flint import arb, fmpq
+from flint import arb, fmpq, fmpz_mat
 from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +12,15 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduced
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.enclosure import degree_above, enclose, is_birational, lower_bound
+from kahanmaps.laboratory.growth.enclosure import (
+    _ceiling,
+    _decimal,
+    _less,
+    degree_above,
+    enclose,
+    is_birational,
+    lower_bound,
+)
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -20,12 +28,18 @@ PRIME = 2**61 - 1
 PLANAR = [name for name in (*names(), *map_names()) if DIMENSION[name] == 2]
 POSITIVE = ["lotka_volterra", "fibonacci", "hietarinta_viallet", "zander_120", "lotka_volterra_symplectic_euler"]
 
+# of the standard quadratic transformation, on the class of a line and of 11 points
+QUADRATIC = fmpz_mat(12, 12, [int(i == j) for i in range(12) for j in range(12)])
+for i, row in enumerate([[2, 1, 1, 1], [-1, 0, -1, -1], [-1, -1, 0, -1], [-1, -1, -1, 0]]):
+    for j, entry in enumerate(row):
+        QUADRATIC[i, j] = entry
+
 
 @pytest.mark.parametrize("name", quick(POSITIVE, ["fibonacci"]))
 def test_the_bounds_enclose_the_dynamical_degree_that_is_explained(name):
     found = degree_growth(load(name).map, seconds=20)
     exact = float(found.dynamical_degree.digits)
-    assert 1.2 < float(found.enclosure.lower) < exact <= float(found.enclosure.upper) < 3
+    assert 0.9 * exact < float(found.enclosure.lower) < exact <= float(found.enclosure.upper) < 3
 
 
 @pytest.mark.parametrize(
@@ -43,12 +57,55 @@ def test_the_bound_by_tangents_is_the_largest_degree_that_they_allow(largest, li
     assert lines * (D + 1 - largest) > 6 * D
 
 
-def test_the_lower_bound_is_that_of_the_distances():
-    """cosh of the distance is the degree: from T_2n(x) and T_n(x), x = 3, it is (x + sqrt(x^2 - 1))/4^(1/n)."""
+def test_the_lower_bound_is_attained_on_the_axis():
+    """T_n(3) = cosh(n log(3 + sqrt 8)): degrees of a translation along a line, of which nothing is lost."""
     one = lower_bound(2 * 99**2 - 1, 99, 3)  # T_3(3) = 99, T_6 = 2 T_3^2 - 1
-    assert abs(float(one) - float((3 + arb(8).sqrt()) / arb(4).root(3))) < 1e-12
-    assert lower_bound(40, 10, 1) > 1
-    assert not lower_bound(39, 10, 1) > 1
+    assert one.overlaps(3 + arb(8).sqrt())
+    assert one.rad() < 1e-30
+
+
+@given(st.integers(1, 10**6), st.integers(1, 10**4))
+def test_degrees_of_quadratic_growth_are_just_not_enough(c, n):
+    below, above = 1 + c * (2 * n) ** 2, 1 + c * n**2
+    assert lower_bound(below, above, n) is None
+    assert lower_bound(below, above + 1, n) is None
+    assert lower_bound(below + 1, above, n) > 1
+
+
+def test_an_iterate_of_degree_1_gives_no_bound():
+    assert lower_bound(1, 1, 1) is None
+    assert lower_bound(100, 1, 1) is None
+
+
+@given(st.lists(st.permutations(range(11)), min_size=1, max_size=4))
+def test_the_bound_holds_for_compositions_of_quadratic_transformations(permutations):
+    """Where no two base points meet degrees are those of a matrix of the Weyl group, here of 11 points.
+
+    A composition of s: (d; m) -> (2 d - m1 - m2 - m3; ...), with permutations between. By the triangle inequality its
+    translation length is at most arccosh(D_n)/n for every n, in any of the three kinds of isometries.
+    """
+    word = fmpz_mat(12, 12, [int(i == j) for i in range(12) for j in range(12)])
+    for permutation in permutations:
+        moved = fmpz_mat(
+            12,
+            12,
+            [int(i == j == 0 or (i and j and permutation[i - 1] == j - 1)) for i in range(12) for j in range(12)],
+        )
+        word = QUADRATIC * moved * word
+    degrees = [int((word**n)[0, 0]) for n in range(17)]
+    above = min((d.acosh() / n).exp().upper() for n, d in enumerate(map(arb, degrees)) if n)
+    for n in range(1, 9):
+        bound = lower_bound(degrees[2 * n], degrees[n], n)
+        assert bound is None or bound.lower() <= above
+
+
+def test_printed_bounds_are_rounded_outward():
+    assert lower_bound(10, 3, 1).contains(2)  # x + 1/x = 9/2 - 2
+    assert _less(arb(2)) == "1.999999"
+    assert _less(arb(2).sqrt()) == "1.414213"
+    assert _less(arb(2, 1e-3)) == "1.998999"
+    assert _decimal(_ceiling(arb(2).sqrt().upper())) == "1.414214"
+    assert _decimal(_ceiling(arb(2))) == "2"
 
 
 def test_a_map_that_is_not_birational_is_refused(monkeypatch):

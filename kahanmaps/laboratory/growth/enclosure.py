@@ -1,14 +1,14 @@
 """The dynamical degree of a planar birational map between two bounds, proved: is it more than 1?
 
-A birational map f of the plane acts by an isometry on a hyperbolic space of infinite dimension, which moves the class
-of a line by arccosh(deg f^n) under f^n; its translation length is log lambda, lambda the dynamical degree
-(boucksom-favre-jonsson-2008, over any algebraically closed field cantat-lamy-2013). Four points of such a space satisfy
-the inequality of hyperbolicity with log 2 (nica-spakula-2016), from which for every n
+A birational map f of the plane acts by an isometry on a hyperbolic space of infinite dimension; e the class of a line,
+e . f^n e = deg f^n = D_n. Its translation length is log lambda, lambda the dynamical degree
+(boucksom-favre-jonsson-2008, over any algebraically closed field cantat-lamy-2013). For every n
 
-    n log lambda >= arccosh(deg f^2n) - arccosh(deg f^n) - 2 log 2        (coornaert-delzant-papadopoulos-1990)
+    2 cosh(n log lambda) + 2 >= (D_2n - 1) / (D_n - 1),    and    lambda <= D_n^(1/n).
 
-as soon as the right side is positive; and lambda <= (deg f^n)^(1/n). The lower bound is computed for f_p, the map
-modulo a prime p with eps a residue: deg f_p^n <= deg f^n for every n, so that lambda(f_p) <= lambda(f). For it
+For u = f^n e - e this says that (f^n u) . u is at most cosh(n log lambda) times u . u in absolute value. Where
+lambda = 1 it says D_2n - 1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map modulo a prime p with eps a
+residue: deg f_p^n <= deg f^n for every n, so that lambda(f_p) <= lambda(f). For it
 
 * deg f_p^2n is bounded below by the degree along one line, exactly;
 * deg f_p^n is bounded above by the degrees along K lines that touch a conic. On a line the degree falls by the
@@ -57,8 +57,9 @@ _MOST_NEXT_TERMS = 4000  # of the last one, which has about degree^2 times as ma
 class Enclosure:
     """Bounds of the dynamical degree of a planar map that are proved, for generic eps or for the eps given.
 
-    `lower` and `upper` are decimal numbers, rounded down and up. `lower` is that of the map modulo `prime` at `eps`, a
-    residue, and comes from deg f^(2 steps) >= `degree_below`, deg f^steps <= `degree_above`.
+    `lower` and `upper` are decimal numbers, rounded down and up; the dynamical degree is more than `lower`, for generic
+    eps and then for all but finitely many. `lower` is that of the map modulo `prime` at `eps`, a residue, and comes
+    from deg f^(2 steps) >= `degree_below`, deg f^steps <= `degree_above`.
     """
 
     lower: str
@@ -93,16 +94,16 @@ def enclose(
 ) -> Enclosure | None:
     """Bounds of the dynamical degree of a planar map, the lower one above 1: positive entropy, proved.
 
-    `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), which is for all eps but countably
-    many. Returns None for algebraic coefficients, and where no lower bound above 1 was found in about `seconds`
-    seconds. Then nothing is said: there is none for an integrable map.
+    `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), and for all but finitely many eps.
+    Returns None for algebraic coefficients, and where no lower bound above 1 was found in about `seconds` seconds. Then
+    nothing is said: there is none for an integrable map.
 
     Source: docs/mathematics.md.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = enclose(load("lotka_volterra").map, None)
     >>> found.lower, found.upper
-    ('1.571456', '2')
+    ('1.973638', '2')
     >>> enclose(load("nahm_tetrahedral").map, None, seconds=0.1) is None
     True
     """
@@ -160,14 +161,18 @@ def degree_above(largest: int, lines: int) -> int:
     return (lines * largest - 6) // (lines - 6)
 
 
-def lower_bound(below: int, above: int, steps: int) -> arb:
-    """A ball with the number that lambda is not less than, from the two degrees; more than 1 if it says anything.
+def lower_bound(below: int, above: int, steps: int) -> arb | None:
+    """The number that the dynamical degree is not less than, if D_2n >= `below` and D_n <= `above`, n = `steps`.
 
-    >>> float(lower_bound(2**20, 2**10, 10)) > 1.7, float(lower_bound(3 * 99, 99, 7)) < 1
-    (True, True)
+    Returns a ball with it, or None where it is not more than 1: where below - 1 <= 4 (above - 1).
+
+    >>> float(lower_bound(2**20, 2**10, 10)) > 1.99, lower_bound(3 * 99, 99, 7)
+    (True, None)
     """
+    if above <= 1 or below - 1 <= 4 * (above - 1):
+        return None
     with flint.ctx.workprec(128):
-        return ((arb(below).acosh() - arb(above).acosh() - 2 * arb(2).log()) / steps).exp()
+        return (arb(fmpq(below - 1, 2 * (above - 1)) - 1).acosh() / steps).exp()
 
 
 def _lower(
@@ -184,10 +189,11 @@ def _lower(
     except Stopped:
         pass
     candidates = range(1, (len(degrees) - 1) // 2 + 1)
-    bounds = {n: lower_bound(degrees[2 * n], degree_above(degrees[n], _LINES), n) for n in candidates if degrees[n]}
-    steps = max(bounds, key=lambda n: float(bounds[n]), default=0)
-    if not steps or not bounds[steps] > 1:
+    likely = {n: lower_bound(degrees[2 * n], degree_above(degrees[n], _LINES), n) for n in candidates}
+    bounds = {n: float(bound) for n, bound in likely.items() if bound is not None}
+    if not bounds:
         return None
+    steps = max(bounds, key=bounds.__getitem__)
     largest = 0
     for start in _tangents(map_.field.characteristic, rng):
         tangent = Line(map_, rng, end, _LARGEST, start)
@@ -200,7 +206,7 @@ def _lower(
         progress(f"dynamical degree: tangents of a conic, degrees of iterate {steps} up to {largest}")
     above = degree_above(largest, _LINES)
     bound = lower_bound(degrees[2 * steps], above, steps)
-    return (_rounded(bound.lower(), down=True), steps, degrees[2 * steps], above) if bound > 1 else None
+    return None if bound is None else (_less(bound), steps, degrees[2 * steps], above)
 
 
 def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
@@ -226,7 +232,7 @@ def _upper(map_: BirationalMap, eps: fmpq | None, end: float) -> str:
             root = arb(degree).root(n)
             best = root if best is None or root < best else best
     assert best is not None
-    return _rounded(best.upper(), down=False)
+    return _decimal(_ceiling(best.upper()))
 
 
 def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Iterator[int]:
@@ -261,9 +267,19 @@ def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Itera
             return
 
 
-def _rounded(bound: arb, down: bool) -> str:
-    """An exact number with a few decimals, rounded down or up."""
-    scaled = bound * 10**_DIGITS
-    whole = int((scaled.floor() if down else scaled.ceil()).unique_fmpz())
-    text = f"{whole // 10**_DIGITS}.{whole % 10**_DIGITS:0{_DIGITS}d}"
+def _less(bound: arb) -> str:
+    """The largest number with a few decimals that is less than all of a ball.
+
+    Less, not at most: that the dynamical degree is more than it holds for all but finitely many eps.
+    """
+    return _decimal(_ceiling(bound.lower()) - 1)
+
+
+def _ceiling(end: arb) -> int:
+    """In units of the last decimal; `end` is exact."""
+    return int((end.fmpq() * 10**_DIGITS).ceil())
+
+
+def _decimal(units: int) -> str:
+    text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"
     return text.rstrip("0").rstrip(".")
