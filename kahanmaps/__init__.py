@@ -33,14 +33,23 @@ _HIDDEN = {"map_at", "draw_orbits", "map"}  # the last is the name of a builtin,
 __all__ = list(dict.fromkeys(name for name in (*_MODULE_OF, *_OTHER_NAMES) if name not in _HIDDEN))
 
 
+_VALUES: dict[str, Any] = {}  # by name. Not in globals(), where doctest takes the functions for ones of this file
+
+
 def __getattr__(name: str) -> Any:
+    if name in _VALUES:
+        return _VALUES[name]
     known = _OTHER_NAMES.get(name, name)
-    known = _OTHER_NAMES.get(known, known)
-    if known in _MODULE_OF:
-        value = opened(getattr(import_module(_MODULE_OF[known]), known))
-        globals()[name] = value
-        return value
-    raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}{suggestion(name, __all__)}")
+    if known != name and known in __all__:  # one function under two names
+        value = __getattr__(known)
+    elif known in _MODULE_OF:
+        function = getattr(import_module(_MODULE_OF[known]), known)
+        value = opened(function)
+        if value is not function:  # pickle looks for it here, not where `function` is
+            value.__module__, value.__name__, value.__qualname__ = __name__, name, name
+    else:
+        raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}{suggestion(name, __all__)}")
+    return _VALUES.setdefault(name, value)  # two threads get the same
 
 
 def __dir__() -> list[str]:

@@ -2,10 +2,12 @@
 
 import copy
 import json
+import multiprocessing
 import pickle
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from fractions import Fraction
 
+import flint
 import numpy as np
 import pytest
 
@@ -36,8 +38,63 @@ def test_systems_maps_and_orbits_are_copied_and_pickled(again):
     assert again(phi @ phi) == phi**2
     assert again(phi).field is phi.field
     assert again(km.System(FISH).system) == km.System(FISH).system
-    walk = km.orbit(FISH, [1, 2], "1/5", 3)
-    assert list(again(walk)) == list(walk)
+    for arithmetic in ("exact", "float", "mod:101", f"mod:{2**127 - 1}", "ball:100"):
+        walk = km.orbit(FISH, [1, 2], "1/5", 3, arithmetic=arithmetic)
+        assert list(map(repr, again(walk))) == list(map(repr, walk))
+    floats = km.ensemble(FISH, [["1/2", "1/3"], [0, "1/4"]], "1/5", 9)
+    assert np.array_equal(again(floats).x, floats.x)
+
+
+@pytest.mark.parametrize("name", [*km.__all__, "map", "plot"])
+def test_public_names_are_the_same_after_a_pickle(name):
+    value = getattr(km, name)
+    again = pickle.loads(pickle.dumps(value))
+    assert again is value or (isinstance(value, str) and again == value)
+    for _ in range(2):
+        assert getattr(km, name) is value
+
+
+def test_a_public_function_has_the_name_under_which_it_is_used():
+    assert km.cycles is km.cycle_census
+    assert km.find_density is km.find_densities
+    assert (km.map.__module__, km.map.__qualname__, km.map.__name__) == ("kahanmaps", "map", "map")
+    assert km.load.__module__ == "kahanmaps.documents.catalog"  # takes a name only, and is not wrapped
+
+
+def test_functions_and_their_results_go_to_other_processes_and_back():
+    """`spawn`, so that the other process imports what it needs by what it is sent."""
+    names = ["euler_top", "volterra_periodic_3"]
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        reports = list(pool.map(km.check_integrals, names))
+        others = [
+            pool.submit(km.find_integrals, "euler_top"),
+            pool.submit(km.analyze, "riccati"),
+            pool.submit(km.degrees, "lyness"),
+            pool.submit(km.map, FISH, "1/5"),
+            pool.submit(km.parse_polynomial, "x + y/2", ("x", "y")),
+        ]
+        search, analysis, growth, phi, polynomial = (other.result() for other in others)
+    assert [report.to_json()["claims"] for report in reports] == [
+        km.check_integrals(n).to_json()["claims"] for n in names
+    ]
+    assert [found.text for found in search.integrals] == [
+        found.text for found in km.find_integrals("euler_top").integrals
+    ]
+    assert analysis.sections
+    assert analysis.parts is km.Analysis.parts
+    assert growth.degrees == km.degrees("lyness").degrees
+    assert phi == km.map(FISH, "1/5")
+    assert polynomial == km.parse_polynomial("x + y/2", ("x", "y"))
+
+
+@pytest.mark.parametrize("text", ["0", "2", "-1/3", "nan", "inf"])
+def test_balls_are_pickled_exactly(text):
+    with flint.ctx.workprec(200):
+        ball = flint.arb(flint.fmpq(-1, 3)) if "/" in text else flint.arb(text)
+        pickled = pickle.dumps([ball, flint.acb(ball, 1)])
+    real, number = pickle.loads(pickled)
+    assert repr(real) == repr(number.real) == repr(ball)
+    assert real.is_nan() or (real.mid() == ball.mid() and real.rad() == ball.rad())
 
 
 def test_threads_may_share_a_system():

@@ -39,6 +39,10 @@ class Analysis(Findings, Printed):
     parts: tuple[Part, ...] = ANALYSES
     interrupted: bool = False
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For `pickle`, which has no names for the functions of the table: there the class says which parts."""
+        return {name: value for name, value in vars(self).items() if value is not ANALYSES}
+
     def interrupt(self) -> None:
         """Leave out the parts that are pending."""
         named = {part.name for part in self.parts if not part.adds}

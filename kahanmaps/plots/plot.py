@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 class Plot:
     """The pictures; `ax.figure.savefig("degrees.pdf")` writes one."""
 
+    def __reduce__(self) -> str:
+        return "plot"  # there is one, `km.plot`
+
     def degrees(self, found: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
         """What `km.degrees` found; `scale` is "linear", "log" or "loglog". Raises InputError for anything else."""
         from kahanmaps.plots.growth import draw_degrees

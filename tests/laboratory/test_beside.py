@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly, fmpz_poly
 
-import kahanmaps.algebra.written.pickles  # noqa: F401
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError

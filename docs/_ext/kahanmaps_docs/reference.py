@@ -25,7 +25,7 @@ def exported() -> dict[str, dict[str, list[str]]]:
 
 def module_of(value: Any) -> str:
     """The module in which a name is made."""
-    return str(getattr(value, "__module__", None) or type(value).__module__)
+    return str(getattr(inspect.unwrap(value), "__module__", None) or type(value).__module__)
 
 
 def api_pages_without_names(docs: Path) -> list[str]:

@@ -14,7 +14,6 @@ from contextlib import suppress
 from multiprocessing.connection import Pipe
 from typing import Any
 
-import kahanmaps.algebra.written.pickles  # noqa: F401
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.processes import end_with_parent

@@ -98,7 +98,14 @@ class Stepping:
         method = "generic" if form is None else "normal form"
         self.name = f"numba {method}, {counted(self.threads, 'thread')}" if compiled else f"numpy {method}"
         self._engine = self._made()
-        self._engine.threads = self.threads
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `pickle`: compiled code and its working arrays are made anew."""
+        return {name: value for name, value in vars(self).items() if name != "_engine"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._engine = self._made()
 
     def _made(self) -> Engine:
         planar: Callable[[PlanarRows], Engine]
@@ -110,9 +117,12 @@ class Stepping:
             from kahanmaps.maps.floats.numpy_kernel import GenericNumpy as generic
             from kahanmaps.maps.floats.numpy_kernel import PlanarNumpy as planar
         if self.rows is not None:
-            return planar(self.rows)
-        engines = [generic(generic_equation(one)) for one in self._map.factors]
-        return engines[0] if len(engines) == 1 else Word(engines)
+            engine = planar(self.rows)
+        else:
+            engines = [generic(generic_equation(one)) for one in self._map.factors]
+            engine = engines[0] if len(engines) == 1 else Word(engines)
+        engine.threads = self.threads
+        return engine
 
     def lanes(self, starts: FloatArray) -> Lanes:
         """Lanes at the starts, an array (n, dim) of finite numbers."""
