@@ -6,8 +6,9 @@ they work with, a `SystemFile`, a system or a map, and know nothing of this.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import wraps
+from itertools import starmap, zip_longest
 from numbers import Real
 from pathlib import Path
 from types import FunctionType
@@ -38,7 +39,10 @@ if TYPE_CHECKING:
         def __call__(self, given: Given, /, *others: Any, time_step: Any, **options: Any) -> R: ...
 
 
-_WHOLE = ("steps", "max_terms", "max_degree", "degree", "samples", "terms", "transient")
+_INTEGERS = {
+    *("steps", "every", "max_terms", "max_degree", "degree", "samples", "terms", "transient"),
+    *("prime", "seed", "max_digits"),
+}
 _FIRST = ("file", "system", "given")  # names of first arguments that stand for a map
 
 
@@ -85,7 +89,8 @@ def opened(function: Callable[Concatenate[Any, P], R]) -> Opened[P, R]:
             options["settings"] = Settings(eps=options.pop("eps"))
         if "other" in names and others:
             others = (_file(others[0]), *others[1:])
-        _require_numbers(dict(zip(names[1:], others, strict=False)) | options)
+        others = tuple(starmap(_number, zip_longest(names[1 : 1 + len(others)], others, fillvalue="")))
+        options = {name: _number(name, value) for name, value in options.items()}
         return function(*map(convert, given[:1]), *others, **options)
 
     return door
@@ -110,13 +115,17 @@ def _orbit_of(given: Any) -> Any:
     return given if isinstance(given, MapOver) else _map(given)
 
 
-def _require_numbers(given: Mapping[str, Any]) -> None:
-    """Raises InputError for times that are no positive numbers and counts that are no integers."""
-    for name, value in given.items():
-        if name == "seconds" and value is not None and not (isinstance(value, Real) and float(value) > 0):
-            raise InputError(f"found {value!r} seconds, expected a positive number")
-        if name in _WHOLE and value is not None and not hasattr(value, "__index__"):
-            raise InputError(f"found {name} = {value!r}, expected an integer")
+def _number(name: str, value: Any) -> Any:
+    """An argument. Raises InputError for times that are no positive numbers and counts that are no integers."""
+    if value is None:
+        return value
+    if name == "seconds" and (isinstance(value, bool) or not (isinstance(value, Real) and float(value) > 0)):
+        raise InputError(f"found {value!r} seconds, expected a positive number")
+    if name in _INTEGERS:
+        from kahanmaps.algebra.fields import integer
+
+        return integer(value, name)
+    return value
 
 
 def _system(given: Any) -> Any:

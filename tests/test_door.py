@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from flint import fmpq
+from flint import arb, fmpq
 
 import kahanmaps as km
 from kahanmaps.algebra.fields import rational
@@ -61,6 +61,62 @@ def test_numbers_of_other_libraries_are_exact_or_refused():
     for value in (0.5, np.float64(0.5), Decimal("0.5"), True):
         with pytest.raises(InputError):
             rational(value)
+
+
+INTEGERS = [np.int64(3), np.uint8(3), np.array(3), np.array(3, dtype=object), fmpq(3), "3", np.str_("3")]
+NO_NUMBERS = [
+    (True, "found True, expected a number"),
+    (np.True_, "found True, expected a number"),
+    (np.array(True), "found True, expected a number"),
+    (np.array([3]), r"found array\(\[3\]\) of numpy, expected one exact number"),
+    (np.timedelta64(3, "s"), "of numpy, expected one exact number"),
+    *((value, "found the machine number 3.*expected an exact one") for value in (3.0, np.float32(3), np.array(3.0))),
+]
+EXACT = {
+    "rational numbers": lambda value: km.QQ.convert(value),
+    "residues": lambda value: int(km.GF(101).convert(value)),
+    "eps": lambda value: km.KahanMap(km.load("weierstrass").system, value).eps,
+    "a point": lambda value: km.orbit("weierstrass", [value, 2], "1/10", 1)[0].x[0],
+    "a parameter": lambda value: km.System({"x": "a*y", "y": "x"}, a=value).system.rhs[0].leading_coefficient(),
+    "a right-hand side": lambda value: km.System([value, "x"], "x y").system.rhs[0].leading_coefficient(),
+}
+
+
+@pytest.mark.parametrize("use", EXACT.values(), ids=EXACT)
+def test_integers_of_numpy_are_exact_numbers_and_booleans_and_floats_are_not(use):
+    for value in INTEGERS:
+        assert use(value) == 3
+    for value, words in NO_NUMBERS:
+        with pytest.raises(InputError, match=words):
+            use(value)
+
+
+COUNTS = {
+    "steps": lambda value: len(km.orbit("weierstrass", [1, 2], "1/10", value)) - 1,
+    "every": lambda value: km.orbit("weierstrass", [1, 2], "1/10", 3, every=value)[1].step,
+    "a step of at": lambda value: km.orbit("weierstrass", [1, 2], "1/10", at=[value])[0].step,
+    "max_terms": lambda value: len(km.degrees("weierstrass", max_terms=value).degrees) - 1,
+    "degree": lambda value: km.darboux_polynomials("weierstrass", value, seconds=9) and 3,
+    "the power": lambda value: (km.map("weierstrass", "1/10") ** value == km.map("weierstrass", "1/10") ** 3) * 3,
+    "the modulus": lambda value: km.GF(value).characteristic,
+    "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,
+    "m": lambda value: km.draw_generic(value, 1).m,
+    "the seed": lambda value: (
+        3 if km.draw_with_eigenvalues([1, 2], value).A == km.draw_with_eigenvalues([1, 2], 3).A else 0
+    ),
+    "an entry": lambda value: 3 if km.find_recurrence([value, 6, 12, 24, 48, 96]).rate.text == "2" else 0,
+}
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_counts_are_integers_of_any_library_but_no_booleans_and_floats(name):
+    for value in (3, np.int64(3), np.uint8(3), np.array(3)):
+        assert COUNTS[name](value) == 3
+    for value in (True, np.True_, np.array(True), 3.0, np.float64(3), np.array(3.0), np.array([3]), "3"):
+        with pytest.raises(InputError, match=f"found {name} = .*, expected an integer"):
+            COUNTS[name](value)
+    with pytest.raises(InputError, match=r"found at = 3, expected a sequence of steps, at=\[3\]"):
+        km.orbit("weierstrass", [1, 2], "1/10", at=3)
 
 
 def test_the_time_step_is_twice_eps():
@@ -272,6 +328,63 @@ def test_points_of_an_orbit_are_the_same_however_one_asks():
     field = km.load("euler_top", a1="root of t^2 - 2")
     with pytest.raises(InputError, match='arithmetic="float"'):
         np.asarray(km.orbit(field, [1, 2, 3], "1/10", 2))
+
+
+@pytest.mark.parametrize("prime", [101, 2**53 + 5, 2**61 - 1, 2**127 - 1])
+def test_arrays_of_residues_are_exact_or_refused(prime):
+    walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=f"mod:{prime}")
+    rows = [[int(x) for x in point.x] for point in walk]
+    assert max(map(max, rows)) > prime // 2
+    table = np.asarray(walk)
+    assert table.dtype == (np.int64 if prime < 2**63 else object)
+    assert table.tolist() == np.asarray(walk, dtype=object).tolist() == rows
+    assert all(type(x) is int for x in np.asarray(walk, dtype=object).flat)
+    for kind in (np.int64, np.uint64, np.int16, np.uint8):
+        if max(map(max, rows)) <= np.iinfo(kind).max:
+            assert np.asarray(walk, dtype=kind).tolist() == rows
+        else:
+            with pytest.raises(InputError, match=r"found the coordinate \d+.*, expected integers.*take dtype=object"):
+                np.asarray(walk, dtype=kind)
+    if prime < 2**53:
+        assert np.asarray(walk, dtype=float).tolist() == rows
+    else:
+        with pytest.raises(InputError, match=f"rounds residues modulo {prime}, expected dtype=int or dtype=object"):
+            np.asarray(walk, dtype=float)
+
+
+def test_arrays_of_objects_have_the_coordinates_of_the_points():
+    for arithmetic, kind in (("exact", fmpq), ("float", float), ("ball:64", arb)):
+        walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=arithmetic)
+        table = np.asarray(walk, dtype=object)
+        assert table.shape == (6, 3)
+        assert [tuple(map(repr, row)) for row in table] == [tuple(map(repr, point.x)) for point in walk]
+        assert all(type(x) is kind for x in table.flat)
+    field = km.load("euler_top", a1="root of t^2 - 2")
+    walk = km.orbit(field, [1, 2, 3], "1/10", 2)
+    assert [tuple(row) for row in np.asarray(walk, dtype=object)] == [point.x for point in walk]
+
+
+def test_arrays_of_integers_are_exact_or_refused():
+    grows = km.orbit("x' = x; y' = 0", [1, 5], 1 / fmpq(3), 70)  # x~ = 2 x
+    assert np.asarray(grows, dtype=object)[70, 0] == 2**70
+    for steps, kind in ((62, np.int64), (63, np.uint64), (6, np.int8)):
+        assert np.asarray(km.orbit("x' = x; y' = 0", [1, 5], "1/3", steps), dtype=kind)[-1].tolist() == [2**steps, 5]
+        with pytest.raises(InputError, match=f"found the coordinate {2 ** (steps + 1)}, expected integers"):
+            np.asarray(km.orbit("x' = x; y' = 0", [1, 5], "1/3", steps + 1), dtype=kind)
+    with pytest.raises(InputError, match="found the coordinate -1, expected integers from 0"):
+        np.asarray(km.orbit("x' = x; y' = 0", [-1, 5], "1/3", 1), dtype=np.uint64)
+    words = {"exact": "the coordinate 65/37", "float": r"the coordinate 1\.756\d*", "ball:64": "ball:64 arithmetic"}
+    for arithmetic, found in words.items():
+        with pytest.raises(InputError, match=f"found {found}, expected .*take .*dtype=object"):
+            np.asarray(km.orbit("euler_top", [1, 2, 3], "1/10", 1, arithmetic=arithmetic), dtype=int)
+    floats = km.orbit("x' = x; y' = 0", [1, 5], "1/3", 0, arithmetic="float")
+    assert np.asarray(floats, dtype=int).tolist() == [[1, 5]]
+    with pytest.raises(InputError, match="found the dtype bool, expected one of floats or integers, or object"):
+        np.asarray(grows, dtype=bool)
+    assert np.asarray(grows, dtype=np.float32).dtype == np.float32
+    assert np.asarray(grows, dtype=complex)[2].tolist() == [4, 5]
+    with pytest.raises(ValueError, match="expected copy=None"):
+        np.array(grows, copy=False)
 
 
 def test_a_table_of_pandas_is_made_of_the_rows(monkeypatch, tmp_path):

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
 from numbers import Rational
+from operator import index
 from typing import Any, Self
 
 import flint
@@ -67,14 +68,44 @@ def rational(value: Any) -> fmpq:
         raise InputError(f"found {value}, expected a number")
     if isinstance(value, int | fmpz):
         return fmpq(value)
+    kind = _numpy_kind(value)
+    if kind and kind in "biuO":
+        return rational(value.item())
+    if kind and kind not in "fc":
+        raise InputError(f"found {value!r} of numpy, expected one exact number")
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
-    if isinstance(value, float | complex) or type(value).__module__ == "numpy":
+    if isinstance(value, float | complex) or kind:
         raise InexactNumber(
             f"found the machine number {value!s}, expected an exact one: "
             f'write an integer, p/q or a decimal as text, e.g. "{_example(str(value))}"'
         )
     raise InputError(f"found {value!r} of type {type(value).__name__}, expected an exact number")
+
+
+def integer(value: Any, name: str) -> int:
+    """An integer of Python, FLINT, numpy or SymPy as an int; `name` says in the message of InputError what it is.
+
+    >>> integer(7, "m")
+    7
+    >>> integer(True, "m")
+    Traceback (most recent call last):
+        ...
+    kahanmaps.errors.InputError: found m = True, expected an integer
+    """
+    if not isinstance(value, bool) and _numpy_kind(value) in ("", "i", "u"):
+        try:
+            return index(value)
+        except TypeError:
+            pass
+    raise InputError(f"found {name} = {value!r}, expected an integer")
+
+
+def _numpy_kind(value: Any) -> str:
+    """The kind of a number of numpy: b, i, u, f, c, O or another; "array" of an array, nothing of anything else."""
+    if not hasattr(value, "dtype") or not hasattr(value, "ndim"):
+        return ""
+    return str(value.dtype.kind) if value.ndim == 0 else "array"
 
 
 class Field(ABC):
@@ -470,7 +501,6 @@ class ComplexBallField(_Balls):
 QQ = RationalField()
 
 
-@lru_cache(maxsize=256)
 def GF(prime: int) -> PrimeField:
     """The field of `prime` elements.
 
@@ -483,8 +513,11 @@ def GF(prime: int) -> PrimeField:
         ...
     kahanmaps.errors.InputError: found the modulus 91, expected a prime: 91 is composite
     """
-    if isinstance(prime, bool) or not isinstance(prime, int):
-        raise InputError(f"found the modulus {prime!r}, expected a prime number as an integer")
+    return _prime_field(integer(prime, "the modulus"))
+
+
+@lru_cache(maxsize=256)
+def _prime_field(prime: int) -> PrimeField:
     if prime < 2:
         raise InputError(f"found the modulus {prime}, expected a prime, at least 2")
     if prime.bit_length() > MAX_PRIME_BITS:

@@ -21,7 +21,7 @@ def formula_text(value: Any) -> str:
     >>> formula_text("x*y"), formula_text(2)
     ('x*y', '2')
     """
-    if isinstance(value, _NUMBERS) or type(value).__module__ == "numpy":
+    if isinstance(value, _NUMBERS) or (type(value).__module__ == "numpy" and not isinstance(value, str)):
         return str(rational(value))
     if not _is_sympy(value):
         return str(value)

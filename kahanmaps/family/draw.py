@@ -14,7 +14,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
-from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import InputError
@@ -37,7 +37,7 @@ def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) 
     """
     values = [rational(value) for value in eigenvalues]
     m = _require_m(len(values))
-    rng = random.Random(seed)
+    rng = random.Random(integer(seed, "the seed"))
     normal = fmpq_mat(2 * m, 2 * m)
     for i, value in enumerate(values):
         normal[i, i] = normal[m + i, m + i] = value
@@ -62,7 +62,7 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     """
     m = _require_m(chi.degree())
     chi = chi / chi.leading_coefficient()
-    rng = random.Random(seed)
+    rng = random.Random(integer(seed, "the seed"))
     companion = fmpq_mat(m, m)
     for i in range(m):
         companion[i, m - 1] = -chi[i]
@@ -98,7 +98,7 @@ def draw_generic(m: int, seed: int, size: int = 1) -> FamilyMember:
     >>> draw_generic(3, seed=7).is_generic
     True
     """
-    _require_m(m)
+    m = _require_m(m)
     rng = random.Random(f"chi {seed}")
     while True:
         chi = fmpq_poly([rng.choice((-3, -2, -1, 1, 2, 3)), *(rng.randint(-2, 2) for _ in range(m - 1)), 1])
@@ -126,7 +126,7 @@ def random_eigenvalues(m: int, seed: int) -> list[int]:
     >>> len(set(random_eigenvalues(5, seed=1)))
     5
     """
-    _require_m(m)
+    m = _require_m(m)
     values = [value for value in range(-m - 1, m + 2) if value != 0]
     return random.Random(f"eigenvalues {seed}").sample(values, m)
 
@@ -200,6 +200,7 @@ def _coefficients(rng: random.Random, m: int, size: int) -> list[int]:
 
 
 def _require_m(m: int) -> int:
+    m = integer(m, "m")
     if not 1 <= m <= MAX_M:
         raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M} (dimension 2m)")
     return m

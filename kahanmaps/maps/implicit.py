@@ -28,7 +28,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.chance import random_prime_field, seed_for
-from kahanmaps.algebra.fields import QQ, Field, rational
+from kahanmaps.algebra.fields import QQ, Field, integer, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
 from kahanmaps.algebra.roots import Root
@@ -112,8 +112,7 @@ class MapOver(ABC):
 
     def __pow__(self, power: int) -> MapOver:
         """So many steps as one map, of the inverse for a negative number, the identity for 0."""
-        if not isinstance(power, int):
-            raise InputError(f"found the power {power!r}, expected an integer: a map has no roots here")
+        power = integer(power, "the power")
         if power == 0:
             return self._at_rest()
         return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.fields import QQ, integer
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, linear_combinations, names_of
 from kahanmaps.displayed import DisplayedAsFormula
@@ -27,7 +27,7 @@ def standard_structure(dim: int) -> fmpq_mat:
     [ 0, 1]
     [-1, 0]
     """
-    if dim % 2 or dim <= 0:
+    if integer(dim, "the dimension") % 2 or dim <= 0:
         raise InputError(f"the standard structure J = [[0, I], [-I, 0]] needs an even dimension, found {dim}")
     m = dim // 2
     return fmpq_mat(dim, dim, [(j == i + m) - (i == j + m) for i in range(dim) for j in range(dim)])

@@ -19,9 +19,9 @@ from typing import Any
 import flint
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
 
+from kahanmaps.algebra.fields import integer
 from kahanmaps.algebra.written.plain import attributes, plain
 from kahanmaps.algebra.written.text import format_univariate
-from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
@@ -235,9 +235,7 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     >>> find_recurrence([2, 3, 5, 7, 11, 13, 17, 19]) is None
     True
     """
-    for value in values:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise InputError(f"found {value!r} in the sequence, expected integers")
+    values = [integer(value, "an entry") for value in values]
     if len(values) < 2:
         return None
     polynomial = _context().minpoly(list(values))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import QQ, BallField, Field
+from kahanmaps.algebra.fields import QQ, BallField, Field, integer
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
@@ -366,7 +366,5 @@ def _digits(bits: int) -> int:
 
 def require_steps(steps: int | None) -> None:
     """Raises InputError for a negative number of steps, and one that is not whole."""
-    if steps is not None and not hasattr(steps, "__index__"):
-        raise InputError(f"found {steps!r} steps, expected a whole number")
-    if steps is not None and steps < 0:
+    if steps is not None and integer(steps, "steps") < 0:
         raise InputError(f"found {steps} steps, expected 0 or more (for the inverse map, step backward)")

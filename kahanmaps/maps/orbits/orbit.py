@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import cached_property
@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
-from kahanmaps.algebra.fields import GF, Field, rational
+from kahanmaps.algebra.fields import GF, Field, integer, rational
 from kahanmaps.algebra.written.plain import json_float
 from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.displayed import data_frame
@@ -105,13 +105,15 @@ def orbit(
     if (steps is None) == (at is None):
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
     require_steps(steps)
-    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+    if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
     start = _numbers(start, arithmetic)
-    far = max(at, default=0) if at is not None else (steps or 0)
+    if not isinstance(at, Iterable | None):
+        raise InputError(f"found at = {at!r}, expected a sequence of steps, at=[{at}]")
+    wanted = None if at is None else frozenset(integer(step, "a step of at") for step in at)
+    far = max(wanted, default=0) if wanted is not None else (steps or 0)
     require_steps(far)
-    wanted = None if at is None else frozenset(at)
     asked = _Asked(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     if isinstance(given, MapOver):
         return _orbit_at_one_eps(asked, field)
@@ -355,17 +357,43 @@ class Trajectory:
         return replace(end, message=message), more
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
-        """The coordinates (points, dim), rounded to doubles. Raises InputError for balls and over number fields."""
+        """The coordinates (points, dim) as an array for `numpy.asarray`.
+
+        Args:
+            dtype: float64 by default, to which exact numbers are rounded; of residues int64, or object where they do
+                not fit. `object` has the coordinates as they are: fmpq, elements of a number field, balls, float, and
+                residues as int. An integer dtype has them exactly.
+
+        Raises:
+            InputError: for what the dtype does not hold: numbers that are no integers or too large for an integer
+                dtype; balls, algebraic numbers, and residues that are rounded, for floats.
+        """
         import numpy as np
 
+        if copy is False:
+            raise InputError("found copy=False, expected copy=None: an orbit has no array before it is asked for one")
+        prime = self.arithmetic.number if self.arithmetic.kind == "mod" else 0
+        rows: list[list[Any]] = [[int(x) if prime else x for x in point.x] for point in self.points]
+        default = np.float64 if not prime else np.int64 if prime < 2**63 else object
+        kind = np.dtype(default if dtype is None else dtype)
+        if kind.kind == "O":
+            table = np.empty((len(rows), len(self.variables)), dtype=object)
+            for at in np.ndindex(table.shape):
+                table[at] = rows[at[0]][at[1]]
+            return table
+        if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
+            raise InputError(
+                f'found {self.arithmetic} arithmetic, expected numbers: take arithmetic="float", or dtype=object'
+            )
+        if kind.kind in "iu":
+            return np.array([[_held(x, kind, np.iinfo(kind)) for x in row] for row in rows], dtype=kind)
+        if kind.kind not in "fc":
+            raise InputError(f"found the dtype {kind}, expected one of floats or integers, or object")
+        if prime > 2 ** (np.finfo(kind).nmant + 1):
+            raise InputError(f"found {kind}, which rounds residues modulo {prime}, expected dtype=int or dtype=object")
         from kahanmaps.maps.floats.doubles import to_float
 
-        if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
-            raise InputError(f'found {self.arithmetic} arithmetic, expected numbers: take arithmetic="float"')
-        rows = [[to_float(x) if isinstance(x, fmpq) else float(int(x)) for x in p.x] for p in self.points]
-        if self.arithmetic.kind == "float":
-            rows = [list(p.x) for p in self.points]
-        return np.array(rows, dtype=dtype or np.float64)
+        return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=kind)
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # `list` asks for the length between here and the first point
@@ -383,6 +411,19 @@ class Trajectory:
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+def _held(x: Any, kind: Any, limits: Any) -> int:
+    """A coordinate as an integer that the kind of an array holds. Raises InputError for others."""
+    number = fmpq(*x.as_integer_ratio()) if isinstance(x, float) and math.isfinite(x) else x
+    whole = int(number.p) if isinstance(number, fmpq) and number.q == 1 else number
+    if isinstance(whole, int) and limits.min <= whole <= limits.max:
+        return whole
+    text = str(x)
+    raise InputError(
+        f"found the coordinate {text if len(text) < 50 else text[:40] + '...'}, expected integers from {limits.min} "
+        f"to {limits.max} for {kind}: take dtype=object, which has all numbers as they are, or dtype=float"
+    )
 
 
 def _numbers(start: Any, arithmetic: Arithmetic) -> Sequence[Any]:
