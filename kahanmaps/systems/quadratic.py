@@ -233,8 +233,8 @@ class SystemOver:
                     is_square = len(where) == 2 and where[0] == where[1]
                     value = field.convert(coefficient * 2 if is_square else coefficient)
                     for exponent, at in zip(monomial[n:], values, strict=True):
-                        if exponent:
-                            value = value * at ** int(exponent)
+                        for _ in range(exponent):  # a power of a ball around 0 is nan in python-flint 0.9.0
+                            value = value * at
                     if len(where) == 2:
                         j, k = where
                         add(tensor, (i * n + j) * n + k, value)

@@ -20,7 +20,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.floats import steps as float_steps
-from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, _factors, planar_blocks
+from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, _factors, _sine, _Unclear, planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
@@ -42,6 +42,17 @@ FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
 over_members = pytest.mark.parametrize("name", MEMBERS)
 KERNELS = ["numpy", pytest.param("numba", marks=pytest.mark.skipif(not has_numba(), reason="numba is not installed"))]
 over_kernels = pytest.mark.parametrize("kernel", KERNELS)
+
+
+def test_lines_at_right_angles_are_not_parallel():
+    """Their product is a ball around exactly 0, whose square is nan in python-flint 0.9.0."""
+    for radius in (0, 1e-30):
+        one, small = acb(1), acb(arb(0, radius))
+        right, parallel = ([one, small], [small, one]), ([one, small], [one, small])
+        assert _sine(right, [[one, small], [small, one]]) == pytest.approx(1, abs=1e-15)
+        assert _sine(parallel, [[one, small], [small, one]]) == 0
+    with pytest.raises(_Unclear):
+        _sine(([one, one], [acb(arb(0, 1)), acb(arb(0, 1))]), [[one, one], [one, one]])
 
 
 def member_of_repeated_factor():

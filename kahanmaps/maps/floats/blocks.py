@@ -275,7 +275,11 @@ def _inverse(frame: Frame) -> Frame:
 def _sine(frame: Frame, rows: list[list[acb]]) -> float:
     """The sine of the angle between two forms in u and v, as forms in x."""
     one, two = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
-    cosine = abs(_inner(one, two)) ** 2 / (_inner(one, one).real * _inner(two, two).real)
+    size = abs(_inner(one, two))
+    # Not size**2: in python-flint 0.9.0 every power but the 0th of an arb with the midpoint 0 and a radius is nan.
+    cosine = size * size / (_inner(one, one).real * _inner(two, two).real)
+    if not cosine.is_finite():
+        raise _Unclear
     return float((1 - cosine).mid()) ** 0.5 if cosine < 1 else 0.0
 
 
