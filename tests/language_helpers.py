@@ -1,6 +1,7 @@
 """What the tests of `convert` share: systems, the values that a converted file has to give, and programs to run it."""
 
 import json
+import os
 import random
 import re
 import shutil
@@ -152,10 +153,15 @@ print(json.dumps(printed))
 """
 
 
-def run_python(scripts: dict[str, str]) -> dict[str, list[str]]:
+def run_python(scripts: dict[str, str], **environment: str) -> dict[str, list[str]]:
     """The lines that scripts print, each in a namespace of its own, all in one process."""
     done = subprocess.run(
-        [sys.executable, "-c", _DRIVER], input=json.dumps(scripts), capture_output=True, text=True, timeout=100
+        [sys.executable, "-c", _DRIVER],
+        input=json.dumps(scripts),
+        capture_output=True,
+        text=True,
+        timeout=100,
+        env={**os.environ, **environment},
     )
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))

@@ -4,6 +4,7 @@ Loading SymPy takes a second: all scripts are run by one process, each in a name
 """
 
 import pytest
+from flint import fmpq
 from language_helpers import converted, numbers, question_in_python, run_python, systems
 
 import kahanmaps as km
@@ -103,6 +104,32 @@ def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themsel
 
 def test_an_algebraic_parameter_is_an_argument(printed):
     assert printed["algebraic"] == ["True", "True", "False"]
+
+
+NUMBERS = """
+from fractions import Fraction
+from flint import fmpq, fmpz
+from sympy.external.gmpy import GROUND_TYPES
+print(GROUND_TYPES)
+for kind in (fmpq, Fraction, Rational, lambda p, q: f"{p}/{q}", lambda p, q: str(p / q), lambda p, q: p / fmpq(q)):
+    image = kahan_map([kind(-1, 2), kind(3, 4), fmpz(10) ** 30], kind(1, 8), kind(5, 4))
+    print([str(entry) for entry in image])
+    print(integral_F1((kind(1, 2), 2, kind(3, 4)), kind(1, 8), kind(5, 4)))
+print(kahan_matrix([1, 2, 3], 0.5)[1])
+"""
+
+
+@pytest.mark.parametrize("ground", ["flint", "python"])
+def test_numbers_are_exact_whatever_ground_types_sympy_has(ground):
+    """sympify makes floats of the numbers of FLINT where SymPy does not work with them itself."""
+    text = convert(km.load("euler_top"), "sympy", symbols=["a1"]) + NUMBERS
+    ground_types, *lines, of_a_float = run_python({"": text}, SYMPY_GROUND_TYPES=ground)[""]
+    top = km.load("euler_top", a1="5/4")
+    image = km.map(top, "1/8")(["-1/2", "3/4", 10**30])
+    integral = top.integrals["F1"].value(km.QQ, [fmpq(1, 2), fmpq(2), fmpq(3, 4), fmpq(1, 8)])
+    assert ground_types == ground
+    assert lines == [str([str(entry) for entry in image]), str(integral)] * 6
+    assert "." in of_a_float  # control: floats stay floats
 
 
 def test_a_sum_of_many_terms_does_not_exhaust_the_parser(printed):
