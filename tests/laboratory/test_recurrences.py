@@ -69,7 +69,7 @@ def test_one_wrong_term_is_noticed():
 
 
 def test_wrong_values_are_refused():
-    with pytest.raises(InputError, match=r"found 1\.5 in the sequence"):
+    with pytest.raises(InputError, match=r"found an entry = 1\.5, expected an integer"):
         find_recurrence([1, 1.5])
 
 
