@@ -16,7 +16,7 @@ for point in orbit:
 print(orbit.end.status)
 
 of_the_flow = km.parse_rational_function("2*x1^2 + x2^2", [*top.variables, "eps"])
-for finding in km.check_integrals(top, extra={"of the flow": of_the_flow}).findings:
+for finding in km.check_integrals(top, extra={"of the flow": of_the_flow}, known=True).findings:
     print(f"{finding.verdict}: {finding.claim}")
     if finding.witness:
         print(f"  at x = {finding.witness.point}, eps = {finding.witness.eps}:", end=" ")

@@ -96,7 +96,7 @@ COUNTS = {
     "every": lambda value: km.orbit("weierstrass", [1, 2], "1/10", 3, every=value)[1].step,
     "a step of at": lambda value: km.orbit("weierstrass", [1, 2], "1/10", at=[value])[0].step,
     "max_terms": lambda value: len(km.degrees("weierstrass", max_terms=value).degrees) - 1,
-    "degree": lambda value: km.darboux_polynomials("weierstrass", value, seconds=9) and 3,
+    "degree": lambda value: km.darboux_polynomials("weierstrass", value, seconds=9).degree,
     "the power": lambda value: (km.map("weierstrass", "1/10") ** value == km.map("weierstrass", "1/10") ** 3) * 3,
     "the modulus": lambda value: km.GF(value).characteristic,
     "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,

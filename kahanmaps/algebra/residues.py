@@ -53,12 +53,13 @@ def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
 def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
     """The fraction n/d with this residue for which |n| d is least, if that is below modulus / 2^spare_bits.
 
-    There is at most one such fraction, and a random residue has one with a probability of about 2^-spare_bits times the
-    bits of the modulus. The numerator may be much longer than the denominator or the reverse. Exact.
+    A random residue has such a fraction with a probability of about 2^-spare_bits times the bits of the modulus, and so
+    has the residue of a simple fraction another one, if the modulus is random: one near a power of 10 is close to small
+    multiples of such powers. The numerator may be much longer than the denominator or the reverse. Exact.
 
-    >>> m = 10**40 + 121
-    >>> simple_fraction(10**25 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
-    (10000000000000000000000000/7, None)
+    >>> m = (2**61 - 1) * (2**63 - 25)
+    >>> simple_fraction(10**20 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
+    (100000000000000000000/7, None)
     """
     above, below = (modulus, 0), (residue % modulus, 1)
     best = below

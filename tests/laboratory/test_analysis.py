@@ -75,7 +75,7 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     special, generic = analyze(system(*FOUR), eps=1), analyze(system(*FOUR))
     assert (special.conclusion.kind, special.integrals.profile.period) == ("linearisable", 4)
     assert special.conclusion.sentence == (
-        "Orbits close after 4 steps (measured): the map is periodic there; bounded growth, dynamical degree 1. "
+        "The map is periodic: Phi^4 is the identity (proved); 2 independent integrals in dimension 2. "
         "All this at eps = 1 only: other eps may differ."
     )
     assert (generic.conclusion.kind, generic.conclusion.integrals) == ("integrable", 1)

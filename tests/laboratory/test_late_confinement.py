@@ -114,9 +114,13 @@ def test_seven_degrees_are_explained_by_a_pattern_that_is_longer():
     # Without what the singularities explain there is an estimate only.
     length = max(found.patterns.lengths)
     measured = replace(found, patterns=replace(found.patterns, series=()))
-    assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (None, None, Growth.UNKNOWN)
+    assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (
+        None,
+        None,
+        Growth.EXPONENTIAL,
+    )  # proved by its bounds
     assert measured.growth_text == (
-        "exponential growth by a factor of about 2 (estimated: the last quotients are 2 to 2; "
+        "exponential growth (proved), by a factor of about 2 (estimated: the last quotients are 2 to 2; "
         f"after a pattern of {length} steps {length + 2} "
         "iterates are needed (--seconds, --max-degree))"
     )
@@ -127,7 +131,7 @@ def test_degrees_that_the_singularities_do_not_explain_are_no_result():
     found = degree_growth(load("euler_top").system)
     other = replace(found, degrees=(*found.degrees[:8], found.degrees[8] + 1, *found.degrees[9:]))
     assert (found.disagreement, other.disagreement) == (None, 8)
-    assert (other.explained, other.recurrence, other.growth) == (None, None, Growth.UNKNOWN)
+    assert (other.explained, other.recurrence, other.growth) == (None, None, Growth.EXPONENTIAL)  # proved by its bounds
     assert "do not explain the degree of iterate 8" in other.unconfirmed
 
 

@@ -35,7 +35,7 @@ def slow(found, *kinds):
         one.text
         for degrees, some in found.classes
         for one in some
-        if any(o.growth and o.growth.growth in kinds for o in some)
+        if any(o.growth is not None and o.growth.growth in kinds for o in some)
     }
 
 
@@ -139,7 +139,7 @@ def test_points_over_quadratic_fields_have_their_minimal_polynomial():
     rhs = ["x*(x + 2*y)", "-y*(a^2*x + (a^2 - 1)*y)"]"""
     # 2 and 3 are squares modulo all four primes, -1 modulo three of them
     found = scan(parse_system(text), ["a"], primes=(71, 73, 97, 193), terms=4)
-    quadratic = {one.text: one for one in found.components if one.growth and one.growth.growth is Growth.QUADRATIC}
+    quadratic = {c.text: c for c in found.components if c.growth is not None and c.growth.growth is Growth.QUADRATIC}
     assert set(quadratic) == {"a^2 - 2 = 0", "a^2 - 3 = 0"}  # g = a^2 - 1 is 1 and 2
     assert all(one.is_confirmed and one.values is None for one in quadratic.values())
     assert quadratic["a^2 - 2 = 0"].growth.degrees[:8] == (1, 2, 4, 8, 13, 20, 28, 38)

@@ -82,7 +82,7 @@ def test_what_is_estimated_is_said_and_dotted():
 
 def test_degrees_without_recurrence_have_no_dynamical_degree():
     [label] = labels(draw_degrees({"x": growth((1, 2, 4, 7, 8, 12))}))
-    assert label == "x: no recurrence found, $d_n/d_{n-1} = 1.5$ at the end"
+    assert label == "x: no recurrence found, $d_{5}^{1/5} = 1.644$"
 
 
 def test_an_irrational_dynamical_degree_is_not_rounded_silently():

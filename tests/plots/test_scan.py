@@ -21,7 +21,12 @@ def found():
 
 def of_growth(found, kind):
     """The components of the blocks with this growth."""
-    return [one for _, some in found.classes for one in some if any(o.growth and o.growth.growth == kind for o in some)]
+    return [
+        one
+        for _, some in found.classes
+        for one in some
+        if any(o.growth is not None and o.growth.growth == kind for o in some)
+    ]
 
 
 def test_marks_are_the_points_of_each_kind_of_growth(found):
