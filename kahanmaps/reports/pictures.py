@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from kahanmaps.display import markup
@@ -20,11 +22,12 @@ _RASTERISE_ABOVE = 1_500  # points: as elements of the page they would be a hund
 class Pictures:
     """Draws pictures into a page, or leaves them out: `wanted` says whether the reader wants any.
 
-    `note` is a sentence for the page: that matplotlib is missing, and what to do; empty where it is there.
+    None is begun after `until`, a value of time.monotonic(): a sentence says so in its place. `note` is a sentence for
+    the page: that matplotlib is missing, and what to do; empty where it is there.
     """
 
-    def __init__(self, wanted: bool = True) -> None:
-        self.note = ""
+    def __init__(self, wanted: bool = True, until: float = inf) -> None:
+        self.note, self._until = "", until
         self._wanted = wanted
         if wanted:
             try:
@@ -43,6 +46,8 @@ class Pictures:
         if not self._wanted:
             return ""
         try:
+            if time.monotonic() > self._until:
+                raise InputError("the time was over (--seconds)")
             figure = drawing(_STYLE)
             _rasterise(figure)
             svg = svg_text(figure, name, _STYLE, alt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ def report_html(
     by: Sequence[str] = (),
     values: Sequence[str] = (),
     explore: bool = False,
+    until: float = inf,
 ) -> str:
     """A page about what was found: one HTML text that needs no network, and no JavaScript unless it is to `explore`.
 
@@ -44,6 +46,7 @@ def report_html(
         by: for a Store, the names to group its results by (default: the experiment).
         values: for a Store, the numbers to summarise, with a picture of their distributions (default: all, without).
         explore: for an Analysis, a page on which eps and the start of an orbit are moved by sliders.
+        until: no picture is begun after this value of time.monotonic(); the page says so.
 
     Returns:
         The page, the same text for the same input (and the same version of matplotlib). Formulas are exact; those of
@@ -59,7 +62,7 @@ def report_html(
     >>> text[:15], text.count("</details>")
     ('<!DOCTYPE html>', 3)
     """
-    drawn = Pictures(pictures)
+    drawn = Pictures(pictures, until)
     title = (title or "").strip()
     if explore:
         if not isinstance(found, Analysis):

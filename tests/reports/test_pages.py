@@ -96,6 +96,12 @@ def test_without_matplotlib_the_page_says_what_to_install(volterra, monkeypatch)
     assert "pip install 'kahanmaps[plot]'" in page.text
 
 
+def test_no_picture_is_begun_when_the_time_is_over(volterra):
+    page = require_sound(report_html(volterra, until=0.0))
+    assert "svg" not in page.tags
+    assert page.text.count("not drawn, for the time was over (--seconds)") == 3
+
+
 def test_a_portrait_says_which_orbits_ended_and_what_lies_outside():
     nowhere = km.QuadraticSystem.from_text(["x"], ["x"])  # at eps = 1
     html = portrait_figure(km.SystemFile.from_system(nowhere), 1, Pictures())

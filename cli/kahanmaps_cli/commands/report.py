@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import time
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +42,10 @@ _ONLY_FOR = {
 @click.option("--value", "values", multiple=True, metavar="NAME", help="With --db: only this number, with a picture.")
 @opt.eps_options
 @opt.symbolic_option
-@opt.seconds_option(None, "Time for the analysis (default: 16 to 150 by dimension); pictures take seconds more.")
+@opt.seconds_option(
+    None,
+    "Stop about then, pictures left out (default: 16 to 150 by dimension for the analysis).",
+)
 @opt.seed_option
 @draw_options
 @click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")
@@ -161,11 +166,15 @@ def _analysis(system: str | None, options: dict[str, Any], progress: Progress, h
 
     symbols, eps = symbols_and_eps(options)
     file = opt.load_system(system, options)
+    began = time.monotonic()
     found = lib.analyze(
         file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress, processes=2
     )
     progress("the page")
-    return lib.report_html(found, explore=options["explore"], **how), 3 if found.conclusion.kind == "undecided" else 0
+    until = inf if options["seconds"] is None else began + options["seconds"]
+    return lib.report_html(
+        found, explore=options["explore"], until=until, **how
+    ), 3 if found.conclusion.kind == "undecided" else 0
 
 
 def _system_or_member(system: str | None, options: dict[str, Any]) -> lib.SystemFile:

@@ -36,7 +36,7 @@ scan_options: Callable[[F], F] = opt.stack(
         "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N, or relations and densities up to degree N."
     ),
     click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
-    opt.seconds_option(120.0, "Stop about then, and say what was seen."),
+    opt.seconds_option(120.0, "Stop about then, counted from when its loops are loaded, and say what was seen."),
     click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
     opt.seed_option,
 )
