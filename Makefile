@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 python := .venv/bin/python
 
-.PHONY: help demo test test-slow mutants check lint types format bench docs docs-links pictures clean demo-venv dev-venv
+.PHONY: help demo test test-slow check lint types format bench docs docs-links pictures clean demo-venv dev-venv
 
 help:  ## list the tasks
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -26,9 +26,6 @@ test: dev-venv  ## the tests and the examples in docstrings, without the slow on
 test-slow: dev-venv  ## all tests, the slow ones too
 	@.ci/tools
 	@$(python) -m pytest -n 2 --timeout 1800 --hypothesis-profile=thorough $(ARGS)
-
-mutants: dev-venv  ## do tests see single changes to the mathematics? Half an hour; ARGS="--count 40 --seed 7"
-	@nice $(python) tests/mutants.py $(ARGS)
 
 check: lint types test  ## all that must hold before a commit: lint, types, test
 
@@ -62,7 +59,7 @@ docs-links: dev-venv  ## do the links of the documentation to other sites work? 
 	@$(python) -m sphinx -b linkcheck -q -d docs/_build/trees-links docs docs/_build/links
 
 clean:  ## remove .venv, caches and build leftovers
-	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .mutants .demo docs/_build
+	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .demo docs/_build
 	@find . -path ./.git -prune -o -type d -name __pycache__ -exec rm -rf {} +
 
 demo-venv:
