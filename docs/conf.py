@@ -23,7 +23,7 @@ copyright = author
 version = release = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "kahanmaps_docs"]
-exclude_patterns = ["_build", "_ext", "man", "schemas", *api_pages_without_names(HERE)]
+exclude_patterns = ["_build", "_ext", *api_pages_without_names(HERE)]
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 5  # the anchors that a Git host makes, so that links to them hold in both places

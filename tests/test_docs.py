@@ -25,9 +25,8 @@ import kahanmaps  # noqa: E402
 from kahanmaps.documents.catalog import names  # noqa: E402
 from kahanmaps.sources import SOURCES  # noqa: E402
 from kahanmaps_cli.main import COMMANDS  # noqa: E402
-from kahanmaps_cli.schema_files import schema_titles  # noqa: E402
 
-NO_PAGES = {"_build", "_ext", "man", "schemas"}  # folders of docs, see conf.py
+NO_PAGES = {"_build", "_ext"}  # folders of docs, see conf.py
 
 
 def markdown_files() -> list[Path]:
@@ -137,14 +136,6 @@ def test_every_task_of_batches_has_its_section_with_its_options(built_from):
     entry = built_from["reference/batch-tasks"].partition("(task-heights)=")[2].partition("(task-")[0]
     assert re.search(r"\| `steps` \| .* \| `60` \|", entry)
     assert re.search(r"\| `eps` \| .* \| required \|", entry)
-
-
-def test_every_schema_has_its_section_with_its_keys(built_from):
-    text = built_from["reference/schemas"]
-    assert [name for name in schema_titles() if f"(schema-{name})=" not in text] == []
-    entry = text.partition("(schema-find-density)=")[2].partition("(schema-")[0]
-    assert re.search(r"^\| `densities` \| .+ \|$", entry, re.MULTILINE)  # of what the schema refers to
-    assert re.search(r"^\| `time_step` \| .+ \|$", entry, re.MULTILINE)
 
 
 @together("path", markdown_files())

@@ -53,7 +53,6 @@ def test_what_is_built_is_installed_and_works_in_a_bare_environment(built, tmp_p
     page = (tmp_path / "top.html").read_text(encoding="utf-8")
     assert "font/woff" in page
     assert "kahanmaps[plot]" in page  # nothing was installed that is not required
-    assert (tmp_path / "bare" / "share" / "man" / "man1" / "kahanmaps.1").is_file()
 
 
 @pytest.mark.slow

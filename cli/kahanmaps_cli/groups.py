@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import ClassVar
 
 import click
 
@@ -10,13 +11,17 @@ from kahanmaps.errors import quoted
 
 
 class SuggestingGroup(click.Group):
-    """A group that suggests commands where a name is none."""
+    """A group that suggests commands where a name is none, and says what to use instead of a removed one."""
+
+    removed: ClassVar[dict[str, str]] = {}  # name of a command -> what to use instead
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         known = self.list_commands(ctx)
         if args and args[0] not in known and not args[0].startswith("-") and not ctx.resilient_parsing:
+            if args[0] in self.removed:
+                raise click.UsageError(f"{args[0]} was removed in 0.3.0: {self.removed[args[0]]}.", ctx)
             raise click.UsageError(f"There is no command {quoted(args[0])}.{self.hint(args[0], known)}", ctx)
         return super().resolve_command(ctx, args)
 

@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import click
 
@@ -66,9 +66,7 @@ SECTIONS = {
         "convert": ("convert", "LaTeX, SymPy, PARI/GP, Maple, ... of a system, its map."),
     },
     "About": {
-        "schema": ("schema", "JSON schemas of files and of what --json prints."),
         "completion": ("completion", "Completion of commands, systems and options for your shell."),
-        "manual": ("manual", "The manual page, for man."),
         "version": ("version", "The versions of kahanmaps and of what it computes with."),
     },
 }
@@ -95,13 +93,17 @@ What does the Kahan map of a system preserve, and is it integrable?
   help:
     kahanmaps --help              all commands
     kahanmaps COMMAND --help      one of them, examples first
-    kahanmaps manual | man -l -   the manual page
 
 eps is the paper's epsilon throughout: the time step is 2 eps."""
 
 
 class LazyGroup(SuggestingGroup):
     """A group that imports a command only when it is needed, so that --help stays light."""
+
+    removed: ClassVar = {
+        "schema": "the keys of JSON are described in docs/cli.md",
+        "manual": "kahanmaps --help and kahanmaps COMMAND --help say the same",
+    }
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

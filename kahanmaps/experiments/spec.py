@@ -29,14 +29,11 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import SystemFileError, reading
-from kahanmaps.experiments.experiment import PARAMETERS, TIME_STEP, Experiment, ExperimentReader
-from kahanmaps.experiments.options import FAMILY, VOCABULARY
-from kahanmaps.experiments.registry import task_kinds
-from kahanmaps.experiments.shape import SpecDocument, shape_schema
+from kahanmaps.experiments.experiment import Experiment, ExperimentReader
+from kahanmaps.experiments.shape import SpecDocument
 
 MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000
@@ -130,37 +127,3 @@ def _largest(experiments: Sequence[Experiment]) -> str:
     told = [f"{experiment.name} has {experiment.product}" for experiment in by_size[:_LARGEST_TOLD]]
     more = len(experiments) - len(told)
     return ", ".join(told) + (f" and {more} more" if more else "")
-
-
-def spec_schema() -> dict[str, Any]:
-    """The JSON schema (draft 2020-12) of what a batch spec in TOML is read as.
-
-    It knows which keys, tasks and options there are, not which options a task has and which values make sense: that is
-    what `read_spec` says. Numbers may be quoted or not.
-
-    >>> "orbit" in spec_schema()["$defs"]["experiment"]["properties"]["task"]["enum"]
-    True
-    """
-    found = shape_schema()
-    found["properties"]["experiments"]["propertyNames"] = {"pattern": f"^{EXPERIMENT_NAME}$"}
-    experiment = found["$defs"]["experiment"]["properties"]
-    experiment["task"]["enum"] = sorted(task_kinds())
-    experiment["options"] |= _table(_VALUE)
-    experiment["axes"] |= _table(_VALUES)
-    return found
-
-
-def _table(value: dict[str, Any]) -> dict[str, Any]:
-    """A table of options by name, each with a value of this kind."""
-    options = {name: {"description": option.help, **value} for name, option in {**VOCABULARY, **FAMILY}.items()}
-    options[TIME_STEP] = {"description": "the time step, 2 eps, instead of eps", **value}
-    parameters = {
-        "description": "values for parameters of the systems",
-        "type": "object",
-        "additionalProperties": value,
-    }
-    return {
-        "properties": {**options, PARAMETERS.removesuffix("."): parameters},
-        "patternProperties": {f"^{PARAMETERS.replace('.', '[.]')}": value},
-        "additionalProperties": False,
-    }

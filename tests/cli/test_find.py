@@ -5,7 +5,6 @@ search again, and what stays open gives 3.
 import shlex
 
 import pytest
-from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.version import __version__
@@ -138,7 +137,6 @@ def test_integrals_of_the_flow(kahanmaps):
     record = kahanmaps("find-integrals euler_top --flow --json -q").json
     assert record["flow"] is True
     assert [one["combination"] for one in record["beside_map"]["limits"]] == ["I1", "I2"]
-    assert mistakes("find-integrals", record) == []
 
 
 def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps):
@@ -151,13 +149,11 @@ def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps
     ]
     data = kahanmaps(f"{words} --json").json
     assert (data["flow"], data["cofactors"], data["reason"]) == (True, [], "")
-    assert mistakes("find-integrals", data) == []
     assert [one["cofactor"] for one in data["spaces"]] == ["-20"]
     beside = "find-integrals lorenz -p b=20 --flow --max-degree 2 -q"
     assert "T1\tproved\texp(20*t)*(x^2 - 20*z)\n\tdepends on time\n" in kahanmaps(beside).out
     data = kahanmaps(f"{beside} --json").json
     assert data["beside_map"]["polynomials_degree"] == 3
-    assert mistakes("find-integrals", data) == []
 
 
 # What stays open

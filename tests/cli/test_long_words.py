@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from schema_helpers import mistakes
 
 WORDS = {
     "four": '[composition]\nof = [{ system = "henon_heiles", power = 4 }]\n'
@@ -33,30 +32,27 @@ def test_orbits_are_stepped(kahanmaps, word, name, arithmetic):
     line = f"orbit {word(name)} --start {STARTS[name]} --eps 1/10 --steps 1 --arithmetic {arithmetic} --format jsonl -q"
     found = kahanmaps(line)
     records = [json.loads(text) for text in found.out.splitlines()]
-    assert [mistakes("orbit", record) for record in records] == [[]] * 4
     assert (found.status, records[-1]["status"]) == (0, "completed")
     assert len(records[0]["composition"]) == {"four": 4, "ten letters": 10}[name]
 
 
-LINES = {
-    "check-measure": "check",
-    "check-integrals": "check",
-    "find-density --seconds 5": "find-density",
-    "find-integrals --seconds 2": "find-integrals",
-    "cycles --prime 11 --samples 5 --steps 5": "cycles",
-    "lyapunov --eps 1/50 --steps 20": "lyapunov",
-    "systems": "systems",
-}
+LINES = [
+    "check-measure",
+    "check-integrals",
+    "find-density --seconds 5",
+    "find-integrals --seconds 2",
+    "cycles --prime 11 --samples 5 --steps 5",
+    "lyapunov --eps 1/50 --steps 20",
+    "systems",
+]
 
 
 # Every command goes through four factors, but for degrees, which take their time there.
 @pytest.mark.parametrize(("name", "line"), [*(("four", line) for line in LINES), ("ten letters", "degrees --terms 1")])
 def test_commands_go_through_the_factors(kahanmaps, word, name, line):
-    schema = LINES.get(line, "degrees")
-    quiet = "" if schema == "systems" else " -q"
+    quiet = "" if line == "systems" else " -q"
     found = kahanmaps(f"{line} {word(name)} --json{quiet}")
     record = json.loads(found.out)
-    assert mistakes(schema, record) == []
     if line.startswith("check"):
         is_density = name == "four" and "measure" in line
         assert (record["verdict"], found.status) == (("supported", 0) if is_density else ("refuted", 1))
@@ -67,7 +63,6 @@ def test_commands_go_through_the_factors(kahanmaps, word, name, line):
 def test_singularities_are_told_by_random_points(kahanmaps, word):
     found = kahanmaps(f"singularities {word('four')} --eps 1/3 --steps 4 --json -q")
     record = json.loads(found.out)
-    assert mistakes("singularities", record) == []
     (run,) = record["runs"]
     assert (run["denominator"], run["map_degree"], run["critical_degree"]) == ("?", 39, None)
     assert {h["status"] for h in run["hypersurfaces"]} >= {"confined"}
@@ -87,6 +82,5 @@ def test_what_is_preserved_for_all_values_of_a_shared_symbol(kahanmaps, tmp_path
     path.write_text(f"parameters.a = 3\n[composition]\nof = [{part.format(1)}, {part.format(2)}]")
     found = kahanmaps(f"find-integrals {path} --symbolic a --json -q")
     record = json.loads(found.out)
-    assert mistakes("find-integrals", record) == []
     assert (record["symbols"], [one["verdict"] for one in record["integrals"]]) == (["a"], ["proved"])
     assert "x*a" in record["integrals"][0]["integral"]

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from helpers import THOROUGH
-from schema_helpers import mistakes
 
 from kahanmaps.documents.files import read_system
 from kahanmaps.maps.convention import NO_EPS
@@ -25,8 +24,7 @@ def test_the_orbit_command_takes_every_map_and_every_arithmetic(kahanmaps, name,
     start = ",".join(["1/2", "1/3", "2/5", "1/7"][: file.dim])
     eps = " --eps 1/10" if file.map.has_eps else ""
     out = kahanmaps(f"orbit {path} --start {start}{eps} --steps 3 --arithmetic {arithmetic} --format jsonl -q").out
-    header, *points, end = map(json.loads, out.splitlines())
-    assert [mistakes("orbit", line) for line in (header, *points, end)] == [[]] * 6
+    header, *_, end = map(json.loads, out.splitlines())
     assert (header["time_step"] is None) == (not file.map.time_steps)
     assert ("equations" in header) == (file.kind != "system" or file.name == "duffing")
     assert end["status"] == "completed"
@@ -49,30 +47,29 @@ def test_backward_steps_find_the_inverse(kahanmaps, tmp_path):
 # Of maps without eps and with it; what takes long, of the first.
 @pytest.mark.parametrize("name", ["mcmillan", pytest.param("duffing", marks=THOROUGH)])
 @pytest.mark.parametrize(
-    ("command", "schema"),
+    "command",
     [
-        ("analyze --seconds 1", "analyze"),
-        ("degrees --terms 3", "degrees"),
-        ("singularities --eps 1/3", "singularities"),
-        ("find-integrals --seconds 5 --max-degree 4", "find-integrals"),
-        ("find-integrals --darboux 2", "find-integrals"),
-        ("find-integrals --monomials 'q,p,1'", "find-integrals"),
-        ("find-density --seconds 5 --max-degree 4", "find-density"),
-        ("heights --eps 1/10 --steps 8 --random 1", "heights"),
-        ("ensemble --eps 1/10 --random 3 --box 1/4 --steps 5", "ensemble"),
-        ("lyapunov --eps 1/10 --random 2 --box 1/8 --steps 20", "lyapunov"),
-        ("cycles --prime 7 --eps 1/3", "cycles"),
-        ("check-integrals --integral 'J=1' -v", "check"),
-        ("check-measure -v", "check"),
+        "analyze --seconds 1",
+        "degrees --terms 3",
+        "singularities --eps 1/3",
+        "find-integrals --seconds 5 --max-degree 4",
+        "find-integrals --darboux 2",
+        "find-integrals --monomials 'q,p,1'",
+        "find-density --seconds 5 --max-degree 4",
+        "heights --eps 1/10 --steps 8 --random 1",
+        "ensemble --eps 1/10 --random 3 --box 1/4 --steps 5",
+        "lyapunov --eps 1/10 --random 2 --box 1/8 --steps 20",
+        "cycles --prime 7 --eps 1/3",
+        "check-integrals --integral 'J=1' -v",
+        "check-measure -v",
     ],
 )
-def test_what_is_found_out_about_any_map(kahanmaps, name, command, schema):
+def test_what_is_found_out_about_any_map(kahanmaps, name, command):
     file = read_system(path := EXAMPLES[NAMES.index(name)])
     command = command.replace("q,p", ",".join(file.variables))
     found = kahanmaps(f"{command} {path} --json -q")
     assert found.status in (0, 3)
     record = json.loads(found.out)
-    assert mistakes(schema, record) == []
     if not file.map.has_eps:
         assert record["convention"] == NO_EPS
     plain = kahanmaps(f"{command} {path} -q").out
@@ -99,7 +96,6 @@ def test_a_witness_of_a_map_without_eps_has_none(kahanmaps, command):
     found = kahanmaps(f"{command} --json -q")
     assert found.status == 1
     record = json.loads(found.out)
-    assert mistakes("check", record) == []
     assert record["claims"][0]["witness"]["eps"] is None
     assert not re.search(r"\beps\b", kahanmaps(f"{command} -q").out)
 

@@ -24,10 +24,8 @@ FOR_PROGRAMS = (
     "report",
     "convert",
     "completion",
-    "manual",
     "family new",
     "family tensor",
-    "schema",  # lines of its list are not broken
 )
 
 

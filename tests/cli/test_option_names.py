@@ -26,7 +26,7 @@ def by_name() -> dict[str, list[tuple[str, click.Option]]]:
 
 def own(words: str) -> bool:
     """Whether a command is older than pictures and pages, which have words of their own for a few things."""
-    return words.split()[0] not in ("plot", "report", "convert", "schema")
+    return words.split()[0] not in ("plot", "report", "convert")
 
 
 @pytest.mark.parametrize("name", SAME_WORDS)

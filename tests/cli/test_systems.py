@@ -1,7 +1,6 @@
 """kahanmaps systems: the catalogue, listed, shown, and printed as files to copy and change."""
 
 import pytest
-from schema_helpers import mistakes
 
 from kahanmaps.documents import catalog
 from kahanmaps.documents.files import parse_system
@@ -30,7 +29,6 @@ def test_a_map_is_shown_as_text_latex_and_data(kahanmaps, name):
     assert "x' = " in shown if is_adjusted else "~ = " in shown or "_new" in shown
     assert r"\begin{aligned}" in kahanmaps(f"systems {name} --latex").out
     record = kahanmaps(f"systems {name} --json").json
-    assert mistakes("systems", record) == []
     assert ("rhs" in record) == is_adjusted
     assert parse_system(kahanmaps(f"systems {name} --toml").out, name) == catalog.load(name)
 

@@ -21,7 +21,6 @@ from kahanmaps_docs.formulas import block_as_mathml, inline_as_mathml
 from kahanmaps_docs.links import ROOT, with_links_for
 from kahanmaps_docs.literature import bibliography, with_keys_linked
 from kahanmaps_docs.reference import api_index, api_page
-from kahanmaps_docs.schemas import schemas
 from kahanmaps_docs.sessions import ConsoleLexer
 
 PARTS: dict[str, Callable[..., str]] = {
@@ -33,7 +32,6 @@ PARTS: dict[str, Callable[..., str]] = {
     "commands": commands,
     "database": database_tables,
     "examples": examples,
-    "schemas": schemas,
 }
 MARK = re.compile(r"^<!-- generated: (.+) -->$", re.MULTILINE)
 
