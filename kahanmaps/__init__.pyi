@@ -125,7 +125,6 @@ from kahanmaps.maps.orbits.iteration import Iterates as Iterates
 from kahanmaps.maps.orbits.iteration import Orbit as Orbit
 from kahanmaps.maps.orbits.orbit import orbit as _orbit
 from kahanmaps.maps.polarised import polarised_map as polarised_map
-from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
 from kahanmaps.paper.verifier import VerifyOptions as VerifyOptions
 from kahanmaps.paper.verify import verify as _verify  # noqa: F401
 from kahanmaps.paper.verify import verify_universal as verify_universal

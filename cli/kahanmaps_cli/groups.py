@@ -48,8 +48,20 @@ def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
     return [word for word, ratio in zip(close, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
+# (command, option) -> what to use instead of an option that is there no longer
+REMOVED_OPTIONS = {
+    ("ensemble", "--arithmetic"): "ensembles are in floating point; kahanmaps orbit has exact, mod:P and ball:BITS",
+}
+
+
 def in_our_words(error: click.ClickException) -> click.ClickException:
     """The error with what was found and what was expected, and where a choice is misspelt with one that is like it."""
+    if isinstance(error, click.NoSuchOption) and error.ctx is not None:
+        command = error.ctx.command_path.removeprefix("kahanmaps ")
+        instead = REMOVED_OPTIONS.get((command, error.option_name))
+        if instead is not None:
+            return click.UsageError(f"{error.option_name} was removed in 0.3.0: {instead}.", error.ctx)
+        return error
     if not isinstance(error, click.BadParameter) or error.param is None:
         return error
     if isinstance(error, click.MissingParameter):

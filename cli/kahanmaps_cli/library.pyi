@@ -175,7 +175,6 @@ from kahanmaps.maps.orbits.iteration import OrbitEnd as OrbitEnd
 from kahanmaps.maps.orbits.orbit import orbit as orbit
 from kahanmaps.maps.orbits.stored import read_orbits as read_orbits
 from kahanmaps.maps.orbits.writers import form_of as form_of
-from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
 from kahanmaps.paper.claims.survivors import survivors as survivors
 from kahanmaps.paper.claims.survivors import table as table
 from kahanmaps.paper.verifier import VerifyOptions as VerifyOptions

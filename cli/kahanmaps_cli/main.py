@@ -36,7 +36,7 @@ SECTIONS = {
         "systems": ("systems", "The catalogue of named systems."),
         "orbit": ("orbit", "Iterate the map: exactly, modulo p, in balls or floats."),
         "period": ("period", "The exact period of an orbit, modulo p or over Q."),
-        "ensemble": ("ensemble", "Many orbits at once, in machine numbers or modulo p."),
+        "ensemble": ("ensemble", "Many orbits at once, in floating point."),
     },
     "Checks": {name: ("check", check.question) for name, check in CHECKS.items()},
     "Laboratory": {

@@ -1,6 +1,6 @@
 """The equation of a step over a field: the matrix (M | -r), whose entries are forms of one degree in (X : Z).
 
-The evaluators start from it: integers over one denominator (integer_steps.py), residues (residues/ensemble.py), machine
+The evaluators start from it: integers over one denominator (integer_steps.py), machine
 numbers (floats/steps.py), curves and forms in projective space (projective.py).
 """
 

@@ -48,15 +48,6 @@ def test_text_has_a_point_in_each_line(kahanmaps, tmp_path, text):
     assert np.load(tmp_path / "x.npy").tolist() == [STARTS]
 
 
-def test_starts_modulo_a_prime_are_reduced(kahanmaps, tmp_path):
-    (tmp_path / "s.txt").write_text("-1,1/2,10008\n")
-    kahanmaps(f"{TOP} --steps 0 --arithmetic mod:10007 --starts", tmp_path / "s.txt", "-o", tmp_path / "x.npy")
-    assert np.load(tmp_path / "x.npy").tolist() == [[[10006, 5004, 1]]]
-    path = saved(tmp_path / "s.npy", np.array([[-1, 2**62, 10008]]))
-    kahanmaps(f"{TOP} --steps 0 --arithmetic mod:10007 --starts", path, "-o", tmp_path / "x.npy")
-    assert np.load(tmp_path / "x.npy").tolist() == [[[10006, 2**62 % 10007, 1]]]
-
-
 def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
     def drawn(more):
         assert kahanmaps(f"{TOP} --steps 0 --random 50 {more} -q -o", tmp_path / "x.npy").status == 0
@@ -67,8 +58,6 @@ def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
     assert (drawn("--seed 3") != drawn("--seed 4")).all()
     assert (drawn("--seed 3 --box 1/4") == drawn("--seed 3") / 4).all()
     assert np.abs(drawn("--box 1/4")).max() <= 0.25
-    residues = drawn("--arithmetic mod:7")
-    assert set(residues.ravel().tolist()) == set(range(7))
     # so that a change of numpy or of ours does not go unnoticed
     assert drawn("--seed 3")[0].tolist() == pytest.approx([-0.828701666, -0.526379, 0.602548930], abs=1e-6)
 
@@ -88,23 +77,7 @@ def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     assert generic["drift"] == []
 
 
-def test_modulo_a_prime_where_chi_does_not_split_there_is_elimination(kahanmaps):
-    command = "ensemble paper_m3_irreducible --random 5 --eps 1/10 --steps 5 --arithmetic mod:{} --kernel numpy --json"
-    splits = {prime: kahanmaps(command.format(prime)).json["method"] for prime in (101, 103, 107, 109, 113, 127)}
-    assert set(splits.values()) == {"generic", "normal-form"}
-    prime = next(prime for prime, method in splits.items() if method == "generic")
-    outcome = kahanmaps(command.format(prime) + " --method normal-form")
-    assert (outcome.status, "needs a chi that splits modulo P" in outcome.err) == (2, True)
-
-
 # The summary
-
-
-def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):
-    command = f"{TOP} --random 40 --steps 5 --arithmetic mod:{PRIME} --integral F1 --integral y=x1 --json"
-    first, second = kahanmaps(command).json["drift"]
-    assert first == {"name": "F1", "orbits": 40, "changed": 0, "orbit": None}
-    assert second == {"name": "y", "orbits": 40, "changed": 40, "orbit": 0}
 
 
 def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps):
@@ -117,12 +90,12 @@ def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanma
 
 def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
-    for more in ("", " --integral F1", " --arithmetic mod:10007"):
+    for more in ("", " --integral F1"):
         kahanmaps(f"{TOP} --random 3 --steps 100{more} -o", path)
         two = np.load(path)
         kahanmaps(f"{TOP} --random 3 --steps 100 --every 50{more} -o", path)
         assert two.tolist() == np.load(path)[::2].tolist()
-        assert two.dtype == (np.int64 if "mod" in more else np.float64)
+        assert two.dtype == np.float64
 
 
 # Interrupts
@@ -191,13 +164,6 @@ def test_wrong_starts_give_2_and_say_where(kahanmaps, tmp_path, data, words, nam
     assert words in outcome.err.replace(str(path), "s")
 
 
-def test_starts_modulo_a_prime_are_integers(kahanmaps, tmp_path):
-    path = saved(tmp_path / "s.npy", np.ones((2, 3)))
-    outcome = kahanmaps(f"{TOP} --steps 1 --arithmetic mod:7 --starts", path)
-    assert outcome.status == 2
-    assert "found an array of machine floats, expected integers: modulo P starts are" in outcome.err
-
-
 def test_text_and_numbers_are_bounded(kahanmaps, tmp_path, monkeypatch):
     path = tmp_path / "s.txt"
     path.write_text("1,2,3\n" * 10)
@@ -218,13 +184,10 @@ def test_a_normal_form_in_coordinates_of_its_own_is_for_single_orbits(kahanmaps,
     assert (outcome.status, "J = [[0, I], [-I, 0]] only" in outcome.err) == (2, True)
 
 
-@pytest.mark.parametrize("arithmetic", ["float", "mod:7"])
-def test_integrals_may_contain_an_algebraic_parameter(kahanmaps, tmp_path, arithmetic):
-    """Modulo 7 the first root of t^2 - 2 is 3; its square is 2 for both."""
+def test_integrals_may_contain_an_algebraic_parameter(kahanmaps, tmp_path):
     path = tmp_path / "s.txt"
     path.write_text("1/2,1/3,1/5,1/11\n")
-    command = f"ensemble henon_heiles -p c='sqrt(2)' --eps 1/10 --steps 0 --arithmetic {arithmetic} --json"
+    command = "ensemble henon_heiles -p c='sqrt(2)' --eps 1/10 --steps 0 --json"
     record = kahanmaps(command, "--integral c*c --integral c*c*q1 --starts", path).json
-    if arithmetic == "float":
-        assert [one["initial"] for one in record["drift"]] == pytest.approx([2, 1])
+    assert [one["initial"] for one in record["drift"]] == pytest.approx([2, 1])
     assert [one["orbits"] for one in record["drift"]] == [1, 1]

@@ -30,7 +30,6 @@ from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
-from kahanmaps.maps.residues.ensemble import ModularEnsemble
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "maps"
@@ -134,28 +133,6 @@ def test_the_jacobi_matrix_is_that_of_dual_numbers(name):
         moved = tuple(duals.dual(entry, fmpq(int(i == k))) for i, entry in enumerate(x))
         image = map_.at("1/10", duals).generic_step(moved)
         assert [entry.slope for entry in image] == [found[i, k] for i in range(n)]
-
-
-# Other fields.
-
-
-@every_map
-@pytest.mark.parametrize("kernel", ["numpy", "numba"])
-@pytest.mark.parametrize("prime", [P, 2**61 - 1])
-def test_arrays_of_residues_step_as_one_residue_does(name, kernel, prime):
-    map_ = MAPS[name]
-    starts = [[(7 * i + 3 * k + 1) % prime for k in range(map_.dim)] for i in range(20)]
-    if kernel == "numba" and name not in LINEAR:
-        with pytest.raises(InputError, match="the kernel numba is for equations that are linear"):
-            ModularEnsemble(map_, "1/10", starts, prime, kernel=kernel)
-        return
-    ensemble = ModularEnsemble(map_, "1/10", starts, prime, kernel=kernel)
-    ensemble.advance(4)
-    taken = np.where(ensemble.singular_at < 0, ensemble.steps, ensemble.singular_at)
-    for start, x, count in zip(starts, ensemble.x.tolist(), taken.tolist(), strict=True):
-        one = Orbit(map_.at("1/10", GF(prime)), start, 4)
-        *_, last = one
-        assert (one.end.steps, [int(e) for e in last.x]) == (count, x)
 
 
 # Machine numbers.

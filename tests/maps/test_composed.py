@@ -17,7 +17,6 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.orbits.orbit import orbit
-from kahanmaps.maps.residues.ensemble import ModularEnsemble
 
 F = load("lotka_volterra").map
 G = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y - y", "x^2 - x*y"]').map
@@ -65,15 +64,6 @@ def test_an_orbit_stays_where_a_factor_has_no_value():
         floats = FloatEnsemble(word, 1, np.array([[1.0, 2.0], [4.0, 2.0]]), kernel=kernel)
         floats.advance(2)
         assert floats.failed_at.tolist() == [1, -1]
-    lines = composed_map(F, (G, -1), F)
-    for kernel in ("numpy", "numba"):
-        ensemble = ModularEnsemble(lines, EPS, [[k, l] for k in range(11) for l in range(11)], 11, kernel=kernel)
-        ensemble.advance(3)
-        for x, ended, start in zip(ensemble.x.tolist(), ensemble.singular_at.tolist(), range(121), strict=True):
-            one = orbit(lines, divmod(start, 11), EPS, steps=3, arithmetic="mod:11")
-            last = list(one)[-1]
-            assert [int(e) for e in last.x] == x
-            assert ended == (last.step if one.end.status == "singular" else -1)
 
 
 def test_long_words_are_stepped_and_refused_where_formulas_are_asked_for():

@@ -10,8 +10,8 @@ import click
 from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.params import Arithmetic, Whole
-from kahanmaps_cli.runs.ensemble_run import FAILURES_SHOWN, Asked, FloatRun, ModularRun, Run, normal_form_for
+from kahanmaps_cli.params import Whole
+from kahanmaps_cli.runs.ensemble_run import FAILURES_SHOWN, Asked, EnsembleRun, normal_form_for
 from kahanmaps_cli.runs.ensemble_starts import asked_starts
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, say
@@ -20,7 +20,6 @@ from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.signals import interruptible
 
 _MAX_STEPS = 10**13  # years
-_MAX_BITS = 61
 
 
 @click.command("ensemble")
@@ -29,14 +28,6 @@ _MAX_BITS = 61
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", required=True, help="How many steps to take.")
 @opt.backward_option
-@click.option(
-    "--arithmetic",
-    type=Arithmetic(),
-    metavar="KIND",
-    default="float",
-    show_default=True,
-    help="float or mod:P, P < 2^61.",
-)
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
 @opt.integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
@@ -55,30 +46,23 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
           --every 100 -o orbits.npy
       kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
           --steps 1000 --integral F1
-      kahanmaps ensemble paper_m2 --random 100 --eps 1/10 --steps 10000 \\
-          --arithmetic mod:2305843009213693951 --json
 
     FILE.npy is an array (records, orbits, dimension): row k holds step k K. It grows while the orbits are walked, and
-    is valid at every moment, also after Ctrl-C. Orbits that have ended early are NaN there; residues stay at their last
-    point. Starts in text are exact numbers, separated by commas or blanks; # starts a comment, and a first line may
-    name the columns.
+    is valid at every moment, also after Ctrl-C. Orbits that have ended early are NaN there. Starts in text are exact
+    numbers, separated by commas or blanks; # starts a comment, and a first line may name the columns.
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
     _require_sense(system, options)
-    kind, prime = options["arithmetic"]
     file = opt.load_system(system, {**options, "quiet": quiet})
-    integrals = lib.functions_along(file, options["integrals"], in_floats=kind == "float")
+    integrals = lib.functions_along(file, options["integrals"], in_floats=True)
     eps = opt.eps_of(file, options)
     number = lib.fmpq(1) if eps is None else eps
-    file.map.at(
-        number, lib.GF(prime) if kind == "mod" else lib.QQ
-    )  # the demands on eps and the prime, in the words of orbit
-    starts = asked_starts(file, options, prime if kind == "mod" else None)
+    file.map.at(number)  # the demands on eps, in the words of orbit
+    starts = asked_starts(file, options)
     normal_form = normal_form_for(file, options["method"])
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
-    made = ModularRun if kind == "mod" else FloatRun
-    run: Run = made(Asked(file, number, starts, form, integrals, options))
+    run = EnsembleRun(Asked(file, number, starts, form, integrals, options))
     if verbose and not quiet:
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
@@ -100,21 +84,12 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:
     """Options that contradict each other, or themselves."""
     steps, every, output = options["steps"], options["every"], options["output"]
-    kind, prime = options["arithmetic"]
-    if kind not in ("float", "mod"):
-        raise click.UsageError(f"found --arithmetic {kind}, expected float or mod:P (one orbit: kahanmaps orbit)")
-    if kind == "mod" and prime.bit_length() > _MAX_BITS:
-        raise click.UsageError(
-            f"found a modulus of {prime.bit_length()} bits, expected at most {_MAX_BITS} (one orbit: kahanmaps orbit)"
-        )
     if (options["starts"] is None) == (options["count"] is None):
         raise click.UsageError("give --starts FILE or --random N, one of the two")
     if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
         raise click.UsageError("--box and --seed are for --random N")
     if options["starts"] == "-" and system == "-":
         raise click.UsageError("found - twice, and there is one standard input")
-    if kind == "mod" and options["box"] is not None:
-        raise click.UsageError("--box is for float arithmetic: residues are drawn from 0 to P - 1")
     if steps < 0:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if steps > _MAX_STEPS:
@@ -125,11 +100,10 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
+def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: EnsembleRun) -> None:
     """Tab-separated lines, aligned on a terminal."""
     backward = ", backward" if options["backward"] else ""
-    arithmetic = options["arithmetic"]
-    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {arithmetic} arithmetic{backward}")
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()
@@ -146,11 +120,11 @@ def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) ->
         tell(f"{name}\t{text}", 15)
 
 
-def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
+def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: EnsembleRun) -> dict[str, Any]:
     steps, output = options["steps"], options["output"]
     drawn_at_random = options["starts"] is None
     box = None
-    if drawn_at_random and options["arithmetic"][0] == "float":
+    if drawn_at_random:
         box = "1" if options["box"] is None else lib.format_number(options["box"])
     every = options["every"] or max(1, steps)
     more = {
@@ -173,4 +147,4 @@ def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: Run) -
         if output is None
         else {"file": output, "shape": [run.records, *run.shape], "every": every, "axes": ["record", "orbit", "x"]},
     }
-    return record_of("ensemble", file, str(options["arithmetic"]), **more)
+    return record_of("ensemble", file, "float", **more)

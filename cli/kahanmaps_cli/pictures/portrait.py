@@ -173,10 +173,10 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
             )
         starts = lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
     elif options["starts"] is not None:
-        starts = read_starts(options["starts"], file.variables, None)
+        starts = read_starts(options["starts"], file.variables)
     elif options["count"] is not None:
         box = 1 if options["box"] is None else options["box"]
-        starts = drawn(options["count"], file.dim, box, options["seed"] or 0, None)
+        starts = drawn(options["count"], file.dim, box, options["seed"] or 0)
     steps = options["steps"]
     if steps is None:
         # in one variable the map is a fraction: all there is to be seen happens at the beginning, drawn over the step

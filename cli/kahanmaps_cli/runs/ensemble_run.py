@@ -1,12 +1,10 @@
-"""Many orbits at once in the arithmetic that was asked for: how they went, what moved, and the records of them."""
+"""Many orbits in floating point at once: how they went, what moved, and the records of them."""
 
 from __future__ import annotations
 
-import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError
 from kahanmaps_cli import library as lib
@@ -16,7 +14,6 @@ FAILURES_SHOWN = 20
 _WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded
 _LOOKS = 100  # at integrals that were asked for, unless --every says when
 _VALUES = 200_000  # of them at most
-_PIECE = 0.1  # seconds between looks at Ctrl-C
 
 Told = Callable[[int], None]
 
@@ -43,22 +40,9 @@ class Asked(NamedTuple):
     integrals: Mapping[str, lib.PhaseFunction]
     options: Mapping[str, Any]
 
-    @property
-    def stepping(self) -> dict[str, Any]:
-        """How either kind of ensemble is to step."""
-        wish, steps = self.options["kernel"], self.options["steps"]
-        kernel = "numpy" if wish is None and len(self.starts) * steps < _WORTH_COMPILING else wish
-        return {"form": self.form, "kernel": kernel, "backward": self.options["backward"]}
 
-
-class _Walk(ABC):
-    """How far many orbits have come; what it tells is `counts`, `failures`, `moved` and `near`, for people and JSON."""
-
-    kind: Literal["<f8", "<i8"]  # of the numbers in a .npy file
-    ensemble: Any
-    method: str
-    kernel: str
-    look = 0  # steps between two looks at integrals, if these want more than the first and the last
+class EnsembleRun:
+    """Many orbits in floating point; results are `counts`, `failures`, `moved` and `near`, for people and JSON."""
 
     def __init__(self, asked: Asked) -> None:
         self.asked = asked
@@ -67,17 +51,41 @@ class _Walk(ABC):
         self.reached = 0
         self.records = 0
         self.interrupted = False
+        value = lib.to_float(asked.eps)  # backward too: the inverse conserves what the map conserves
+
+        def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
+            found = lib.float_function(claimed.function)
+            return lambda x: found([*x, value])
+
+        wish = asked.options["kernel"]
+        kernel = "numpy" if wish is None and len(asked.starts) * self.steps < _WORTH_COMPILING else wish
+        self.ensemble: lib.FloatEnsemble = lib.FloatEnsemble(
+            asked.file.map,
+            asked.eps,
+            asked.starts,
+            form=asked.form,
+            kernel=kernel,
+            backward=asked.options["backward"],
+            threads=asked.options["threads"],
+            integrals={name: of_point(function) for name, function in asked.integrals.items()},
+        )
+        self.method = "generic" if asked.form is None else "normal-form"
+        self.kernel = self.ensemble.kernel
+        self.look = 0  # steps between two looks at integrals, if these want more than the first and the last
+        if asked.integrals:
+            self.look = max(1, -(-self.steps // max(1, min(_LOOKS, _VALUES // self.shape[0]))))
 
     def interrupt(self) -> None:
         """Ask to end after the portion in hand."""
         self.interrupted = True
+        self.ensemble.interrupt()
 
     def walk(self, told: Told) -> None:
         """Take the steps; the starts and multiples of --every, or the first and the last, go to a .npy file."""
         output, every = self.asked.options["output"], self.asked.options["every"]
         whole = every or max(1, self.steps)
         interval = every or self.look or whole
-        with nullcontext() if output is None else lib.NpyFile(output, self.shape, self.kind) as file:
+        with nullcontext() if output is None else lib.NpyFile(output, self.shape, "<f8") as file:
             for k, points in enumerate(self.portions(interval, told)):
                 if file is not None and (interval == whole or k == 0):
                     file.append(points)
@@ -85,42 +93,9 @@ class _Walk(ABC):
                 file.append(self.ensemble.x[None])
             self.records = 0 if file is None else file.rows
 
-    @abstractmethod
     def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
         """Take the steps; the starts, then points at multiples of the interval, some at a time."""
 
-
-class FloatRun(_Walk):
-    """In machine numbers."""
-
-    kind = "<f8"
-
-    def __init__(self, asked: Asked) -> None:
-        super().__init__(asked)
-        value = lib.to_float(asked.eps)  # backward too: the inverse conserves what the map conserves
-
-        def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
-            found = lib.float_function(claimed.function)
-            return lambda x: found([*x, value])
-
-        self.ensemble: lib.FloatEnsemble = lib.FloatEnsemble(
-            asked.file.map,
-            asked.eps,
-            asked.starts,
-            **asked.stepping,
-            threads=asked.options["threads"],
-            integrals={name: of_point(function) for name, function in asked.integrals.items()},
-        )
-        self.method = "generic" if asked.form is None else "normal-form"
-        self.kernel = self.ensemble.kernel
-        if asked.integrals:
-            self.look = max(1, -(-self.steps // max(1, min(_LOOKS, _VALUES // self.shape[0]))))
-
-    def interrupt(self) -> None:
-        super().interrupt()
-        self.ensemble.interrupt()
-
-    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
         def progress(step: int) -> None:
             told(step)
             if self.interrupted:
@@ -172,84 +147,3 @@ class FloatRun(_Walk):
                 told = f"at most {largest} (orbit {record['orbit']}, from {start})"
             lines.append(f"{record['name']}\t{told}")
         return lines
-
-
-class ModularRun(_Walk):
-    """Modulo a prime, where an integral either holds or does not."""
-
-    kind = "<i8"
-
-    def __init__(self, asked: Asked) -> None:
-        super().__init__(asked)
-        prime, threads = asked.options["arithmetic"][1], asked.options["threads"] or 1
-        self.ensemble: lib.ModularEnsemble = lib.ModularEnsemble(
-            asked.file.map, asked.eps, asked.starts, prime, **asked.stepping, threads=threads
-        )
-        if asked.options["method"] == "normal-form" and self.ensemble.method != "planes":
-            raise InputError("the method normal-form needs a chi that splits modulo P: take generic, or another prime")
-        self.method = "normal-form" if self.ensemble.method == "planes" else "generic"
-        self.kernel = f"{self.ensemble.kernel} {self.ensemble.method}"
-        self._initial = self._values()
-
-    def portions(self, interval: int, told: Told) -> Iterator[lib.NDArray[Any]]:
-        yield self.ensemble.x[None]
-        while self.reached + interval <= self.steps and self._advance(self.reached + interval, told):
-            yield self.ensemble.x[None]
-        self._advance(self.steps, told)
-
-    def _advance(self, stop: int, told: Told) -> bool:
-        """To step `stop`, in pieces that take a moment; whether it was reached."""
-        piece = 1
-        while self.reached < stop and not self.interrupted:
-            began = time.monotonic()
-            count = min(piece, stop - self.reached)
-            self.ensemble.advance(count)
-            self.reached += count
-            if count == piece and time.monotonic() - began < _PIECE:
-                piece *= 2
-            told(self.reached)
-        return self.reached >= stop
-
-    def _values(self) -> dict[str, list[Any]]:
-        field = self.ensemble.field
-        rows = self.ensemble.x.tolist() if self.asked.integrals else []
-        points = [[field.convert(entry) for entry in x] for x in rows]
-        asked = self.asked.integrals.items()
-        return {name: [function.value(field, self.asked.eps, x) for x in points] for name, function in asked}
-
-    @property
-    def counts(self) -> dict[str, int]:
-        singular = int((self.ensemble.singular_at >= 0).sum())
-        return {"completed": len(self.ensemble) - singular, "singular": singular}
-
-    def failures(self) -> Iterator[dict[str, Any]]:
-        over = self.asked.file.map.at(self.asked.eps, self.ensemble.field)
-        det = lib.det_of(over.denominator_name(self.asked.options["backward"]))
-        for orbit in (self.ensemble.singular_at >= 0).nonzero()[0].tolist():
-            at = int(self.ensemble.singular_at[orbit])
-            message = f"{det} = 0 at step {at}: the map has no value there"
-            yield {"orbit": orbit, "status": "singular", "steps": at, "message": message}
-
-    def moved(self) -> list[dict[str, Any]]:
-        now = self._values()
-        found = []
-        for name, initial in self._initial.items():
-            pairs = list(zip(initial, now[name], strict=True))
-            defined = [k for k, (before, after) in enumerate(pairs) if before is not None and after is not None]
-            moved = [k for k in defined if pairs[k][0] != pairs[k][1]]
-            record = {"name": name, "orbits": len(defined), "changed": len(moved)}
-            found.append({**record, "orbit": moved[0] if moved else None})
-        return found
-
-    def moved_lines(self) -> list[str]:
-        lines = []
-        for record in self.moved():
-            first = f", the first of them orbit {record['orbit']}" if record["changed"] else ""
-            lines.append(f"{record['name']}\tchanged in {record['changed']} of {record['orbits']} orbits{first}")
-        return lines
-
-    def near(self) -> None:
-        """Residues are exact: no step is nearly singular."""
-
-
-Run: TypeAlias = FloatRun | ModularRun

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from kahanmaps.errors import BadPrime, ExpressionError, InputError
+from kahanmaps.errors import ExpressionError, InputError
 from kahanmaps_cli import library as lib
 
 MAX_TEXT_BYTES = 100_000_000
@@ -19,21 +19,15 @@ MAX_NPY_BYTES = 2_000_000_000
 MAX_NUMBERS = 50_000_000  # of all starts together
 _MAGIC = b"\x93NUMPY"
 
-Convert = Callable[[str], "float | int"]
 
-
-def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> lib.NDArray[Any]:
-    """Starts at random: doubles from -box to box, or residues modulo a prime; the same ones for the same seed."""
-    import numpy as np
-
+def drawn(count: int, dim: int, box: Any, seed: int) -> lib.NDArray[Any]:
+    """Starts at random: doubles from -box to box; the same ones for the same seed."""
     if count < 1:
         raise InputError(f"found --random {count}, expected at least 1 start")
     if count * dim > MAX_NUMBERS:
         raise InputError(f"found --random {count}, expected at most {MAX_NUMBERS // dim} starts in dimension {dim}")
     if seed < 0:
         raise InputError(f"found --seed {seed}, expected 0 or more")
-    if prime is not None:
-        return np.random.default_rng(seed).integers(0, prime, (count, dim), dtype=np.int64)
     box = lib.rational(box)
     if box <= 0:
         raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
@@ -43,18 +37,16 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> lib.N
     return lib.starts_in_box(count, dim, size, seed)
 
 
-def asked_starts(
-    file: lib.SystemFile, options: Mapping[str, Any], prime: int | None = None, count: int | None = None
-) -> lib.NDArray[Any]:
+def asked_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.NDArray[Any]:
     """The starts that the options ask for: those of a file, or drawn at random, `count` of them unless they say."""
     if options["starts"] is not None:
-        return read_starts(options["starts"], file.variables, prime)
+        return read_starts(options["starts"], file.variables)
     count = options["count"] if count is None or options["count"] is not None else count
-    return drawn(count, file.dim, 1 if options["box"] is None else options["box"], options["seed"] or 0, prime)
+    return drawn(count, file.dim, 1 if options["box"] is None else options["box"], options["seed"] or 0)
 
 
-def read_starts(path: str, variables: Sequence[str], prime: int | None) -> lib.NDArray[Any]:
-    """The starts in a file, or on standard input for "-": an array (n, dim) of doubles, or of residues below the prime.
+def read_starts(path: str, variables: Sequence[str]) -> lib.NDArray[Any]:
+    """The starts in a file, or on standard input for "-": an array (n, dim) of doubles.
 
     Raises InputError with file and line of the first mistake.
     """
@@ -65,7 +57,7 @@ def read_starts(path: str, variables: Sequence[str], prime: int | None) -> lib.N
         with open(path, "rb") as stream:
             data = stream.read(MAX_NPY_BYTES + 1)
     if data.startswith(_MAGIC):
-        return _from_npy(data, where, variables, prime)
+        return _from_npy(data, where, variables)
     if path.endswith(".npy"):
         raise InputError(f"{where}: found no .npy file (those start with \\x93NUMPY)")
     if len(data) > MAX_TEXT_BYTES:
@@ -74,10 +66,10 @@ def read_starts(path: str, variables: Sequence[str], prime: int | None) -> lib.N
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{where}: found neither a .npy file nor UTF-8 text with a point in each line") from None
-    return _Text(where, variables, prime).read(text)
+    return _Text(where, variables).read(text)
 
 
-def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | None) -> lib.NDArray[Any]:
+def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[Any]:
     """The array of a .npy file; nothing is ever unpickled."""
     import numpy as np
 
@@ -88,10 +80,8 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | No
     except Exception as error:  # its head is read like Python, and may go wrong like Python: in its tokens, its depth
         raise InputError(f"{where}: found a .npy file that cannot be read: {_first(error)}") from None
     dtype, shape, dim = rows.dtype, rows.shape, len(variables)
-    if dtype.kind not in ("iu" if prime is not None else "fiu"):
-        hint = ": modulo P starts are integers, or text" if prime is not None and dtype.kind == "f" else ""
-        wanted = "integers" if prime is not None else "real numbers"
-        raise InputError(f"{where}: found an array of {_kind(dtype)}, expected {wanted}{hint}")
+    if dtype.kind not in "fiu":
+        raise InputError(f"{where}: found an array of {_kind(dtype)}, expected real numbers")
     if len(shape) != 2 or shape[1] != dim or shape[0] < 1:
         raise InputError(
             f"{where}: found an array of shape {shape}, expected (n, {dim}): one row for each start, with columns "
@@ -99,12 +89,6 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | No
         )
     if rows.size > MAX_NUMBERS:
         raise InputError(f"{where}: found an array of shape {shape}, expected at most {MAX_NUMBERS} numbers")
-    if prime is not None:
-        unsigned = np.issubdtype(dtype, np.unsignedinteger)
-        residues: lib.NDArray[Any] = rows.astype(np.uint64 if unsigned else np.int64) % (
-            np.uint64 if unsigned else np.int64
-        )(prime)
-        return residues.astype(np.int64)
     with np.errstate(over="ignore"):
         starts: lib.NDArray[Any] = np.ascontiguousarray(rows, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
@@ -117,18 +101,16 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | No
 class _Text:
     """Reads text with a point in each line."""
 
-    def __init__(self, where: str, variables: Sequence[str], prime: int | None) -> None:
+    def __init__(self, where: str, variables: Sequence[str]) -> None:
         self.where = where
         self.variables = list(variables)
-        self.prime = prime
-        self.convert = _to_residue(prime) if prime is not None else _to_double
         self.columns: list[int] | None = None
         self.width = len(self.variables)
 
     def read(self, text: str) -> lib.NDArray[Any]:
         import numpy as np
 
-        rows: list[list[float | int]] = []
+        rows: list[list[float]] = []
         fresh = True
         for number, line in enumerate(text.split("\n"), start=1):
             content = line.partition("#")[0].strip().strip("()[]{}")  # as people print points
@@ -146,7 +128,7 @@ class _Text:
             raise InputError(
                 f"{self.where}: found no point, expected one a line: {', '.join(self.variables)}, e.g. 1/2,-1/3,..."
             )
-        return np.array(rows, dtype=np.float64 if self.prime is None else np.int64)
+        return np.array(rows, dtype=np.float64)
 
     def _is_header(self, cells: list[str]) -> bool:
         """Whether this is a line of names; then the columns of the variables are looked up there."""
@@ -155,36 +137,20 @@ class _Text:
         self.columns, self.width = [cells.index(name) for name in self.variables], len(cells)
         return True
 
-    def _row(self, number: int, cells: list[str]) -> list[float | int]:
+    def _row(self, number: int, cells: list[str]) -> list[float]:
         where = f"{self.where}:{number}"
         if len(cells) != self.width:
             what = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
             named = "" if self.columns is not None else f": {', '.join(self.variables)}"
             raise InputError(f"{where}: found {what}, expected {self.width}{named}")
-        row: list[float | int] = []
+        row: list[float] = []
         for k in range(len(cells)) if self.columns is None else self.columns:
             try:
-                row.append(self.convert(cells[k]))
+                row.append(lib.to_float(lib.parse_number(cells[k])))
             except InputError as error:
                 message = error.message if isinstance(error, ExpressionError) else error
                 raise InputError(f"{where}: entry {k + 1}: {message}") from error
         return row
-
-
-def _to_double(text: str) -> float:
-    return lib.to_float(lib.parse_number(text))
-
-
-def _to_residue(prime: int) -> Convert:
-    field = lib.GF(prime)
-
-    def residue(text: str) -> int:
-        try:
-            return int(field.convert(lib.parse_number(text)))
-        except BadPrime:
-            raise InputError(f"the prime {prime} divides the denominator") from None
-
-    return residue
 
 
 def _kind(dtype: Any) -> str:
