@@ -29,6 +29,15 @@ class KahanmapsError(Exception):
     def __str__(self) -> str:
         return bounded(super().__str__())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # An exception is restored by a call with its message, which is less than some of them take.
+        return _restore_error, (type(self), self.args), self.__dict__
+
+
+def _restore_error(kind: type[KahanmapsError], args: tuple[Any, ...]) -> KahanmapsError:
+    """The error that was pickled, without its attributes."""
+    return kind.__new__(kind, *args)
+
 
 class InputError(KahanmapsError, ValueError):
     """A value that cannot be used: the message says what was found, what was expected, what to do."""

@@ -1,10 +1,25 @@
 """Messages of errors: no more of a long text than anybody reads, and the name of the file that was being read."""
 
 import errno
+import pickle
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from kahanmaps.errors import InputError, KahanmapsError, SystemFileError, bounded, is_out_of_memory, quoted, reading
+import kahanmaps as km
+from kahanmaps.errors import (
+    BadPrime,
+    ExpressionError,
+    InputError,
+    KahanmapsError,
+    SingularStep,
+    SystemFileError,
+    UnknownName,
+    bounded,
+    is_out_of_memory,
+    quoted,
+    reading,
+)
 
 
 @pytest.mark.parametrize("text", ["x" * 200_000, "x " * 100_000, "x\n" * 200_000, "0" * 1001])
@@ -61,3 +76,28 @@ def test_an_expected_one_says_it_itself(error):
 )
 def test_a_library_that_finds_no_memory_is_told_from_one_that_is_broken(error, is_memory):
     assert is_out_of_memory(error) is is_memory
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputError("expected a number"),
+        ExpressionError("found 'q'", "p + q", 4),
+        UnknownName("found the unknown name 'q'", "p + q", 4),
+        SystemFileError("a.toml", [("name", "missing"), ("variables", "missing")]),
+        BadPrime("3 divides a denominator", 3),
+        SingularStep("det(I - eps f'(x)) = 0", (1, 2), 1),
+    ],
+)
+def test_an_error_is_the_same_after_a_pickle(error):
+    error.add_note("a.toml")
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert (str(again), vars(again)) == (str(error), vars(error))
+
+
+def test_a_pool_of_processes_survives_a_wrong_system():
+    with ProcessPoolExecutor(1) as pool:
+        with pytest.raises(SystemFileError, match="unknown name"):
+            pool.submit(km.System, "x' = a*x").result()
+        assert pool.submit(km.check_integrals, "euler_top").result().holds
