@@ -58,7 +58,8 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     texts = [given] if isinstance(given, str) else given
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
         return dict(document), []
-    if isinstance(given, list) and not any(mark in text for text in texts for mark in "=;"):
+    marks = "=;,[{" if len(texts) == 1 else "=;"  # [x*y, -x] is a list of formulas in one text
+    if isinstance(given, list) and not any(mark in text for text in texts for mark in marks):
         return dict(document), []
     pieces = pieces_of("\n".join(texts))
     notes: list[str] = []
@@ -87,7 +88,7 @@ def tokens_of(text: str) -> list[str]:
 
 def pieces_of(text: str) -> list[list[str]]:
     """The tokens of each equation, or formula, of a list. Raises InputError for brackets that do not balance."""
-    tokens = _without_outer_brackets(tokens_of(text))
+    tokens = _without_outer_brackets(_list_in(tokens_of(text)))
     pieces: list[list[str]] = [[]]
     depth = 0
     for token in tokens:
@@ -103,6 +104,16 @@ def pieces_of(text: str) -> list[list[str]]:
     if depth:
         raise InputError(f"found {quoted(_text(pieces[-1]))}, where a bracket is opened that is not closed")
     return [piece for piece in pieces if _text(piece)]
+
+
+def _list_in(tokens: list[str]) -> list[str]:
+    """The tokens of a list without the name that it is given, eqs := [x' = y, y' = -x], and what ends it."""
+    words = [k for k, token in enumerate(tokens) if not token.isspace()]
+    while words and tokens[words[-1]] in (";", ":", ","):
+        words.pop()
+    if len(words) > 2 and is_name(tokens[words[0]]) and tokens[words[1]] in ("=", ":=") and tokens[words[2]] in "[{":
+        words = words[2:]
+    return tokens[words[0] : words[-1] + 1] if words else []
 
 
 def _without_outer_brackets(tokens: list[str]) -> list[str]:
@@ -298,6 +309,8 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
 
 def _hint(left: Sequence[str], piece: Sequence[str]) -> str:
     """What to type in the place of something that people put between equations."""
+    if left and left[0].isalpha() and not left[0].isascii():
+        return f"; a name is made of ASCII letters, digits and _: rename {left[0]}"
     if len(left) == 1 and left[0][0] == "d" and is_name(left[0][1:]):
         return f"; did you mean {left[0]}/dt = ...?"
     if len(left) == 1 and is_name(left[0]):

@@ -19,6 +19,8 @@ WRITTEN = [
     """rhs = "x'[t] == x[t]*y[t], y'[t] == -x[t]" """,
     """rhs = "{x'[t] == x[t]*y[t], D[y[t], t] == -x[t]}" """,
     """rhs = "[diff(x(t), t) = x(t)*y(t), diff(y(t), t) = -x(t)]" """,
+    """rhs = "eqs := {diff(x(t), t) = x(t)*y(t), diff(y(t), t) = -x(t)};" """,
+    """rhs = "eqs = [x' = x*y, y' = -x];" """,
     """rhs = "D(x)(t) = x(t)*y(t); Derivative(y(t), t) = -x(t)" """,
     """rhs = "x_dot = x*y; ydot = -x" """,
     """rhs = "dx(t)/dt = x(t)*y(t); dydt = -x(t)" """,
@@ -40,8 +42,16 @@ def test_the_variables_have_the_order_of_the_list_where_there_is_one():
     assert [str(polynomial) for polynomial in file.system.rhs] == ["-x", "y*x"]
 
 
-def test_one_text_may_hold_right_hand_sides_alone():
-    assert km.parse_system('variables = ["x", "y"]\n[system]\nrhs = "x*y; -x"', "alone").system == PLAIN
+@pytest.mark.parametrize(
+    "rhs", ['"x*y; -x"', '["x*y; -x"]', '"x*y, -x"', '["x*y, -x"]', '["[x*y, -x]"]', '["{x*y, -x};"]']
+)
+def test_one_text_may_hold_right_hand_sides_alone(rhs):
+    assert km.parse_system(f'variables = ["x", "y"]\n[system]\nrhs = {rhs}', "alone").system == PLAIN
+
+
+def test_a_letter_that_is_not_ascii_is_named():
+    with pytest.raises(InputError, match="a name is made of ASCII letters, digits and _: rename θ"):
+        km.System("θ' = x; x' = θ^2")
 
 
 def test_parameters_stand_in_equations():
