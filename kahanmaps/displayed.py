@@ -36,7 +36,9 @@ class WithoutTruthValue:
             hint = "use .holds, which is True, False or None (undecided)"
         else:
             hint = "use one of its attributes, or `is not None`"
-        raise TypeError(f"the truth value of a {type(self).__name__} is ambiguous: {hint}")
+        name = type(self).__name__
+        article = "an" if name[0] in "AEIOU" else "a"
+        raise TypeError(f"the truth value of {article} {name} is ambiguous: {hint}")
 
 
 class Printed(Displayed, WithoutTruthValue):

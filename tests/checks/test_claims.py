@@ -10,6 +10,7 @@ from fractions import Fraction
 import pytest
 from check_helpers import QUICK, file_of, hamiltonian_of, system_of
 
+import kahanmaps as km
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness, combined
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
@@ -50,6 +51,8 @@ def test_a_result_has_no_truth_value_and_says_what_to_ask_instead(result):
 def test_a_search_has_no_truth_value_either():
     with pytest.raises(TypeError, match="truth value of a DegreeGrowth is ambiguous: use one of its attributes"):
         bool(degree_growth(system_of("x", "x^2"), max_terms=2))
+    with pytest.raises(TypeError, match="truth value of an IntegralSearch is ambiguous"):
+        bool(km.find_integrals("euler_top", eps="1/5", max_degree=1))
 
 
 # By hand: refuted before undecided before supported before proved.
