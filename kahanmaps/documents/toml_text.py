@@ -36,6 +36,8 @@ class TomlKind(NamedTuple):
                 raise InputError(f"cannot read the {self.name} {path}: it is a pipe or a device, expected a file")
             with open(path, "rb") as stream:
                 return stream.read(self.most + 1)
+        except InputError:  # a ValueError as well
+            raise
         except OSError as error:
             raise InputError(f"cannot read the {self.name} {path}: {error.strerror or error}") from error
         except ValueError as error:  # a path with a NUL character

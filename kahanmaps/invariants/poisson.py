@@ -11,7 +11,6 @@ written down, and Pi(x) = J - eps^2 f'(x)^2 J of Hamiltonian systems. Source: pe
 
 from __future__ import annotations
 
-import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -24,10 +23,13 @@ from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
 from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
-from kahanmaps.errors import InputError, quoted
+from kahanmaps.documents.toml_text import TomlKind
+from kahanmaps.errors import InputError, SystemFileError, quoted
 from kahanmaps.invariants.phase_functions import at_eps, where
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
+
+_TENSOR_FILE = TomlKind("tensor", 4_000_000, SystemFileError)
 
 
 def poisson_tensor(hamiltonian: CubicHamiltonian, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -136,10 +138,7 @@ class GivenTensor(PoissonTensor):
 
         Raises InputError for a file that cannot be read or says something else.
         """
-        try:
-            document = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"), parse_float=str)
-        except (OSError, ValueError, RecursionError) as error:
-            raise InputError(f"cannot read the tensor in {path}: {error}") from error
+        document = _TENSOR_FILE.document(_TENSOR_FILE.read(path), str(path))
         section = document.get("poisson")
         rows = section.get("tensor") if isinstance(section, dict) else None
         if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):

@@ -6,6 +6,9 @@ generic Hamiltonian in dimension 4. Tensors that are given are decided, for maps
 second time, det dPhi and dPhi from dual numbers.
 """
 
+import os
+import subprocess
+import sys
 from fractions import Fraction
 
 import pytest
@@ -378,6 +381,14 @@ def test_a_tensor_that_is_0_at_the_eps_and_parameters_in_force_is_wrong_use(entr
     path.write_text(f'[poisson]\ntensor = [["0", "{entry}"], ["-({entry})", "0"]]\n')
     with pytest.raises(InputError, match=message):
         check_poisson(file, how, GivenTensor.read(path, file.variables, file.parameters))
+
+
+def test_a_tensor_in_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")  # nobody ever writes to it
+    command = [sys.executable, "-m", "kahanmaps_cli", "check-poisson", "euler_top", "--tensor", "pipe"]
+    outcome = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=30, check=False)
+    assert outcome.returncode == 2
+    assert outcome.stderr == "Error: cannot read the tensor pipe: it is a pipe or a device, expected a file\n"
 
 
 @pytest.mark.parametrize(
