@@ -43,6 +43,7 @@ from kahanmaps.laboratory.growth.proofs import (
     linear_iterate,
     monomial_degree,
     monomial_growth,
+    monomial_period,
 )
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
@@ -341,7 +342,8 @@ class _Search:
         """Step after step until something ends it."""
         matrix = exponent_matrix(self._map, self._eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
-            return self._by_matrix(matrix, proof, max_terms)
+            periodic = monomial_period(self._map, self._eps, matrix) if proof.growth is Growth.BOUNDED else None
+            return self._by_matrix(matrix, periodic or proof, max_terms)
         lines = [self._line() for _ in range(_LINES)]
         self._is_explicit = lines[0].is_explicit
         try:

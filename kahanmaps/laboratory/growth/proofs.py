@@ -28,6 +28,7 @@ _BUDGET = 1_000_000  # products of terms, to compose formulas
 _MAX_FACTORS = 24  # of a composition
 _MAX_DIMENSION = 8  # for the algebraic number: polynomials of degree up to 2 dim^2 are factored
 _BITS = 256
+_LARGEST_ORDER = 60  # of a matrix of integers with at most _MAX_DIMENSION rows
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,19 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
     growth = classes[power] if power < 3 else Growth.POLYNOMIAL
     return GrowthProof(growth, power, rate, f"powers of the exponent matrix {rows} of a monomial map")
+
+
+def monomial_period(map_: BirationalMap, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
+    """The proof that a monomial map with this exponent matrix is periodic; None where it is not, or is the identity.
+
+    If A^n = 1, the iterate n multiplies each variable by a number or a function of eps. Its order is then 1 or 2.
+    """
+    one = matrix**0
+    order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == one), None)
+    periods = [] if order is None else [order, 2 * order]
+    proofs = (linear_iterate(map_, eps, period) for period in periods)
+    found = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
+    return None if found is None or found.period == 1 else found
 
 
 def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
