@@ -163,7 +163,6 @@ from kahanmaps.maps.floats.fast import float_function as float_function
 from kahanmaps.maps.floats.lyapunov import Lyapunov as Lyapunov
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
 from kahanmaps.maps.floats.stream import NpyFile as NpyFile
-from kahanmaps.maps.implicit import det_of as det_of
 from kahanmaps.maps.kahan import Kahan as Kahan
 from kahanmaps.maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from kahanmaps.maps.normal_form.division import text_in_gamma as text_in_gamma

@@ -192,7 +192,7 @@ READERS = {
     "orbit.csv": lambda path: read_orbits(path, None),
     "orbit.jsonl": lambda path: read_orbits(path, None),
     "orbits.npy": lambda path: read_orbits(path, None),
-    "starts.npy": lambda path: read_starts(path, ["x", "y"], None),
+    "starts.npy": lambda path: read_starts(path, ["x", "y"]),
     "heights.json": lambda path: curves_of_record(read_record(path), path),
     "degrees.json": lambda path: degrees_of_record(read_record(path), path),
     "picture.png": read_recipe,
