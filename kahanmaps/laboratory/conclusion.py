@@ -96,7 +96,10 @@ def _linear(facts: _Facts) -> _Verdict | None:
     eps, B = facts.found.eps, facts.found.file.system.B
     if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
         return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Known.PROVED)
+    proof = None if facts.degrees is None else facts.degrees.proof
     closes = facts.closes and f"; {facts.closes}"
+    if proof is not None and proof.is_identity:
+        closes = f"; {proof.reason} (proved)"
     sentence = f"The system is linear, and so is its Kahan map; {facts.integrals}{closes}."
     return _Verdict("linear", sentence, ground=Known.PROVED)
 

@@ -16,6 +16,7 @@ from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 OPEN = Patterns((), None, False, "not looked at")
 
@@ -114,6 +115,16 @@ def test_a_wrong_period_is_not_proved(monkeypatch):
     assert [n for n in range(1, 11) if linear_iterate(lyness, None, n) is not None] == [5, 10]
     monkeypatch.setattr(proofs, "_BUDGET", 10)
     assert linear_iterate(lyness, None, 5) is None
+
+
+@pytest.mark.parametrize(("rhs", "eps", "order"), [("3*y; -x", 1, 3), ("y; -x", 1, 4), ("y; -3*x", "1/3", 6)])
+def test_a_linear_map_of_finite_order_is_proved_periodic(rhs, eps, order):
+    """The Kahan map of x' = a y, y' = -b x rotates by an angle whose half has the tangent eps sqrt(a b)."""
+    system = QuadraticSystem.from_text(["x", "y"], rhs.split("; "))
+    found = degree_growth(system, eps=eps).proof
+    assert (found.period, found.is_identity, found.reason) == (order, True, f"Phi^{order} is the identity")
+    assert not degree_growth(system, eps="1/7").proof.is_identity
+    assert not degree_growth(system).proof.is_identity
 
 
 def test_a_linear_iterate_need_not_be_the_identity():

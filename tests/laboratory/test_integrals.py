@@ -249,7 +249,7 @@ def test_orbits_have_settled_where_the_last_of_several_degrees_showed_no_more(co
 
 
 def test_formulas_with_symbols_that_depend_at_the_values_of_the_file_say_so():
-    said = "at a1 = 0, a2 = 0, a3 = 1 only 1 of the 2 formulas are independent"  # x2 and x3 are both constant there
+    said = "at a1 = 0, a2 = 0, a3 = 1 only 1 of the 2 formulas is independent"  # x2 and x3 are both constant there
     symbols = ["a1", "a2", "a3"]
     assert said in find_integrals(load("euler_top", {"a1": 0, "a2": 0}), symbols=symbols).reason
     assert integrals_of("euler_top", *symbols).reason == ""

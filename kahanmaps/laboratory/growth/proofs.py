@@ -8,6 +8,7 @@ has degree 1 on projective space, which is decided by composing formulas, d_(n +
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -26,6 +27,7 @@ from kahanmaps.maps.implicit import BirationalMap
 
 _BUDGET = 1_000_000  # products of terms, to compose formulas
 _MAX_FACTORS = 24  # of a composition
+_MAX_ORDER = 12  # of a linear iterate
 _MAX_DIMENSION = 8  # for the algebraic number: polynomials of degree up to 2 dim^2 are factored
 _BITS = 256
 _LARGEST_ORDER = 60  # of a matrix of integers with at most _MAX_DIMENSION rows
@@ -199,7 +201,8 @@ def _at(polynomial: fmpz_poly, x: arb) -> arb:
 def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> GrowthProof | None:
     """The proof that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
 
-    Exact, by composing formulas. None where it is not, and where the formulas have too many terms.
+    Exact, by composing formulas. None where it is not, and where the formulas have too many terms. Of a linear iterate
+    powers up to 12 are tried as well, the first that is the identity is named then.
     """
     if map_.symbols or map_.root is not None:
         return None
@@ -217,6 +220,14 @@ def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> Growth
         return None
     if not is_identity and _degree([(entry.above, entry.below) for entry in point], n) != 1:
         return None
+    linear = period
+    with suppress(BudgetExceeded, SingularStep):
+        while not is_identity and period < _MAX_ORDER * linear:
+            for _ in range(linear):
+                point = over.step(point)
+            period += linear
+            is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
+    period = period if is_identity else linear
     iterate = "the map" if period == 1 else f"iterate {period}"
     reason = f"Phi^{period} is the identity" if is_identity else f"{iterate} is linear on projective space"
     return GrowthProof(Growth.BOUNDED, 0, GrowthRate(fmpz_poly([-1, 1]), "1", "1", 1), reason, period, is_identity)

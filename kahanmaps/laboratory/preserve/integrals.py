@@ -385,7 +385,8 @@ def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
     if left == len(rows):
         return ""
     told = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
-    return f"at {told} only {left} of the {len(rows)} formulas are independent: without --symbolic others may be found"
+    how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
+    return f"at {told} {how_many}: without --symbolic others may be found"
 
 
 def _period_at_the_values(laboratory: Laboratory) -> int | None:
