@@ -170,12 +170,12 @@ SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids
             for words in [
                 "cycles paper_m3_irreducible --prime 11",
                 "find-integrals paper_m3",
-                "find-density henon_heiles",
+                "find-density clebsch_first_flow",
                 "degrees zhukovski_volterra_2 --terms 100 --seconds 60",
                 "singularities paper_m2 --steps 10000",
                 "scan lotka_volterra --over a,b,c,d",
                 "heights henon_heiles --seconds 60 --max-digits 1000000",
-                "lyapunov lorenz --start 1,2,3 --eps 1/400 --steps 100000000",
+                "lyapunov lorenz --random 3 --box 5 --eps 1/400 --steps 100000000",
                 "verify --m 4",
             ]
         ),

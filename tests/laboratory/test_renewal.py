@@ -56,7 +56,7 @@ OF_ONE_FORM = {
 @pytest.mark.parametrize("name", quick(WRITTEN, DAILY))
 def test_the_degrees_of_the_catalogue_are_explained(name):
     found = degree_growth(load(name).map, seconds=30, max_degree=500)
-    if found.degrees[1] > 1:
+    if found.degrees[1] > 1 and found.proof is None:
         assert found.explained is not None
         assert tuple(coefficients(found.patterns.fraction, len(found.degrees))) == found.degrees
         assert found.explained.characteristic == (found.fitted or found.explained).characteristic
