@@ -24,8 +24,8 @@ def errors_of(survey, function):
 top = km.load("euler_top")
 functions = known_functions(top, km.QQ.convert(EPS))
 survey = survey_drift(top.system, EPS, [1, "1/2", "1/3"], STEPS, functions, ("generic", "rk4", "midpoint"))
-print(f"{top.name}, {STEPS} steps, relative error of F1:")
-for method, error in errors_of(survey, "F1").items():
+print(f"{top.name}, {STEPS} steps, relative error of {functions[0].name}:")
+for method, error in errors_of(survey, functions[0].name).items():
     size = "rounding only" if error < 1e-13 else f"about {error:.0e}"
     print(f"  {METHODS[method]}: {size}")
 
