@@ -51,9 +51,7 @@ docs: dev-venv  ## the documentation as pages, in docs/_build/html
 	@echo "docs/_build/html/index.html"
 
 pictures: dev-venv  ## the pictures of the documentation again, by the commands they carry
-	@cd docs/pictures && PATH="$$PWD/../../.venv/bin:$$PATH" && for picture in *.png *.svg; do \
-	    eval "$$(kahanmaps plot recipe $$picture)" || exit; \
-	done
+	@PATH="$$PWD/.venv/bin:$$PATH" $(python) docs/_ext/redraw.py docs/pictures/*.png docs/pictures/*.svg
 
 docs-links: dev-venv  ## do the links of the documentation to other sites work? Needs the network
 	@$(python) -m sphinx -b linkcheck -q -d docs/_build/trees-links docs docs/_build/links

@@ -51,6 +51,8 @@ def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
 # (command, option) -> what to use instead of an option that is there no longer
 REMOVED_OPTIONS = {
     ("ensemble", "--arithmetic"): "ensembles are in floating point; kahanmaps orbit has exact, mod:P and ball:BITS",
+    ("plot portrait", "--density"): "kahanmaps ensemble -o FILE.npy and numpy.histogram2d count points in cells",
+    ("plot portrait", "--from"): "a portrait is computed from a SYSTEM; matplotlib draws the points of a file",
 }
 
 

@@ -2,13 +2,11 @@
 
 style             sizes in centimetres, fonts, colours that the colour-blind and a grey printer tell apart
 figures           an empty figure in a style, its texts and legend; as a file (PDF, SVG, PNG) or as SVG inside a page
-recipe            how a picture was made: written into its file, read from it
-terminal          a figure as characters, for a terminal
-zero_band         a logarithmic axis on which an exact zero has a place
+recipe            how a picture was made, for the metadata of its file
 growth            degrees of iterates, heights of exact orbits (height_curves, degree_records: read from records)
 scan              the plane of two parameters, with what a scan found in it
+squares           do two maps commute, seen from one point (draw_squares)
 drifts            how far integrals drift along float orbits
 portraits         orbits of planar maps and of sections, equilibria, the flow
 curves            invariant curves, and the planes they lie in
-batch             results of a batch: counts, distributions, one number against another
 """

@@ -34,12 +34,8 @@ def draw_squares(
     style: Style,
     axes: tuple[int, int] | None = None,
     captions: Sequence[str] = (),
-    *,
-    below: bool = False,
 ) -> Figure:
     """One panel for each pair of maps, in two coordinates: those given, or those in which the squares are widest.
-
-    They stand side by side, or one `below` the other.
 
     `captions` stand above the panels, in place of the names of the maps. Raises InputError for numbers that are none of
     variables, and for a start beyond the range of what can be drawn.
@@ -52,10 +48,9 @@ def draw_squares(
         raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
     with drawing(style):
         letter = style.font_size * 2.54 / 72
-        rows, columns = (len(found), 1) if below else (1, len(found))
-        side = style.width / max(columns, 1.25) - 4.2 * letter
-        figure = new_figure(style, rows * (side + 10 * letter) / style.width)
-        for k, panel in enumerate(figure.subplots(rows, columns, squeeze=False).ravel()):
+        side = style.width / max(len(found), 1.25) - 4.2 * letter
+        figure = new_figure(style, (side + 10 * letter) / style.width)
+        for k, panel in enumerate(figure.subplots(1, len(found), squeeze=False).ravel()):
             caption = captions[k] if k < len(captions) else ""
             _draw(panel, found[k], chosen, caption, letter / side, style)
         _legend(figure)

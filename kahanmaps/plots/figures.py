@@ -113,6 +113,13 @@ def label_number(value: Any) -> str:
     return text if len(text) <= _LONGEST else rf"{text[:10]}\ldots{text[-10:]}"
 
 
+def write_title(figure: Figure, text: str, style: Style) -> None:
+    """Set a title above all panels, in lines that fit the figure."""
+    size = style.font_size + 1
+    with drawing(style):
+        figure.suptitle(plain(wrapped(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
+
+
 def legend_columns(labels: Sequence[str], style: Style, most: int = 4) -> int:
     """How many columns of these labels fit into the width of the style.
 

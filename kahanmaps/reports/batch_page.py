@@ -11,13 +11,11 @@ from kahanmaps.display.experiments import status_table, table_html
 from kahanmaps.errors import counted
 from kahanmaps.experiments.results.records import Outcome
 from kahanmaps.experiments.results.summary import summarise
-from kahanmaps.plots.batch import draw_batch
 from kahanmaps.reports.page import Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.results.store import Store
-    from kahanmaps.experiments.results.summary import Summary
     from kahanmaps.plots.recipe import Recipe
 
 _ROWS = 400
@@ -43,18 +41,9 @@ def batch_page(
     done = sum(sum(one.outcomes.values()) for one in status)
     every = sum(one.tasks for one in status)
     lead = f"{counted(len(status), 'experiment')}, {done} of {every} tasks done"
-    ends = "What became of the tasks,"
-    counts = _figure("counts", ends, summary, (), "The tables have the numbers", pictures) if summary.groups else ""
-    spread = f"Distribution of {', '.join(values)}"
-    about = "The table above has the quantiles"
     sections = [
-        Section("status", "Progress", f"{wide(status_table(status))}\n{counts}"),
+        Section("status", "Progress", wide(status_table(status))),
         Section("summary", "Summary", tables if done else "<p>There are no results yet.</p>"),
-        Section(
-            "distributions",
-            "Distributions",
-            _figure("distributions-figure", spread, summary, values, about, pictures) if values else "",
-        ),
         Section("exceptions", "Exceptional tasks", _exceptions(store)),
         Section("experiments", "The experiments", definitions),
     ]
@@ -83,10 +72,3 @@ def _exceptions(store: Store) -> str:
     more = f"<p>… and {rest} more</p>" if (rest := sum(1 for _ in found)) else ""
     about = "<p>What <code>kahanmaps batch show KEY --db FILE</code> tells all about.</p>"
     return about + wide(markup.table(["experiment", "number", "key", "what became of it", "message"], rows)) + more
-
-
-def _figure(name: str, what: str, summary: Summary, values: Sequence[str], tables: str, pictures: Pictures) -> str:
-    """The groups of a summary: what became of their tasks, or the distributions of `values`."""
-
-    caption = f"{what} by {', '.join(summary.by)}."
-    return pictures.draw(name, caption, f"{caption} {tables}.", lambda style: draw_batch(summary, values, style))

@@ -56,11 +56,10 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def least_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the lines of `LEAST` run: with a database, a spec and a picture."""
+    """Where the lines of `LEAST` run: with a database and a spec."""
     monkeypatch.chdir(tmp_path)
     planned(tmp_path / "DB", 1, 2, records=[ok(1)])
     Path("SPEC").write_text('[experiments.a]\ntask = "orbit"\nsystem = "harmonic"\naxes = {eps = "1/10"}\n')
-    Path("PICTURE").write_bytes(b"\x89PNG\r\n\x1a\n")
     return tmp_path
 
 
@@ -68,7 +67,6 @@ def least_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are made but not rendered: for tests of what is said."""
     monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
-    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
 
 
 @pytest.fixture

@@ -26,10 +26,8 @@ from helpers import table
 from small_databases import ok, planned
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.orbits.stored import read_orbits
 from kahanmaps.plots.degree_records import degrees_of_record
 from kahanmaps.plots.height_curves import curves_of_record
-from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli.main import main
 from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.runs.ensemble_starts import read_starts
@@ -47,7 +45,6 @@ READS = {
 # Made before each test: what is in the file, by the name of what takes it.
 CONTENT = {
     "starts": "starts.npy",
-    "stored": "orbit.npz",
     "record": "heights.json",
     "records": "degrees.json",
     "db": "study.db",
@@ -63,9 +60,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     planned(folder / "study.db", 1, records=[ok(1)])
     np.save(folder / "starts.npy", np.ones((1, 2)))
-    for name, more in {"orbit.npz": "", "float.npz": "--arithmetic float", "orbit.csv": "", "orbit.jsonl": ""}.items():
-        assert main([*shlex.split(f"orbit harmonic {ORBIT} {more} -q -o"), str(folder / name)]) == 0
-    assert main(["plot", "degrees", "harmonic", "-q", "-o", str(folder / "picture.png")]) == 0
     for name, line in {
         "system.toml": "systems harmonic --toml",
         "member.toml": "systems paper_m2 --toml",
@@ -187,15 +181,9 @@ def test_a_pipe_is_no_place_for_a_file_that_grows(kahanmaps, tmp_path, command):
 # Damaged files
 
 READERS = {
-    "orbit.npz": lambda path: read_orbits(path, None),
-    "float.npz": lambda path: read_orbits(path, None),
-    "orbit.csv": lambda path: read_orbits(path, None),
-    "orbit.jsonl": lambda path: read_orbits(path, None),
-    "orbits.npy": lambda path: read_orbits(path, None),
     "starts.npy": lambda path: read_starts(path, ["x", "y"]),
     "heights.json": lambda path: curves_of_record(read_record(path), path),
     "degrees.json": lambda path: degrees_of_record(read_record(path), path),
-    "picture.png": read_recipe,
 }
 NASTY = (None, float("inf"), "1/0", [], {})
 
@@ -222,14 +210,14 @@ def is_read_or_refused(read: Callable[[str], Any], path: Path) -> bool:
 
 @pytest.mark.parametrize("name", READERS)
 def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name):
-    content = (made / name.replace("orbits.npy", "starts.npy")).read_bytes()
+    content = (made / name).read_bytes()
     path = tmp_path / name
     for damaged in damages(content, 12):
         path.write_bytes(damaged)
         assert is_read_or_refused(READERS[name], path)
 
 
-@pytest.mark.parametrize("name", ["degrees.json", "orbit.jsonl"])
+@pytest.mark.parametrize("name", ["degrees.json", "heights.json"])
 def test_a_record_with_any_other_value_is_read_or_refused_with_its_name(made, tmp_path, name):
     path = tmp_path / name
     records = [json.loads(line) for line in (made / name).read_text().splitlines()]

@@ -39,7 +39,7 @@ ENDINGS = {
     "starts": "npy",
     "record": "json",
 }
-PATHS = {"system", "other", "systems", "output", "db", "record", "name", "picture"}  # some are names as well
+PATHS = {"system", "other", "systems", "output", "db", "record", "name"}  # some are names as well
 KINDS = {
     "integer": ("ShortInteger", "IntRange", "Whole"),
     "number of machine": ("FloatParamType", "FloatRange", "Seconds"),
@@ -135,7 +135,6 @@ def test_numbers_and_paths_that_nobody_means_are_refused_in_a_sentence(words, ca
         "batch show KEY --db DB",
         "batch run SPEC --dry-run --db DB",
         "report --db DB -o x.html",
-        "plot batch DB --format text",
     ],
 )
 def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, line):

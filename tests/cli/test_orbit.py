@@ -219,7 +219,6 @@ def test_what_a_csv_file_is_of_stands_beside_it(kahanmaps, tmp_path):
     assert {"record": "header", **told["header"]} == header
     assert {"record": "end", **told["end"]} == end
     assert len(path.read_text().splitlines()) == 1 + len(points)
-    assert kahanmaps("plot portrait --format text --from", path).status == 0
 
 
 # Talk

@@ -49,7 +49,7 @@ COMMANDS = [
     "batch summary --db r.db --by name,message,system --markdown",
     "batch export --db r.db --csv",
     "batch show KEY --db r.db",
-    f"plot portrait {ORBIT} --format svg --title <script>\x1b[31m",
+    f"plot portrait {ORBIT} -o - --format svg --title <script>\x1b[31m",
     "analyze s.toml --seconds 0.05 --markdown",
     "report s.toml --from checks --no-pictures -o -",
     *(f"convert s.toml --to {language}" for language in ("pari", "latex", "mathematica")),

@@ -9,17 +9,15 @@ from matplotlib.collections import PathCollection
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.plots.curves.level_sets import level_curves
-from kahanmaps.plots.density import density_of
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.draw_portrait import draw_density, draw_portrait
+from kahanmaps.plots.portraits.draw_portrait import draw_portrait
 from kahanmaps.plots.portraits.portrait import portrait_of
 from kahanmaps.plots.portraits.trajectories import (
     MAX_POINTS,
     Trajectories,
     ensemble_for,
     euler_orbits,
-    require_points,
     walked,
 )
 from kahanmaps.plots.style import Style
@@ -83,8 +81,8 @@ def test_kahans_orbit_of_the_same_start_does_not_spiral():
 
 
 def test_more_points_than_can_be_drawn_are_refused():
-    with pytest.raises(InputError, match="take fewer, or a density"):
-        require_points(MAX_POINTS + 1, 1, 2)
+    with pytest.raises(InputError, match="take fewer"):
+        orbits(1, MAX_POINTS)
 
 
 def test_more_orbits_are_one_cloud_with_a_colour_for_each():
@@ -150,16 +148,3 @@ def test_points_outside_the_window_are_not_drawn_in_space():
 def test_no_points_at_all_are_an_empty_picture():
     found = Trajectories(("x", "y"), np.full((2, 1, 2), np.nan), np.arange(2))
     assert picture_bytes(draw_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
-
-
-def test_empty_cells_of_a_density_are_white():
-    found = density_of([np.array([[0.1, 0.1]])], AXES, ((0, 1), (0, 1)), (2, 2))
-    (image,) = draw_density(found, STYLE).axes[0].images
-    assert image.get_array().mask.tolist() == [[False, True], [True, True]]
-
-
-def test_the_lowest_row_of_a_density_is_below():
-    found = density_of([np.array([[0.1, 0.1]])], AXES, ((0, 1), (0, 1)), (2, 2))
-    image = draw_density(found, STYLE).axes[0].images[0]
-    assert image.origin == "lower"
-    assert image.get_extent() == [0, 1, 0, 1]

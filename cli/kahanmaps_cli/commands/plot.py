@@ -1,24 +1,34 @@
-"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | commute | batch | recipe."""
+"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | commute."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import batch, commute, drift, growth, invariant_curves, portrait, recipe, scan
+from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, scan
 
 
-@click.group("plot", cls=SuggestingGroup)
+class Pictures(SuggestingGroup):
+    """The group, with what to use instead of the commands that it had."""
+
+    removed: ClassVar = {
+        "batch": "kahanmaps batch export writes tables for pandas and matplotlib",
+        "recipe": "exiftool, or any program that shows metadata, prints the command in a picture (its description)",
+    }
+
+
+@click.group("plot", cls=Pictures)
 def command() -> None:
-    """Pictures as PDF, SVG or PNG for papers, or drawn in the terminal.
+    """Pictures as PDF, SVG or PNG for papers.
 
     \b
-      kahanmaps plot portrait lotka_volterra --eps 1/20
       kahanmaps plot portrait lotka_volterra --eps 1/20 -o portrait.pdf
       kahanmaps plot degrees euler_top -o degrees.svg --size 8.6
-      kahanmaps plot recipe portrait.pdf
 
-    Pictures need matplotlib: pip install 'kahanmaps[plot]'. Each of them carries the command that makes it.
+    Pictures need matplotlib: pip install 'kahanmaps[plot]'. The metadata of each hold the command that makes it, and
+    the system.
     """
 
 
@@ -30,7 +40,5 @@ for _command in (
     growth.degrees,
     scan.command,
     commute.command,
-    batch.command,
-    recipe.command,
 ):
     command.add_command(_command)

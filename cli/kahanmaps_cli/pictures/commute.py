@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
-from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from, two_variables
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from, two_variables
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -30,7 +30,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The square x, Phi_f x, Phi_g x: do its two fourth corners coincide?
 
     \b
-      kahanmaps plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/50
+      kahanmaps plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/50 \\
+          -o square.pdf
       kahanmaps plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/100 \\
           --steps 5 -o lattice.pdf
       kahanmaps plot commute euler_top zhukovski_volterra_1 \\
@@ -61,8 +62,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
         pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
     found = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-    below = goes_to_terminal(options)  # side by side, two panels of it are too coarse
-    figure = lib.draw_squares(found, style_from(options), chosen, captions, below=below)
+    figure = lib.draw_squares(found, style_from(options), chosen, captions)
     talk = []
     for square in found:
         names = captions[0] if captions else " and ".join(square.pair.names)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import click
@@ -11,10 +10,9 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, goes_to_terminal, picture, style_from
+from kahanmaps_cli.pictures.output import Drawn, picture, style_from
 from kahanmaps_cli.screen.progress import Progress
 
-_WIDE = 24.0  # centimetres: in a terminal panels stand side by side, for its lines are few
 _LONGEST = 160  # characters of a start that is told
 _SHOWN = 3  # known integrals, unless more are asked for
 
@@ -46,10 +44,11 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """How far integrals drift along float orbits: Kahan, RK4, implicit midpoint.
 
     \b
-      kahanmaps plot drift henon_heiles --eps 1/20
+      kahanmaps plot drift henon_heiles --eps 1/20 -o drift.svg
       kahanmaps plot drift weierstrass --eps 1/50 --steps 100000 -o drift.pdf
-      kahanmaps plot drift euler_top --start 1,1/2,1/3 --eps 1/10 --integral F1
-      kahanmaps plot drift harmonic --eps 1/10 --integral E=x^2+y^2
+      kahanmaps plot drift euler_top --start 1,1/2,1/3 --eps 1/10 --integral F1 \\
+          -o top.svg
+      kahanmaps plot drift harmonic --eps 1/10 --integral E=x^2+y^2 -o e.png
 
     A panel shows |I(x_n) - I(x_0)|/|I(x_0)| for one function I, absolute where
     I(x_0) = 0; all methods take the time step 2 eps. Kahan maps conserve the
@@ -68,7 +67,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         raise lib.InputError("found eps = 0, expected another number: nothing moves")
     talk: list[str] = []
     functions = _functions(rounded, eps, options, talk)
-    form, reason = _form(rounded)
+    form, reason = lib.float_normal_form(rounded)
     methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
     if "normal-form" in methods and form is None:
         raise lib.InputError(f"the method normal-form needs a normal form, and there is none: {reason}")
@@ -84,22 +83,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         linear_bins=options["scale"] == "semilog",
         progress=progress,
     )
-    style = style_from(options)
-    if options["size"] is None and options["output"] == "-" and goes_to_terminal(options):
-        style = replace(style, width=_WIDE, height=0.56 * _WIDE)
     early = not all(end.is_whole for end in survey.ends.values())
-    figure = lib.draw_drift(survey, style, scale=options["scale"])
+    figure = lib.draw_drift(survey, style_from(options), scale=options["scale"])
     return Drawn(figure, file, [*talk, *_told(survey)], 3 if early else 0)
-
-
-def _form(file: lib.SystemFile) -> tuple[lib.NormalForm | None, str]:
-    """The normal form that machine numbers can step in, or why there is none."""
-    normal_form = file.normal_form
-    if isinstance(normal_form, lib.NoNormalForm):
-        return None, normal_form.reason
-    if normal_form.T is not None:
-        return None, "in machine numbers only J = [[0, I], [-I, 0]] has one"
-    return normal_form.form, ""
 
 
 def _functions(file: lib.SystemFile, eps: Any, options: dict[str, Any], talk: list[str]) -> list[lib.WatchedFunction]:

@@ -54,10 +54,11 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
     """Degrees of the iterates of maps, with the recurrence they satisfy.
 
     \b
-      kahanmaps plot degrees euler_top
+      kahanmaps plot degrees euler_top -o degrees.png
       kahanmaps plot degrees euler_top lotka_volterra weierstrass -o degrees.pdf
       kahanmaps plot degrees weierstrass --eps 1/10 --scale loglog -o degrees.svg
-      kahanmaps degrees euler_top --json | kahanmaps plot degrees --from -
+      kahanmaps degrees euler_top --json | kahanmaps plot degrees --from - \\
+          -o degrees.svg
 
     Marks are measured degrees (docs: kahanmaps degrees --help), a solid line is
     the recurrence they satisfy. Dots join degrees for which none was checked:
@@ -125,10 +126,11 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
     """Heights of exact orbits against the step: how fast the numbers grow.
 
     \b
-      kahanmaps plot heights weierstrass
+      kahanmaps plot heights weierstrass -o heights.png
       kahanmaps plot heights weierstrass --eps 1/10 --random 5 -o heights.pdf
       kahanmaps plot heights lotka_volterra --scale log -o heights.svg
-      kahanmaps heights weierstrass --json | kahanmaps plot heights --from -
+      kahanmaps heights weierstrass --json | kahanmaps plot heights --from - \\
+          -o heights.svg
 
     The height is the bit length of the largest integer that a point needs; a
     colour is an eps, a curve an orbit, a line the growth that was fitted.

@@ -36,7 +36,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The curves that carry the orbits of a member of the commuting family, plane by plane.
 
     \b
-      kahanmaps plot invariant-curves paper_m2 --start 1/2,-1/3,0,1 --eps 1/10
+      kahanmaps plot invariant-curves paper_m2 --start 1/2,-1/3,0,1 --eps 1/10 \\
+          -o curves.pdf
       kahanmaps plot invariant-curves paper_m3 --start 1,0,1/2,0,1/3,1 \\
           --eps 1/20 --original x1,x2 -o product.pdf
       kahanmaps plot invariant-curves paper_m2 --start 1,0,1/2,0 \\

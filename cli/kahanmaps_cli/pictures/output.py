@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -20,7 +18,6 @@ from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import OptionType, PointText
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, as_typed, say
-from kahanmaps_cli.screen.terminal import is_coloured
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,8 +25,6 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"
-_MOST_ROWS = 60
-_DARKEST, _LIGHTEST = 85, 165  # what can be seen on black and on white, of 255
 
 
 class Size(OptionType):
@@ -48,7 +43,7 @@ class Size(OptionType):
 
 
 class PictureCommand(click.Command):
-    """A command that remembers the words it was called with: they are the recipe of the picture."""
+    """A command that remembers the words it was called with: they stand in the metadata of the picture."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         ctx.meta[_ARGUMENTS] = list(args)
@@ -60,14 +55,11 @@ picture_options: Callable[[F], F] = stack(
         "-o",
         "--output",
         type=OutputFile(),
-        default="-",
-        show_default=True,
+        required=True,
         metavar="FILE",
-        help="FILE.pdf, .svg or .png; - draws in the terminal.",
+        help="FILE.pdf, FILE.svg or FILE.png; - with --format is standard output.",
     ),
-    click.option(
-        "--format", "kind", type=click.Choice(["pdf", "svg", "png", "text"]), help="Instead of by the ending."
-    ),
+    click.option("--format", "kind", type=click.Choice(["pdf", "svg", "png"]), help="Instead of by the ending."),
     click.option("--size", type=Size(), metavar="WxH", help="Width, or width x height, in cm (default 12 wide)."),
     click.option("--font-size", type=float, metavar="PT", help="Size of the letters in points (default 9)."),
     click.option("--dpi", type=int, metavar="N", help="Dots per inch of PNG and of clouds of points (default 300)."),
@@ -84,16 +76,11 @@ def style_from(options: dict[str, Any]) -> lib.Style:
     return lib.Style(**given)
 
 
-def goes_to_terminal(options: dict[str, Any]) -> bool:
-    """Whether the picture is made of characters."""
-    return options["kind"] == "text" or (options["kind"] is None and options["output"] == "-")
-
-
 @dataclass(frozen=True)
 class Drawn:
     """A picture for `picture` to deliver; None where nothing was found that could be drawn.
 
-    `file` is the system for its recipe, `talk` are sentences for standard error, `status` is the exit status.
+    `file` is the system for its metadata, `talk` are sentences for standard error, `status` is the exit status.
     """
 
     figure: Figure | None
@@ -111,10 +98,10 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
     def made(draw: Draw) -> click.Command:
         def command(**options: Any) -> int:
             """Draw, talk, and deliver."""
-            lib.require_matplotlib()  # and a picture of no known kind is refused before anything is computed
+            # Sizes and formats that are none are refused before anything is computed.
+            lib.require_matplotlib()
             style_from(options)
-            if options["output"] != "-" and options["kind"] != "text":
-                lib.format_of(options["output"], options["kind"])
+            lib.format_of(options["output"], options["kind"])
             with Progress(options["quiet"]) as progress:
                 drawn = draw(options, progress)
             if not options["quiet"]:
@@ -154,27 +141,22 @@ def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> 
     return variables.index(names[0]), variables.index(names[1])
 
 
-def _deliver(figure: Figure, options: dict[str, Any], file: lib.SystemFile | None) -> None:
-    """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
-    from kahanmaps.plots.figures import plain
+def command_line() -> str:
+    """The command that is running, as one would type it; it has to be a PictureCommand."""
+    context = click.get_current_context()
+    words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
+    return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
 
-    style = style_from(options)
-    path, kind = options["output"], options["kind"]
+
+def _deliver(figure: Figure, options: dict[str, Any], file: lib.SystemFile | None) -> None:
+    """Write the figure to its file or to standard output; the options are those of `picture_options`."""
+    style, path = style_from(options), options["output"]
     if options["title"]:
-        with lib.drawing(style):
-            size = style.font_size + 1
-            figure.suptitle(
-                plain(lib.wrapped(printable(options["title"]), 72 * figure.get_size_inches()[0], size)), fontsize=size
-            )
-    if goes_to_terminal(options):
-        _draw_in_terminal(figure, style, path)
-        return
-    kind = lib.format_of(path, kind)
+        lib.write_title(figure, printable(options["title"]), style)
+    recipe = lib.Recipe(command_line(), "" if file is None else file.to_toml())
     with warnings.catch_warnings(record=True) as found:
         warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
-        content = lib.picture_bytes(
-            figure, kind, style, lib.Recipe(command_line(), "" if file is None else file.to_toml())
-        )
+        content = lib.picture_bytes(figure, lib.format_of(path, options["kind"]), style, recipe)
     if found and not options["quiet"]:
         say("the fonts lack some letters of the texts: they are drawn as boxes")
     if path == "-":
@@ -185,60 +167,3 @@ def _deliver(figure: Figure, options: dict[str, Any], file: lib.SystemFile | Non
     if not options["quiet"]:
         width, height = figure.get_size_inches() * 2.54
         say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
-
-
-def command_line() -> str:
-    """The command that is running, as one would type it; it has to be a PictureCommand."""
-    context = click.get_current_context()
-    words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
-    return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
-
-
-def _draw_in_terminal(figure: Figure, style: lib.Style, path: str) -> None:
-
-    window = shutil.get_terminal_size()
-    columns = max(20, window.columns - 1)
-    width, height = figure.get_size_inches()
-    rows = max(8, min(window.lines - 2, round(columns / 2 * height / width), _MOST_ROWS))
-    try:
-        cells = lib.draw_in_characters(figure, columns, rows, style)
-    except lib.InputError:  # several panels do not fit into a small window, and there they are scrolled
-        cells = lib.draw_in_characters(figure, columns, _MOST_ROWS, style)
-    if path == "-" and is_coloured():
-        _print_in_colour(cells)
-        return
-    text = "".join("".join(cell.character for cell in row).rstrip() + "\n" for row in cells)
-    if path == "-":
-        click.echo(text, nl=False)
-    else:
-        lib.write_whole(path, text.encode())
-
-
-def _print_in_colour(cells: list[list[lib.Cell]]) -> None:
-    from rich.console import Console
-    from rich.text import Text
-
-    colours: Any = "truecolor" if os.environ.get("COLORTERM") in ("truecolor", "24bit") else "256"
-    console = Console(
-        markup=False, emoji=False, highlight=False, force_terminal=True, color_system=colours, width=len(cells[0])
-    )
-    for row in cells:
-        line = Text(no_wrap=True, overflow="crop")
-        for cell in row:
-            colour = None if cell.colour is None else "#{:02x}{:02x}{:02x}".format(*_seen_on_both_grounds(cell.colour))
-            line.append(cell.character, colour)
-        line.rstrip()
-        console.print(line)
-
-
-def _seen_on_both_grounds(colour: tuple[int, int, int]) -> tuple[int, int, int]:
-    """The colour, darker where it would vanish on white and lighter where it would on black."""
-    light = 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2]
-    if light > _LIGHTEST:
-        red, green, blue = (round(c * _LIGHTEST / light) for c in colour)
-    elif light < _DARKEST:
-        part = (_DARKEST - light) / (255 - light)
-        red, green, blue = (round(c + (255 - c) * part) for c in colour)
-    else:
-        red, green, blue = colour
-    return red, green, blue

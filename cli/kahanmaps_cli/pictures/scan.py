@@ -22,10 +22,11 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The plane of two parameters: where degrees grow more slowly.
 
     \b
-      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2
+      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 -o plane.svg
       kahanmaps plot scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b \\
         --window=-2,2,-2,2 -o plane.pdf
-      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 --modulo 53
+      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 --modulo 53 \\
+          -o modulo.svg
 
     A colour for each kind of growth; marks are points, lines are curves. The
     conditions of those that do not grow exponentially are written beside them,

@@ -16,7 +16,7 @@ from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonia
 from kahanmaps.invariants.normalize import measured_integrals
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.plots.point_functions import PointFunction, point_function
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 _LONGEST = 30
@@ -136,6 +136,19 @@ def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, s
         if names.count(name) > 1:
             raise InputError(f"found two functions of the name {name}: write --integral NAME=EXPR")
     return found
+
+
+def asked_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
+    """One of `functions_of` by its name, or an expression; without `eps` none that contains it."""
+    known = functions_of(file.rounded, fmpq(0) if eps is None else eps).get(text.strip())
+    return asked_axis(file, eps, text) if known is None else known
+
+
+def asked_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
+    """The same, but for integrals in which the image of the point occurs: they are no rational functions in doubles."""
+    known = functions_of(file.rounded, fmpq(0) if eps is None else eps)
+    named = {name: one.function for name, one in known.items() if isinstance(one, PointFunction)}
+    return point_function(text.strip(), file.variables, eps, file.rounded.parameters, named)
 
 
 def _as_function(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> RationalFunction:

@@ -1,4 +1,4 @@
-"""Phase portraits and densities drawn: dots or lines of orbits, level curves below them, a bar for the colours."""
+"""Phase portraits drawn: dots or lines of orbits, level curves below them, a bar for the colours."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.plots.density import Density
 from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, new_figure, points
 from kahanmaps.plots.portraits.draw_flow import draw_flow
 from kahanmaps.plots.portraits.portrait import Portrait
@@ -72,37 +71,6 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         elif equal:
             axes.set_aspect("equal", adjustable="box")
     return figure
-
-
-def draw_density(found: Density, style: Style, *, equal: bool = False, note: str = "") -> Figure:
-    """Draw counts in logarithmic colours; cells without a point stay white. `note` stands above the right corner."""
-    with drawing(style):
-        from matplotlib.colors import LogNorm
-
-        figure = new_figure(style, _ASPECT)
-        axes = figure.subplots()
-        (x0, x1), (y0, y1) = found.window
-        most = max(int(found.counts.max()), 10)
-        picture = axes.imshow(
-            np.ma.masked_equal(found.counts, 0),
-            norm=LogNorm(1, most),
-            extent=(x0, x1, y0, y1),
-            origin="lower",
-            aspect="equal" if equal else "auto",
-            interpolation="nearest",
-        )
-        bar = figure.colorbar(picture, ax=axes, pad=0.02, aspect=30)
-        bar.set_label("points in a cell")
-        axes.set_xlabel(found.labels[0])
-        axes.set_ylabel(found.labels[1])
-        _write_note(axes, note, style)
-    return figure
-
-
-def cells_for(style: Style) -> tuple[int, int]:
-    """Rows and columns of a density that is to be drawn in this style: cells of a seventh of a millimetre."""
-    width, height = (side * 2.54 for side in style.inches(_ASPECT))
-    return max(50, min(4000, round(70 * height))), max(50, min(4000, round(70 * width)))
 
 
 def _aspect(found: Portrait, equal: bool) -> float:

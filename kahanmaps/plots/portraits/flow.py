@@ -10,11 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from flint import fmpq
 
+from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.equilibria import SADDLE, Equilibrium, isolated_equilibria
-from kahanmaps.plots.portraits.windows import Window
+from kahanmaps.plots.portraits.trajectories import Trajectories
+from kahanmaps.plots.portraits.windows import Window, window_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ARROWS = 21  # along each side
@@ -86,6 +91,23 @@ def solutions(
     (True, True)
     """
     return tuple(_curve(VectorField(system), start, box, time) for start in starts)
+
+
+def projected_solutions(
+    system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], found: Trajectories, backward: bool
+) -> tuple[FloatArray, ...]:
+    """The solutions through the starts of orbits, as long as these are followed and around them, along some axes.
+
+    Raises InputError where an axis is the step.
+    """
+    functions = [axis for axis in axes if not isinstance(axis, str)]
+    if len(functions) < len(axes):
+        raise InputError("the flow is drawn as curves in phase space: it does not go with the axis step")
+    box = window_of(found.points.reshape(-1, system.dim), found.points[0])
+    steps = len(found.points) - 1
+    time = float(time_step(eps) * steps) * (-1 if backward else 1) if steps else None
+    curves = solutions(system, found.points[0], box, time)
+    return tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves)
 
 
 def _branches(f: VectorField, saddle: Equilibrium, box: Window) -> list[FloatArray]:

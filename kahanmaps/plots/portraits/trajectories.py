@@ -1,21 +1,25 @@
-"""Float orbits to be drawn, all in memory or in portions, and explicit Euler's to compare them with."""
+"""Float orbits to be drawn, and those of explicit Euler to compare them with."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
+from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -58,6 +62,30 @@ def ensemble_for(
     return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel)
 
 
+def field_of(file: SystemFile) -> QuadraticSystem | None:
+    """The vector field whose Kahan map a file has, real approximations for algebraic parameters; None without one."""
+    map_ = file.map.rounded
+    return map_.system if isinstance(map_, Kahan) and not map_.system.symbols else None
+
+
+def float_normal_form(file: SystemFile) -> tuple[NormalForm | None, str]:
+    """The normal form in which floats can step, or None and why there is none."""
+    found = file.normal_form
+    if isinstance(found, NoNormalForm):
+        return None, found.reason
+    if found.T is not None:
+        return None, "in machine numbers only J = [[0, I], [-I, 0]] has one"
+    return found.form, ""
+
+
+def ensemble_of_file(
+    file: SystemFile, eps: fmpq | None, starts: FloatArray, steps: int, *, backward: bool = False
+) -> FloatEnsemble:
+    """The ensemble for the map of a file, in its normal form where it has one; `eps` is None for a map without it."""
+    form, _ = float_normal_form(file)
+    return ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
+
+
 def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] | None = None) -> Trajectories:
     """Take `steps` steps and keep every point. Raises InputError for more than MAX_POINTS points.
 
@@ -67,38 +95,20 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
     ([[1.0, 2.0], [3.0, 6.0], [9.0, 18.0]], {})
     """
     require_steps(steps)
-    require_points(steps + 1, ensemble.n, ensemble.system.dim)
+    most = min(MAX_POINTS, _MAX_NUMBERS // ensemble.system.dim)
+    if (steps + 1) * ensemble.n > most:
+        raise InputError(
+            f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: take fewer steps"
+        )
     points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
+    words = {"overflow": "left the range of machine floats", "singular": "met a singular matrix I - eps f'"}
+    ended = {text: int((ensemble.status == status).sum()) for status, text in words.items()}
     return Trajectories(
         ensemble.system.variables,
         points,
         np.arange(len(points)),
-        ended_early(ensemble),
+        {text: count for text, count in ended.items() if count},
     )
-
-
-def require_points(records: int, orbits: int, dim: int) -> None:
-    """Raises InputError where so many records of orbits are too much to be kept and drawn one by one."""
-    most = min(MAX_POINTS, _MAX_NUMBERS // dim)
-    if records * orbits > most:
-        raise InputError(
-            f"found {records} records of {orbits} orbits, expected at most {most} points: take fewer, or a density"
-        )
-
-
-def ended_early(ensemble: FloatEnsemble) -> dict[str, int]:
-    """How many orbits have ended before the last step, in words."""
-    status = ensemble.status
-    words = {"overflow": "left the range of machine floats", "singular": "met a singular matrix I - eps f'"}
-    counts = {text: int((status == word).sum()) for word, text in words.items()}
-    return {text: count for text, count in counts.items() if count}
-
-
-def portions_of(points: FloatArray, size: int = 1_000_000) -> Iterator[FloatArray]:
-    """Points (records, orbits, dim), perhaps on disk, in portions of about `size` points."""
-    rows = max(1, size // max(1, points.shape[1]))
-    for first in range(0, len(points), rows):
-        yield np.asarray(points[first : first + rows], dtype=np.float64)
 
 
 def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: int) -> Trajectories:
