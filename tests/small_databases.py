@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.experiments.results import store as store_module
-from kahanmaps.experiments.results import tables
 from kahanmaps.experiments.results.export import write_jsonl
 from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.results.store import Store
@@ -66,18 +65,16 @@ def exported(path: Path) -> str:
 def small_chunks():
     """So that a dozen rows are many chunks. A context and not a fixture, because Hypothesis needs it anew each time."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (store_module, tables):
-            for name in {"PLAN_CHUNK", "RESULT_CHUNK", "COUNT_CHUNK"} & set(vars(module)):
-                patch.setattr(module, name, 3)
+        for name in ("PLAN_CHUNK", "RESULT_CHUNK"):
+            patch.setattr(store_module, name, 3)
         yield
 
 
 PRELUDE = """
 import json, os, resource, sys, time, urllib.parse  # the last one for scripts that give up the right to load it later
-from kahanmaps.experiments.results import database
+from kahanmaps.experiments.results import store as store_module
 from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.results.database import StoreError, Unavailable
-from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results.store import Store, StoreError, Unavailable
 
 def task(number):
     return Task("orbit", {"family": {"m": 2, "seed": number}}, {"eps": "1/10"})

@@ -78,9 +78,9 @@ from kahanmaps.experiments.results.records import Record as Record
 from kahanmaps.experiments.results.records import option_words as option_words
 from kahanmaps.experiments.results.records import system_words as system_words
 from kahanmaps.experiments.results.store import Found as Found
+from kahanmaps.experiments.results.store import Planned as Planned
 from kahanmaps.experiments.results.store import Store as Store
 from kahanmaps.experiments.results.summary import summarise as summarise
-from kahanmaps.experiments.results.tables import Planned as Planned
 from kahanmaps.experiments.running.children import TRIES as TRIES
 from kahanmaps.experiments.running.run import Batch as Batch
 from kahanmaps.experiments.running.run import executor_for as executor_for

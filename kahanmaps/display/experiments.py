@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from kahanmaps.display import markup
 from kahanmaps.displayed import html_form
-from kahanmaps.experiments.results.database import StoreError
-from kahanmaps.experiments.results.store import ExperimentStatus, Store
+from kahanmaps.experiments.results.store import ExperimentStatus, Store, StoreError
 from kahanmaps.experiments.results.summary import Summary, Table
 
 _ROWS = 40

@@ -5,6 +5,6 @@ What is asked      spec.py (a spec in TOML), with shape and experiment; options.
 What passes        records.py: tasks and their keys, limits, records, what does them
 Who does it        running: run.py (the loop); children.py and child.py here; cluster.py and dask_client.py elsewhere,
                    with group.py, the command on a worker
-What is kept       results: store.py, on database, schema and tables; merging.py
+What is kept       results: store.py, one SQLite file
 What comes out     results: export.py, summary.py
 """

@@ -264,8 +264,7 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 
 def _stored() -> int:
-    from kahanmaps.experiments.results.database import StoreError
-    from kahanmaps.experiments.results.store import Store
+    from kahanmaps.experiments.results.store import Store, StoreError
 
     try:
         with Store.open("study.db", readonly=True) as store:

@@ -61,8 +61,7 @@ def exported(db: str, capsys: pytest.CaptureFixture[str]) -> str:
 
 def done(db: str) -> int:
     """How many tasks have a record."""
-    from kahanmaps.experiments.results.database import StoreError
-    from kahanmaps.experiments.results.store import Store
+    from kahanmaps.experiments.results.store import Store, StoreError
 
     try:
         with Store.open(db, readonly=True) as store:

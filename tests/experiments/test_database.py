@@ -15,9 +15,8 @@ import pytest
 from small_databases import LIMITS, ok, planned, seed, seeds, small_chunks, start, task, tasks
 
 from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.experiments.results import database
-from kahanmaps.experiments.results.database import StoreError, Unavailable
-from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results import store as store_module
+from kahanmaps.experiments.results.store import Store, StoreError, Unavailable
 
 # Files that cannot be used
 
@@ -107,7 +106,7 @@ def test_a_store_that_is_closed_or_opened_to_be_read_refuses_to_write(path):
             with pytest.raises(StoreError, match="opened for reading only"):
                 write()
         with pytest.raises(sqlite3.OperationalError, match="readonly"):  # not even by a mistake of ours
-            store._database.execute("DELETE FROM plan")
+            store._execute("DELETE FROM plan")
     with pytest.raises(StoreError, match="has been closed"):
         store.status()
 
@@ -130,8 +129,8 @@ def test_a_database_of_the_second_format_is_read_and_written(path):
 
 def test_a_full_disk_is_told_in_a_sentence_and_loses_nothing(store):
     store.plan("a", "1", LIMITS, tasks(*range(500)), {})
-    pages = store._database.execute("PRAGMA page_count").fetchone()[0]
-    store._database.execute(f"PRAGMA max_page_count = {pages + 3}")
+    pages = store._execute("PRAGMA page_count").fetchone()[0]
+    store._execute(f"PRAGMA max_page_count = {pages + 3}")
     stored = []
 
     def add_all():
@@ -143,7 +142,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_loses_nothing(store):
         add_all()
     assert stored
     assert [seed(row.task) for row in store.rows()] == stored
-    store._database.execute("PRAGMA max_page_count = 1000000")
+    store._execute("PRAGMA max_page_count = 1000000")
     store.add([ok(number) for number in range(500)])
     assert store.count_pending() == 0
 
@@ -180,7 +179,7 @@ def made():
             os.kill(os.getpid(), 9)
         yield task(number)
 
-database._CACHE = 100  # so little memory that pages of what is not committed go to the disk
+store_module._CACHE = 100  # so little memory that pages of what is not committed go to the disk
 Store.open(path).plan("a", "another", Limits(), made(), {})
 """
     planned(path, 1, 2, 3, records=[ok(2)])
@@ -214,7 +213,7 @@ def test_one_process_writes_at_a_time_and_its_lock_is_gone_at_rest(path):
 
 
 def test_a_reader_in_the_middle_of_a_read_does_not_hold_the_writer_up(path, monkeypatch):
-    monkeypatch.setattr(database, "_BUSY_SECONDS", 0.0)  # whoever has to wait fails
+    monkeypatch.setattr(store_module, "_BUSY_SECONDS", 0.0)  # whoever has to wait fails
     planned(path, *range(20), records=[ok(number) for number in range(10)])
     with small_chunks(), Store.open(path) as writer, Store.open(path, readonly=True) as reader:
         reads = [reader.rows(), reader.rows(missing=True), reader.pending()]

@@ -10,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, small_chunks, task, tasks
 
-from kahanmaps.experiments.results.database import StoreError
-from kahanmaps.experiments.results.merging import Merged
 from kahanmaps.experiments.results.records import Limits, digest
-from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results.store import Merged, Store, StoreError
 
 numbers = st.integers(0, 12)
 

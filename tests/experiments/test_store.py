@@ -11,10 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
 
-from kahanmaps.experiments.results.database import StoreError
 from kahanmaps.experiments.results.records import Limits, Outcome, Record, Row, digest
-from kahanmaps.experiments.results.store import Store
-from kahanmaps.experiments.results.tables import Planned
+from kahanmaps.experiments.results.store import Planned, Store, StoreError
 
 # Records
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from kahanmaps.experiments.options import VOCABULARY
 from kahanmaps.experiments.registry import TaskKind, task_kinds
-from kahanmaps.experiments.results.schema import SCHEMA
+from kahanmaps.experiments.results.store import SCHEMA
 from kahanmaps_docs.markdown import block, code, plain, table
 
 

@@ -6,53 +6,126 @@ changed keeps what it has in common with the old one.
 
 Three rules keep it whole:
 
-* what is said to be done is done: each method that writes is one transaction, and a kill at any moment leaves the state
-  before it or after it;
+* what is reported as stored is stored: each method that writes is one transaction, and a kill at any moment leaves the
+  state before it or after it;
 * one writer: opening for writing takes a lock that the operating system frees when the process ends, however it ends;
 * no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out.
 
-The file itself is the matter of database.py, its tables are in schema.py. What plans and results are in them is in
-tables.py, and merging.py makes one database of two.
+SQLite's rollback journal is used, never WAL: it is sound on every file system, those of networks among them.
 """
 
 from __future__ import annotations
 
+import fcntl
+import json
+import math
 import os
 import re
+import sqlite3
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from itertools import islice
+from operator import index
+from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from kahanmaps.displayed import Displayed
-from kahanmaps.errors import note_source, quoted
-from kahanmaps.experiments.results import tables
-from kahanmaps.experiments.results.database import Database, StoreError
-from kahanmaps.experiments.results.merging import Merged, merge
-from kahanmaps.experiments.results.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
-from kahanmaps.experiments.results.tables import Chosen, Planned
+from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
+from kahanmaps.experiments.results.records import (
+    KEY_LENGTH,
+    Job,
+    Limits,
+    Outcome,
+    Record,
+    Row,
+    Task,
+    canonical,
+    digest,
+    encodable,
+)
+from kahanmaps.whole_files import resolved
 
-COUNT_CHUNK = 50_000  # rows that are only counted: some 50 ms
-FOUND_AT_MOST = 20
+# A change that older versions cannot read increases it. Format 2 is this one with two more columns, which nobody reads.
+FORMATS = (1, 2)
+APPLICATION_ID = 0x4B61684D  # "KahM", by which a file is recognized as ours
+SKIPPED = "TABLE skipped (experiment INTEGER, system TEXT, reason TEXT, PRIMARY KEY (experiment, system))"
+SCHEMA = f"""
+CREATE TABLE document (digest TEXT PRIMARY KEY NOT NULL, text TEXT NOT NULL);
+CREATE TABLE task (id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, text TEXT NOT NULL);
+-- id: also the place among the experiments
+CREATE TABLE experiment (
+    id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, definition TEXT NOT NULL, digest TEXT NOT NULL,
+    limits TEXT NOT NULL, total INTEGER NOT NULL, tasks INTEGER NOT NULL
+);
+-- number: from 0 without gaps. The same task may be planned twice.
+CREATE TABLE plan (
+    experiment INTEGER NOT NULL, number INTEGER NOT NULL, task INTEGER NOT NULL, PRIMARY KEY (experiment, number)
+) WITHOUT ROWID;
+-- Systems of an experiment that could not be used when it was planned.
+CREATE {SKIPPED};
+CREATE INDEX plan_of_task ON plan (task, experiment, number);
+CREATE TABLE result (
+    task INTEGER PRIMARY KEY, outcome TEXT NOT NULL, verdict TEXT, seconds REAL NOT NULL, attempts INTEGER NOT NULL,
+    peak_memory INTEGER, host TEXT NOT NULL, finished TEXT NOT NULL, versions TEXT NOT NULL, message TEXT NOT NULL,
+    stderr TEXT NOT NULL, result TEXT
+);
+-- What is only counted is read from here: the pages of the table itself are full of results.
+CREATE INDEX result_summary ON result (task, outcome, verdict, seconds);
+PRAGMA application_id = {APPLICATION_ID};
+PRAGMA user_version = 1;
+"""
+PLAN_CHUNK = 1000  # rows of the plan that one read takes: they are short
+RESULT_CHUNK = 50  # rows with their results, which may be megabytes
+MAX_FOUND = 20
+CONFLICTS_SHOWN = 5
+
+_BUSY_SECONDS = 30.0
+_MIN_BYTES = 512  # the smallest page that SQLite has
+# In KiB. The index of a million keys, hit at random while they are planned, has to fit into it; otherwise every key
+# costs a page written.
+_CACHE = 128 << 10
+_OF_THE_MACHINE = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
+# fmt: off
+_COLUMNS = (
+    "outcome", "result", "verdict", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished",
+)
+# fmt: on
+_SELECTED = ", ".join(f"r.{column}" for column in (*_COLUMNS, "attempts"))
+
+
+class StoreError(InputError):
+    """A database that cannot be used, or not in this way: the message says what to do."""
+
+
+class Unavailable(KahanmapsError, OSError):
+    """A database that cannot be used just now, by nobody's mistake: the disk is full or broken, the file is gone."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment as it was planned: `total` rows, in which `tasks` different tasks appear."""
+    """An experiment as it was planned: `total` rows, in which `tasks` different tasks appear.
+
+    `id` is its number in the database, `offset` counts the rows of the plan before its own.
+    """
 
     name: str
     definition: str
     limits: Limits
     total: int
     tasks: int
+    id: int = field(compare=False)
+    offset: int = field(compare=False)
 
 
 @dataclass(frozen=True)
 class ExperimentStatus:
     """How far an experiment has come. `total` counts rows of its plan, everything else its `tasks` different tasks.
 
-    So `missing` and the `outcomes` add up to `tasks`. `seconds` is the time the latest attempts took.
+    So `missing` and the `outcomes` add up to `tasks`. `seconds` is the time the latest attempts took; `skipped` are
+    the systems that were left out when it was planned, and why.
     """
 
     name: str
@@ -62,7 +135,36 @@ class ExperimentStatus:
     outcomes: Mapping[Outcome, int]
     verdicts: Mapping[str, int]
     seconds: float
-    skipped: Sequence[tuple[str, str]] = ()  # systems that were left out when it was planned, and why
+    skipped: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What planning did. `total` counts rows of the plan, everything else different tasks.
+
+    `known` of them were in the store already, `new_tasks` were not; `dropped` were in the plan that this one replaces
+    and are no longer. `is_resumed`: the same definition had been planned before, and nothing was done.
+    """
+
+    total: int
+    known: int
+    new_tasks: int
+    dropped: int
+    is_resumed: bool = False
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What came from another database: new tasks, new results, failures `replaced` by results.
+
+    `conflicts` counts tasks which are done in both with different results; `conflicting` has the keys of the first few.
+    """
+
+    tasks: int
+    results: int
+    replaced: int
+    conflicts: int
+    conflicting: tuple[str, ...] = ()
 
 
 class Found(NamedTuple):
@@ -85,36 +187,244 @@ class Store(Displayed):
     ['orbit']
     """
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    path: Path  # resolved: otherwise two names of one file would have two locks
+
+    def __init__(self, path: str | os.PathLike[str], readonly: bool) -> None:
+        self.name = os.fspath(path)  # as it was given, for messages
+        self._is_readonly = readonly
+        self._lock: int | None = None
+        self._connection: sqlite3.Connection | None = None
 
     # Opening and closing
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
         """The store in this file; `create` makes it if it is not there. Open for writing, it has the lock."""
-        return cls(Database.open(path, create, readonly))
+        if create and readonly:
+            raise ValueError("a database opened for reading only cannot be created")
+        store = cls(path, readonly)
+        try:
+            store.path = resolved(store.name)
+            with store._errors():
+                store._open(create)
+        except BaseException as error:
+            store.close()
+            if isinstance(error, OSError) and not isinstance(error, Unavailable):
+                kind = Unavailable if is_of_the_machine(error) else StoreError
+                reason = error.strerror or error
+                raise kind(f"{store.name} cannot be opened ({reason}): check its name and permissions") from error
+            raise
+        return store
 
     def close(self) -> None:
         """Leave one complete file behind. May be called twice."""
-        self._database.close()
+        if self._connection is not None:
+            with suppress(sqlite3.Error):
+                self._connection.close()
+            self._connection = None
+        if self._lock is not None:
+            with suppress(OSError):
+                os.unlink(f"{self.path}.lock")
+            os.close(self._lock)
+            self._lock = None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         if error is not None:
-            note_source(error, self._database.name)
+            note_source(error, self.name)
         self.close()
+
+    def _open(self, create: bool) -> None:
+        exists = self.path.exists()
+        if exists and not self.path.is_file():
+            raise StoreError(f"{self.name} is a folder or a device, expected a file: check the name")
+        # SQLite would take it for an empty one, and write over it.
+        if exists and 0 < self.path.stat().st_size < _MIN_BYTES:
+            raise StoreError(f"{self.name} is not an SQLite database: check the name")
+        if not exists and not create:
+            raise StoreError(f"there is no database {self.name}: check the name, or run the batch to make it")
+        if not self.path.parent.is_dir():
+            raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
+        mode = "rwc" if create else "rw"
+        if self._is_readonly:
+            # Reading may have to write, to play back what a killed writer left. Where nobody may write, nobody does.
+            may_write = os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
+            has_journal = any(Path(f"{self.path}{end}").exists() for end in ("-journal", "-wal"))
+            mode = "rw" if may_write or has_journal else "ro&immutable=1"
+        elif exists and not os.access(self.path, os.W_OK):
+            raise StoreError(f"{self.name} may not be written to: change its permissions, or work on a copy")
+        address = f"{self.path.as_uri()}?mode={mode}"
+        self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
+        self._is_made(create)  # before the lock: no lock file beside what is not ours
+        if not self._is_readonly:
+            self._take_lock()
+            self._execute(f"PRAGMA cache_size = -{_CACHE}")
+            self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
+            if not self._is_made(create):  # under the lock once more: somebody else may have been making it
+                with self._transaction():
+                    for statement in SCHEMA.split(";"):  # executescript would commit
+                        self._execute(statement)
+        if not self._execute("SELECT 1 FROM sqlite_master WHERE name = 'skipped'").fetchone():  # an older version
+            self._execute(f"CREATE {'TEMP ' * self._is_readonly}{SKIPPED}")
+        if self._is_readonly:
+            self._execute("PRAGMA query_only = ON")
+
+    def _is_made(self, create: bool) -> bool:
+        """False for an empty file that may become a database. Raises StoreError for what is not ours."""
+        # The schema first: pragmas alone are answered for files that SQLite cannot read.
+        queries = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
+        tables, application, version = [self._execute(sql).fetchone()[0] for sql in queries]
+        if not (tables or application or version):
+            if create:
+                return False
+            raise StoreError(f"{self.name} is empty and not a database of results: check the name")
+        if application != APPLICATION_ID:
+            raise StoreError(f"{self.name} is an SQLite database of another program, not one of results: left alone")
+        if version not in FORMATS:
+            raise StoreError(
+                f"{self.name} was written by format {version} of kahanmaps databases, this version reads formats "
+                f"{' and '.join(map(str, FORMATS))}: use the kahanmaps that wrote it, or begin another database"
+            )
+        return True
+
+    def _take_lock(self) -> None:
+        """Become the one that writes. The operating system frees the lock when the process ends, however it ends.
+
+        The locked file cannot be the database: to close any descriptor of that would drop the locks that SQLite has.
+        """
+        while self._lock is None:
+            descriptor = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # The one before may have removed the file after it was opened here: then it locks nobody out.
+                with suppress(FileNotFoundError):
+                    if os.path.samestat(os.fstat(descriptor), os.stat(f"{self.path}.lock")):
+                        self._lock = descriptor
+            except BlockingIOError:
+                raise StoreError(f"another batch is writing to {self.name}: wait for it, or end it") from None
+            finally:
+                if self._lock is None:
+                    os.close(descriptor)
+
+    # SQL, with the errors of SQLite as sentences
+
+    def _execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
+        """One statement of a transaction."""
+        return self._opened().execute(sql, values)
+
+    def _opened(self) -> sqlite3.Connection:
+        if self._connection is None:
+            raise StoreError(f"{self.name} has been closed: open it again")
+        return self._connection
+
+    def _fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
+        """All rows at once: a statement half read would keep its lock, and hold the writer up."""
+        with self._errors():
+            rows = self._execute(sql, values).fetchall()
+        if any(isinstance(value, bytes) for row in rows for value in row):
+            raise StoreError(f"{self.name} is damaged (bytes in place of a text or a number): take a copy from before")
+        return rows
+
+    def _fetch_plan(self, sql: str, experiment: Experiment, size: int, *values: int) -> Iterator[list[Any]]:
+        """What `sql` finds in each stretch of the plan: a bounded number of rows is read, found or not."""
+        for first in range(0, experiment.total, size):
+            yield self._fetch(sql, (experiment.id, first, first + size - 1, *values))
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """What is executed in it is done completely or not at all."""
+        if self._is_readonly:
+            raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
+        with self._errors():
+            connection = self._opened()
+            connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                connection.execute("COMMIT")
+            except BaseException:
+                if connection.in_transaction:  # after some errors SQLite has rolled back by itself
+                    with suppress(sqlite3.Error):
+                        connection.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            kind: type[KahanmapsError] = StoreError
+            # Errors of Python's module have no code: text that is not UTF-8.
+            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+            if code in _OF_THE_MACHINE:
+                kind = Unavailable
+                reason = (
+                    f"cannot be read or written: {error}; what was stored before is safe, look after the disk, its "
+                )
+                reason += "room and whoever uses the file, and run it again"
+            elif code == sqlite3.SQLITE_NOTADB:
+                reason = "is not an SQLite database: check the name"
+            elif code in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
+                reason = f"cannot be opened ({error}): file and folder must be readable, and writable as well where a "
+                reason += f"killed writer left {self.path.name}-journal: change the permissions, or work on a copy"
+            else:
+                reason = f"is damaged ({quoted(str(error), 100)}): take a copy from before, or begin another one"
+            raise kind(f"{self.name} {reason}") from error
+
+    @contextmanager
+    def _reading(self, what: str) -> Iterator[None]:
+        """Values are made of what lies in the file: what cannot be made is damage, reported with this name."""
+        try:
+            yield
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+            reason = quoted(" ".join(str(error).split()), 100)
+            raise StoreError(f"{self.name} is damaged ({what}: {reason}): take a copy from before") from error
+
+    def _task(self, key: str, text: str) -> Task:
+        with self._reading(f"the task {key}"):
+            return Task.from_text(text)
+
+    def _record(self, key: str, row: Sequence[Any]) -> Record | None:
+        """The record in a row of `_SELECTED`; None if the task has no result."""
+        if row[0] is None:
+            return None
+        cells = dict(zip((*_COLUMNS, "attempts"), row, strict=True))
+        del cells["attempts"]
+        with self._reading(f"the record of task {key}"):
+            cells["outcome"] = Outcome(cells["outcome"])
+            if (cells["outcome"] is Outcome.OK) is not (cells["result"] is not None):
+                no = "no " * (cells["result"] is None)
+                raise ValueError(f"the outcome is {cells['outcome']}, and the result {no}text")
+            cells["result"] = None if cells["result"] is None else _table(cells["result"])
+            cells["versions"] = _table(cells["versions"])
+            cells["seconds"] = float(cells["seconds"])
+            cells["peak_memory"] = None if cells["peak_memory"] is None else index(cells["peak_memory"])
+            return Record(key=key, **cells)
 
     # Experiments and their plans
 
-    def experiments(self) -> list[Experiment]:
-        """What is planned, in order."""
-        return [
-            Experiment(one.name, tables.definition_of(self._database, one), one.limits, one.total, one.tasks)
-            for one in tables.choose(self._database, None)
-        ]
+    def experiments(self, names: Sequence[str] | None = None) -> list[Experiment]:
+        """What is planned, in order; only the experiments with these names, if they are given."""
+        rows = self._fetch(
+            "SELECT name, definition, limits, total, tasks, id, "
+            "(SELECT max(number) + 1 FROM plan WHERE experiment = e.id) FROM experiment AS e ORDER BY id"
+        )
+        known = [row[0] for row in rows]
+        for name in names or ():
+            if name not in known:
+                raise StoreError(f"{self.name} has no experiment {name}: it has {', '.join(known) or 'none at all'}")
+        chosen: list[Experiment] = []
+        offset = 0
+        for name, definition, limits, total, tasks, id, planned in rows:
+            if names is None or name in names:
+                with self._reading(f"the experiment {quoted(name)}"):
+                    if total != (planned or 0):
+                        raise ValueError(f"{total} tasks are said to be planned, and {planned or 0} are")
+                    limited = Limits(**_table(limits))
+                    chosen.append(Experiment(name, definition, limited, total, index(tasks), id, offset))
+                    offset += total
+        return chosen
 
     def plan(
         self,
@@ -132,18 +442,69 @@ class Store(Displayed):
         `documents` (digest to text) is read after `tasks`, so whoever makes the tasks may fill it meanwhile. `skipped`
         are systems that are left out, and why.
         """
-        with self._database.transaction():
-            planned = tables.replace_plan(self._database, experiment, definition, limits, tasks, documents)
-            tables.put_skipped(self._database, experiment, skipped)
+        with self._transaction():
+            sql = "SELECT digest, total, tasks FROM experiment WHERE name = ?"
+            before = self._execute(sql, (experiment,)).fetchone()
+            if before is not None and before[0] == digest(definition):
+                sql = "UPDATE experiment SET limits = ? WHERE name = ?"
+                self._execute(sql, (canonical(asdict(limits)), experiment))
+                planned = Planned(before[1], before[2], 0, 0, is_resumed=True)
+            else:
+                texts = ((task.key, task.text) for task in tasks)
+                planned = self._replace_plan(experiment, definition, limits, texts)
+                for name, text in documents.items():
+                    if name != digest(text):
+                        raise StoreError(
+                            f"the document {name} is not the one with this digest, which is {digest(text)}"
+                        )
+                    self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, text))
+            self._put_skipped(experiment, skipped)
             return planned
 
-    def merge(self, other: str | os.PathLike[str]) -> Merged:
-        """Take over what another database has, all or nothing; doing it again changes nothing.
+    def _put_skipped(self, experiment: str, skipped: Iterable[tuple[str, str]]) -> None:
+        (id,) = self._execute("SELECT id FROM experiment WHERE name = ?", (experiment,)).fetchone()
+        self._execute("DELETE FROM skipped WHERE experiment = ?", (id,))
+        rows = ((id, system, reason) for system, reason in skipped)
+        self._opened().executemany("INSERT OR REPLACE INTO skipped VALUES (?, ?, ?)", rows)
 
-        Experiments that this one lacks come with their plans. Of two results of a task the one that is ok is kept, and
-        this one's if both are or neither is. Of two experiments with one name the definitions must agree.
-        """
-        return merge(self._database, other)
+    def _replace_plan(
+        self, experiment: str, definition: str, limits: Limits, tasks: Iterable[tuple[str, str]]
+    ) -> Planned:
+        """Plan the tasks with these keys and texts; forget those that neither a plan nor a result needs any more."""
+        values = (experiment, definition, digest(definition), canonical(asdict(limits)))
+        self._execute(
+            "INSERT INTO experiment (name, definition, digest, limits, total, tasks) VALUES (?, ?, ?, ?, 0, 0) ON "
+            "CONFLICT (name) DO UPDATE SET (definition, digest, limits) = "
+            "(excluded.definition, excluded.digest, excluded.limits)",
+            values,
+        )
+        (id,) = self._execute("SELECT id FROM experiment WHERE name = ?", (experiment,)).fetchone()
+        self._execute("CREATE TEMP TABLE earlier (task INTEGER PRIMARY KEY)")
+        self._execute("INSERT INTO earlier SELECT DISTINCT task FROM plan WHERE experiment = ?", (id,))
+        self._execute("DELETE FROM plan WHERE experiment = ?", (id,))
+        total = new = 0
+        tasks = iter(tasks)
+        while batch := list(islice(tasks, PLAN_CHUNK)):
+            new += self._add_tasks(batch)
+            rows = [(id, number, key) for number, (key, _) in enumerate(batch, total)]
+            self._opened().executemany("INSERT INTO plan SELECT ?, ?, id FROM task WHERE key = ?", rows)
+            total += len(batch)
+        sql = "SELECT count(DISTINCT task) FROM plan WHERE experiment = ?"
+        (different,) = self._execute(sql, (id,)).fetchone()
+        self._execute("UPDATE experiment SET total = ?, tasks = ? WHERE id = ?", (total, different, id))
+        sql = "SELECT count(*) FROM earlier WHERE task NOT IN (SELECT task FROM plan WHERE experiment = ?)"
+        (dropped,) = self._execute(sql, (id,)).fetchone()
+        self._execute(
+            "DELETE FROM task WHERE id IN (SELECT task FROM earlier) "
+            "AND NOT EXISTS (SELECT 1 FROM plan WHERE plan.task = task.id) "
+            "AND NOT EXISTS (SELECT 1 FROM result WHERE result.task = task.id)"
+        )
+        self._execute("DROP TABLE earlier")
+        return Planned(total, different - new, new, dropped)
+
+    def _add_tasks(self, tasks: Sequence[tuple[str, str]]) -> int:
+        """How many were not there."""
+        return self._opened().executemany("INSERT OR IGNORE INTO task (key, text) VALUES (?, ?)", tasks).rowcount
 
     # What there is to do
 
@@ -159,10 +520,12 @@ class Store(Displayed):
         With `retry_failed` also those that failed: each is looked at once, so one that fails again does not come back.
         `shard` (i, n) is the i-th part of n, counting rows of the plan of these experiments; no task is in two parts.
         """
-        found = self._pending("t.key, t.text", tables.PLAN_CHUNK, experiments, retry_failed, shard)
+        sql, chosen = self._pending(experiments, retry_failed, shard)
+        sql = sql.format("t.key, t.text", "JOIN task AS t ON t.id = p.task")
         return (
-            Job(tables.task_of(self._database, key, text), experiment.limits)
-            for experiment, rows in found
+            Job(self._task(key, text), experiment.limits)
+            for experiment, *values in chosen
+            for rows in self._fetch_plan(sql, experiment, PLAN_CHUNK, *values)
             for key, text in rows
         )
 
@@ -174,37 +537,32 @@ class Store(Displayed):
         shard: tuple[int, int] = (1, 1),
     ) -> int:
         """How many jobs `pending` has with these arguments."""
-        found = self._pending("count(*)", COUNT_CHUNK, experiments, retry_failed, shard)
-        return sum(rows[0][0] for _, rows in found)
+        sql, chosen = self._pending(experiments, retry_failed, shard)
+        sql = sql.format("count(*)", "")
+        return sum(self._fetch(sql, (one.id, 0, one.total, *values))[0][0] for one, *values in chosen)
 
     def _pending(
-        self, what: str, size: int, experiments: Sequence[str] | None, retry_failed: bool, shard: tuple[int, int]
-    ) -> Iterator[tuple[Chosen, list[Any]]]:
-        """What is selected of the tasks without a result, some rows of the plan at a time."""
+        self, experiments: Sequence[str] | None, retry_failed: bool, shard: tuple[int, int]
+    ) -> tuple[str, list[tuple[Experiment, int, int, int]]]:
+        """A query for the tasks without a result in a stretch of the plan, and its values for each experiment."""
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
-        chosen = tables.choose(self._database, experiments)
+        chosen = self.experiments(experiments)
         # A task planned twice belongs to its first row among the chosen ones: so it comes once, without a memory of
         # what has come, and lies in one shard.
         among = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
-        failed = "OR r.outcome <> 'ok'" if retry_failed else ""
-        text = "JOIN task AS t ON t.id = p.task" if what.startswith("t.") else ""
         sql = f"""
-            SELECT {what} FROM plan AS p {text}
+            SELECT {{}} FROM plan AS p {{}}
             LEFT JOIN result AS r INDEXED BY result_summary ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ?
-            AND (r.task IS NULL {failed}) AND (p.number + ?) % ? = ?
+            AND (r.task IS NULL {"OR r.outcome <> 'ok'" if retry_failed else ""}) AND (p.number + ?) % ? = ?
             AND NOT EXISTS (
                 SELECT 1 FROM plan AS q
                 WHERE q.task = p.task AND (q.experiment, q.number) < (p.experiment, p.number) {among}
             )
             ORDER BY p.number"""
-        return (
-            (experiment, rows)
-            for experiment in chosen
-            for rows in tables.stretches(self._database, sql, experiment, size, (experiment.offset, parts, part - 1))
-        )
+        return sql, [(one, one.offset, parts, part - 1) for one in chosen]
 
     # Results
 
@@ -214,87 +572,132 @@ class Store(Displayed):
         What is lost is no result, and leaves the task as it was.
         """
         records = [record for record in records if record.outcome is not Outcome.LOST]
-        rows = [tables.row_of(record) for record in records]  # what JSON cannot hold is refused here
-        with self._database.transaction():
+        rows = [_row_of(record) for record in records]  # what JSON cannot hold is refused here
+        with self._transaction():
             for record, row in zip(records, rows, strict=True):
-                found = tables.find_result(self._database, record.key)
+                found = self._find_result(record.key)
                 if found is None:
-                    raise StoreError(
-                        f"{self._database.name} has no task {record.key}: plan it before its result is added"
-                    )
-                task, before = found
+                    raise StoreError(f"{self.name} has no task {record.key}: plan it before its result is added")
+                task, *before, attempts = found
                 is_kept = before[0] == Outcome.OK and not record.is_ok
-                attempts = (before[tables.ATTEMPTS] or 0) + 1
-                tables.put_result(self._database, task, attempts, before if is_kept else row)
+                self._put_result(task, before if is_kept else row, (attempts or 0) + 1)
+
+    def _find_result(self, key: str) -> Sequence[Any] | None:
+        """The id of the task and its result with the attempts, all None if it has none; None for an unknown task."""
+        sql = f"SELECT t.id, {_SELECTED} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
+        found: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
+        return found
+
+    def _put_result(self, task: int, row: Sequence[Any], attempts: int) -> None:
+        columns, places = ", ".join(_COLUMNS), ", ".join("?" * (len(_COLUMNS) + 2))
+        sql = f"INSERT OR REPLACE INTO result (task, {columns}, attempts) VALUES ({places})"
+        self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
         """The tasks with their records in plan order; with `missing` also those that have none."""
-        return self._rows(tables.choose(self._database, experiments), missing)
-
-    def _rows(self, chosen: list[Chosen], missing: bool) -> Iterator[Row]:
-        # All rows of the plan, so that what is missing is seen.
+        chosen = self.experiments(experiments)  # now, not when the first row is read
         sql = f"""
-            SELECT p.number, t.key, t.text, {tables.RECORD_COLUMNS}
+            SELECT p.number, t.key, t.text, {_SELECTED}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
-        for experiment in chosen:
-            for rows in tables.stretches(self._database, sql, experiment, tables.RESULT_CHUNK):
-                for number, key, text, *cells in rows:
-                    record = tables.record_of(self._database, key, cells)
-                    if record is not None or missing:
-                        yield Row(experiment.name, number, tables.task_of(self._database, key, text), record)
+        return (
+            Row(experiment.name, number, self._task(key, text), self._record(key, cells))
+            for experiment in chosen
+            for rows in self._fetch_plan(sql, experiment, RESULT_CHUNK)
+            for number, key, text, *cells in rows
+            if missing or cells[0] is not None
+        )
 
-    def unplanned(self) -> int:
-        """How many results no plan asks for."""
-        found, last = 0, 0
-        while last is not None:
-            # In stretches, so that no reader holds the writer up.
-            count, last = self._database.fetch(
-                "SELECT sum(NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)), max(r.task) FROM "
-                "(SELECT task FROM result INDEXED BY result_summary WHERE task > ? ORDER BY task LIMIT ?) AS r",
-                (last, COUNT_CHUNK),
-            )[0]
-            found += count or 0
-        return found
+    def merge(self, other: str | os.PathLike[str]) -> Merged:
+        """Take over what another database has, all or nothing; doing it again changes nothing.
+
+        Experiments that this one lacks come with their plans. Of two results of a task the one that is ok is kept, and
+        this one's if both are or neither is. Of two experiments with one name the definitions must agree.
+        """
+        results = replaced = conflicts = 0
+        conflicting: list[str] = []
+        with Store.open(other, readonly=True) as source, self._transaction():
+            if source.path.samefile(self.path):
+                raise StoreError(f"{source.name} is this database itself: there is nothing to merge")
+            new = 0
+            mine = dict(self._execute("SELECT name, digest FROM experiment").fetchall())
+            for experiment in source.experiments():
+                if mine.get(experiment.name, defined := digest(experiment.definition)) != defined:
+                    raise StoreError(
+                        f"the experiment {experiment.name} is defined in one way in {self.name} and in another way in "
+                        f"{source.name}: rename it in one of them; nothing was merged"
+                    )
+                if experiment.name not in mine:
+                    sql = """
+                        SELECT t.key, t.text FROM plan AS p JOIN task AS t ON t.id = p.task
+                        WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
+                    tasks = (row for rows in source._fetch_plan(sql, experiment, PLAN_CHUNK) for row in rows)
+                    planned = self._replace_plan(experiment.name, experiment.definition, experiment.limits, tasks)
+                    self._put_skipped(experiment.name, source._skipped(experiment))
+                    new += planned.new_tasks
+            for (name,) in source._fetch("SELECT digest FROM document"):  # one by one: each may be long
+                self._execute("INSERT OR IGNORE INTO document VALUES (?, ?)", (name, source.document(name)))
+            sql = f"""
+                SELECT r.task, t.key, t.text, {_SELECTED} FROM result AS r JOIN task AS t ON t.id = r.task
+                WHERE r.task > ? ORDER BY r.task LIMIT ?"""
+            last = 0
+            while rows := source._fetch(sql, (last, RESULT_CHUNK)):
+                last = rows[-1][0]
+                for _, key, text, *theirs, attempts in rows:
+                    new += self._add_tasks([(key, text)])
+                    task, *own, own_attempts = self._find_result(key) or ()
+                    if own[0] is None or theirs[0] == Outcome.OK != own[0]:
+                        results += own[0] is None
+                        replaced += own[0] is not None
+                        self._put_result(task, theirs, attempts + (own_attempts or 0))
+                    elif theirs[0] == Outcome.OK and theirs[1:3] != own[1:3]:
+                        conflicts += 1
+                        conflicting.append(key)
+        return Merged(new, results, replaced, conflicts, tuple(conflicting[:CONFLICTS_SHOWN]))
 
     # Looking
 
     def status(self) -> list[ExperimentStatus]:
         """How far each experiment has come."""
-        return [self._status(experiment) for experiment in tables.choose(self._database, None)]
-
-    def _status(self, experiment: Chosen) -> ExperimentStatus:
-        # A task planned twice counts at its first row; the look at earlier rows costs most, and mostly there are none.
-        once = """AND NOT EXISTS (
-            SELECT 1 FROM plan AS q WHERE q.task = p.task AND q.experiment = p.experiment AND q.number < p.number
-        )"""
-        sql = f"""
-            SELECT r.outcome, r.verdict, count(*), sum(r.seconds)
-            FROM plan AS p
-            JOIN result AS r INDEXED BY result_summary ON r.task = p.task
-            WHERE p.experiment = ? AND p.number BETWEEN ? AND ? {once if experiment.tasks < experiment.total else ""}
-            GROUP BY r.outcome, r.verdict"""
-        outcomes: Counter[Outcome] = Counter()
-        verdicts: Counter[str] = Counter()
-        seconds = 0.0
-        for rows in tables.stretches(self._database, sql, experiment, COUNT_CHUNK):
-            for outcome, verdict, count, time in rows:
-                with self._database.making(f"the outcomes of {quoted(experiment.name)}"):
-                    outcomes[Outcome(outcome)] += count
-                    seconds += time
-                if verdict is not None:
-                    verdicts[verdict] += count
-        missing = experiment.tasks - outcomes.total()
-        return ExperimentStatus(
-            experiment.name,
-            experiment.total,
-            experiment.tasks,
-            missing,
-            dict(outcomes),
-            dict(verdicts),
-            seconds,
-            tables.skipped_of(self._database, experiment.id),
+        experiments = {experiment.id: experiment for experiment in self.experiments()}
+        outcomes: dict[int, Counter[Outcome]] = {id: Counter() for id in experiments}
+        verdicts: dict[int, Counter[str]] = {id: Counter() for id in experiments}
+        seconds = dict.fromkeys(experiments, 0.0)
+        counts = self._fetch(
+            "SELECT p.experiment, r.outcome, r.verdict, count(*), sum(r.seconds) "
+            "FROM (SELECT DISTINCT task, experiment FROM plan INDEXED BY plan_of_task) AS p "  # may be planned twice
+            "JOIN result AS r INDEXED BY result_summary ON r.task = p.task GROUP BY p.experiment, r.outcome, r.verdict"
         )
+        for id, outcome, verdict, count, took in counts:
+            with self._reading(f"the outcomes of {quoted(experiments[id].name)}"):
+                outcomes[id][Outcome(outcome)] += count
+                seconds[id] += took
+                if verdict is not None:
+                    verdicts[id][verdict] += count
+        return [
+            ExperimentStatus(
+                one.name,
+                one.total,
+                one.tasks,
+                one.tasks - outcomes[id].total(),
+                dict(outcomes[id]),
+                dict(verdicts[id]),
+                seconds[id],
+                self._skipped(one),
+            )
+            for id, one in experiments.items()
+        ]
+
+    def _skipped(self, experiment: Experiment) -> list[tuple[str, str]]:
+        sql = "SELECT system, reason FROM skipped WHERE experiment = ? ORDER BY system"
+        return self._fetch(sql, (experiment.id,))
+
+    def unplanned(self) -> int:
+        """How many results no plan asks for."""
+        sql = """
+            SELECT count(*) FROM result AS r INDEXED BY result_summary
+            WHERE NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)"""
+        return int(self._fetch(sql)[0][0])
 
     def find(self, prefix: str) -> list[Found]:
         """The tasks whose key begins like this, at most 20; the first 4 digits at least."""
@@ -304,33 +707,56 @@ class Store(Displayed):
                 f"{quoted(prefix)} is not the beginning of a key: give at least 4 of its {KEY_LENGTH} hexadecimal "
                 "digits"
             )
-        rows = self._database.fetch(
-            f"SELECT t.id, t.key, t.text, {tables.RECORD_COLUMNS} "
-            "FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
+        tasks = self._fetch(
+            f"SELECT t.id, t.key, t.text, {_SELECTED} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
-            (prefix, f"{prefix}g", FOUND_AT_MOST),  # g comes after every hexadecimal digit
+            (prefix, f"{prefix}g", MAX_FOUND),  # g comes after every hexadecimal digit
+        )
+        places = (
+            "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "
+            "WHERE p.task = ? ORDER BY p.experiment, p.number"
         )
         return [
-            Found(
-                tables.task_of(self._database, key, text),
-                tables.record_of(self._database, key, record),
-                self._database.fetch(
-                    "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "
-                    "WHERE p.task = ? ORDER BY p.experiment, p.number",
-                    (id,),
-                ),
-                record[tables.ATTEMPTS] or 0,
-            )
-            for id, key, text, *record in rows
+            Found(self._task(key, text), self._record(key, row), self._fetch(places, (id,)), row[-1] or 0)
+            for id, key, text, *row in tasks
         ]
 
     def task(self, key: str) -> Task:
         """The task with this key."""
-        rows = self._database.fetch("SELECT text FROM task WHERE key = ?", (key,))
+        rows = self._fetch("SELECT text FROM task WHERE key = ?", (key,))
         if not rows:
-            raise StoreError(f"{self._database.name} has no task {key}: plan the experiment that has it")
-        return tables.task_of(self._database, key, rows[0][0])
+            raise StoreError(f"{self.name} has no task {key}: plan the experiment that has it")
+        return self._task(key, rows[0][0])
 
     def document(self, digest: str) -> str:
         """The text of the document with this digest."""
-        return tables.document_of(self._database, digest)
+        rows = self._fetch("SELECT text FROM document WHERE digest = ?", (digest,))
+        if not rows:
+            raise StoreError(f"{self.name} has no document {digest}: plan the experiment that needs it again")
+        return str(rows[0][0])
+
+
+def _table(text: str) -> dict[str, Any]:
+    """The dict that a text in the file spells. Raises ValueError or TypeError for any other text."""
+    table = json.loads(text)
+    if not isinstance(table, dict):
+        raise TypeError("found no table in JSON")
+    return table
+
+
+def _row_of(record: Record) -> tuple[Any, ...]:
+    """The record as values of `_COLUMNS`; what JSON cannot hold is a ValueError."""
+    if not math.isfinite(record.seconds):
+        raise ValueError(f"a record cannot have taken {record.seconds} seconds")
+    return (
+        str(record.outcome),
+        None if record.result is None else canonical(dict(record.result)),
+        None if record.verdict is None else encodable(record.verdict),
+        encodable(record.message),
+        encodable(record.stderr),
+        float(record.seconds),
+        record.peak_memory,
+        record.host,
+        canonical(dict(record.versions)),
+        record.finished,
+    )

@@ -14,8 +14,7 @@ from contextlib import closing
 from pathlib import Path
 
 from kahanmaps.experiments.results.records import Documents, Executor, Job, Record
-from kahanmaps.experiments.results.store import Store
-from kahanmaps.experiments.results.tables import Planned
+from kahanmaps.experiments.results.store import Planned, Store
 from kahanmaps.experiments.running.children import GROUP_SECONDS, LocalChildren
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
