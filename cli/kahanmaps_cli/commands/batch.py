@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
+import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,19 +19,11 @@ from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.params import Shard
 from kahanmaps_cli.runs.batch_run import dry_run, run_batch
-from kahanmaps_cli.runs.batch_show import (
-    export_rows,
-    found_data,
-    print_found,
-    print_status,
-    print_summary,
-    print_tasks,
-    status_data,
-)
+from kahanmaps_cli.runs.batch_show import print_status, print_task, print_tasks, status_data, task_data
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import say
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import echo
+from kahanmaps_cli.screen.terminal import echo, on_terminal, print_table
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -168,19 +164,19 @@ def show(key: str, db: str, as_json: bool) -> None:
         found = store.find(key)
         if not found:
             raise lib.InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
-        data = [found_data(store, one) for one in found]
-    if as_json:
-        for one in data:
-            print_json(one)
-    else:
-        print_found(data)
+        for k, data in enumerate(task_data(store, one) for one in found):
+            if as_json:
+                print_json(data)
+            else:
+                click.echo("\n" * (k > 0), nl=False)
+                print_task(data)
 
 
 @command.command("export", short_help="The results as CSV, JSON lines or Parquet.")
 @_database()
 @click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
 @click.option("--jsonl", "form", flag_value="jsonl", help="One JSON object a line, everything in it.")
-@click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow and -o.")
+@click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow, and -o.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @click.option("--stable", is_flag=True, help="Leave out times, memory, hosts and versions: the same work, same bytes.")
 @_ONLY
@@ -199,8 +195,18 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
         raise click.UsageError("missing --csv, --jsonl or --parquet")
     if form == "parquet" and output in (None, "-"):
         raise click.UsageError("--parquet needs -o FILE: it is no text")
-    with _open(db) as store:
-        export_rows(store, form, output, stable, list(only) or None)
+    with _open(db) as store, ExitStack() as stack:
+        rows = partial(store.rows, list(only) or None)
+        if form == "parquet":
+            lib.write_parquet(rows, str(output), stable=stable)
+            return
+        stream: Any = sys.stdout
+        if output not in (None, "-"):  # a file is complete or is not there
+            stream = codecs.getwriter("utf-8")(stack.enter_context(lib.whole_file(str(output))))
+        if form == "csv":
+            lib.write_csv(rows, stream, stable=stable)
+        else:
+            lib.write_jsonl(rows(), stream, stable=stable)
 
 
 @command.command("summary", short_help="Counts and quantiles for groups of tasks.")
@@ -211,7 +217,9 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
 @click.option("--markdown", "as_markdown", is_flag=True, help="Tables in Markdown.")
 @_ONLY
 @json_option
-def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) -> None:
+def summary(
+    db: str, by: str, values: tuple[str, ...], stable: bool, as_markdown: bool, only: tuple[str, ...], as_json: bool
+) -> None:
     """Counts of outcomes and verdicts, and quantiles of the numbers, for groups of tasks.
 
     \b
@@ -226,7 +234,18 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
         raise click.UsageError("give --json or --markdown, not both")
     names = [name.strip() for name in by.split(",") if name.strip()]
     with _open(db) as store:
-        print_summary(store, names, as_json=as_json, as_markdown=as_markdown, **options)
+        rows = store.rows(list(only) or None, missing=True)
+        result = lib.summarise(rows, names, list(values) or None, stable=stable)
+    if as_json:
+        print_json({**envelope("batch summary"), "convention": lib.CONVENTION, **result.to_json()})
+    elif as_markdown:
+        echo(lib.summary_markdown(result), end="")
+    elif on_terminal():
+        for table in result.tables(digits=4):
+            print_table([table.columns, *table.rows], words=table.words)
+    else:
+        for line in result.lines():
+            echo(line)
 
 
 @command.command("merge", short_help="Bring the results of several databases together.")

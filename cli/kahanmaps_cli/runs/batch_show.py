@@ -1,12 +1,9 @@
-"""What a database of results looks like: status, single tasks, summaries, exports, the list of tasks."""
+"""What is in a database of results, and what tasks there are: as plain data, and printed."""
 
 from __future__ import annotations
 
-import codecs
 import json
-import sys
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from typing import Any
 
 import click
@@ -55,25 +52,23 @@ def require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
 
 def print_status(data: Mapping[str, Any]) -> None:
     """A line for each experiment."""
-    kinds = ("ok", "failed", "crashed", "timeout", "out-of-memory")
-    verdicts = ("proved", "supported", "refuted", "undecided")
     rows = data["experiments"]
-    shown = [kind for kind in kinds if kind == "ok" or any(row["outcomes"].get(kind) for row in rows)]
-    given = [verdict for verdict in verdicts if any(row["verdicts"].get(verdict) for row in rows)]
-    table = [["experiment", "tasks", "missing", *shown, *given, "time"]]
+    kinds = ["ok", *(kind for kind in lib.KEPT[1:] if any(row["outcomes"].get(kind) for row in rows))]
+    verdicts = [verdict for verdict in lib.VERDICTS if any(row["verdicts"].get(verdict) for row in rows)]
+    table = [["experiment", "tasks", "missing", *kinds, *verdicts, "time"]]
     for row in rows:
-        numbers = [row["tasks"], row["missing"], *(row["outcomes"].get(kind, 0) for kind in shown)]
-        numbers += [row["verdicts"].get(verdict, 0) for verdict in given]
-        table.append([row["name"], *map(str, numbers), duration(row["seconds"])])
+        counts = [row["tasks"], row["missing"], *(row["outcomes"].get(kind, 0) for kind in kinds)]
+        counts += [row["verdicts"].get(verdict, 0) for verdict in verdicts]
+        table.append([row["name"], *map(str, counts), duration(row["seconds"])])
     print_table(table)
     for row in rows:
-        for one in row["skipped"]:
-            echo(f"{row['name']} skips {one['system']}: {one['reason']}")
+        for skipped in row["skipped"]:
+            echo(f"{row['name']} skips {skipped['system']}: {skipped['reason']}")
     if data["unplanned"]:
         click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
 
 
-def found_data(store: lib.Store, found: lib.Found) -> dict[str, Any]:
+def task_data(store: lib.Store, found: lib.Found) -> dict[str, Any]:
     """A task and its record as plain data."""
     task, record, places, attempts = found
     return {
@@ -90,72 +85,27 @@ def found_data(store: lib.Store, found: lib.Found) -> dict[str, Any]:
     }
 
 
-def print_found(data: Sequence[Mapping[str, Any]]) -> None:
-    """A block of lines for each task."""
-    for k, one in enumerate(data):
-        if k:
-            click.echo()
-        lines = [
-            ("key", one["key"]),
-            ("task", one["task"]),
-            ("in", ", ".join(f"{place['experiment']} {place['number']}" for place in one["places"]) or "no plan"),
-            ("system", _compact(one["system"])),
-            ("options", _compact({name: v for name, v in one["options"].items() if v is not None})),
-        ]
-        if "outcome" not in one:
-            lines.append(("outcome", "none yet"))
-        else:
-            lines.append(("outcome", one["outcome"] + (f": {one['message']}" if one["message"] else "")))
-            if one["verdict"] is not None:
-                lines.append(("verdict", one["verdict"]))
-            lines += [("result." + name, _compact(value)) for name, value in (one["result"] or {}).items()]
-            if one["stderr"]:
-                lines.append(("stderr", one["stderr"]))
-            memory = "" if one["peak_memory"] is None else f", {one['peak_memory'] / 1e6:.0f} MB at most"
-            lines.append(("took", f"{one['seconds']:.3g} s{memory}, attempts: {one['attempts']}"))
-            versions = ", ".join(f"{name} {number}" for name, number in one["versions"].items())
-            lines.append(("where", f"{one['host']}, {one['finished']}, {versions}"))
-        for name, text in lines:
-            tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
-
-
-def print_summary(
-    store: lib.Store,
-    by: Sequence[str],
-    *,
-    as_json: bool,
-    as_markdown: bool,
-    values: Sequence[str],
-    stable: bool,
-    only: Sequence[str],
-) -> None:
-    """The tables of a summary."""
-    found = lib.summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
-    if as_json:
-        print_json({**envelope("batch summary"), "convention": lib.CONVENTION, **found.to_json()})
-    elif as_markdown:
-        echo(lib.summary_markdown(found), end="")
-    elif on_terminal():
-        for table in found.tables(digits=4):
-            print_table([table.columns, *table.rows], words=table.words)
-    else:
-        for line in found.lines():
-            echo(line)
-
-
-def export_rows(store: lib.Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
-    """Write the results; a file is complete or is not there."""
-    if form == "parquet" and output is not None:
-        lib.write_parquet(lambda: store.rows(only), output, stable=stable)
-        return
-    with ExitStack() as stack:
-        stream: Any = sys.stdout
-        if output not in (None, "-"):
-            stream = codecs.getwriter("utf-8")(stack.enter_context(lib.whole_file(output)))
-        if form == "csv":
-            lib.write_csv(lambda: store.rows(only), stream, stable=stable)
-        else:
-            lib.write_jsonl(store.rows(only), stream, stable=stable)
+def print_task(data: Mapping[str, Any]) -> None:
+    """A block of lines."""
+    lines = {
+        "key": data["key"],
+        "task": data["task"],
+        "in": ", ".join(f"{place['experiment']} {place['number']}" for place in data["places"]) or "no plan",
+        "system": data["system"],
+        "options": {name: value for name, value in data["options"].items() if value is not None},
+        "outcome": "none yet",
+    }
+    if "outcome" in data:
+        lines["outcome"] = data["outcome"] + (f": {data['message']}" if data["message"] else "")
+        lines |= {name: data[name] for name in ("verdict", "stderr") if data[name]}
+        lines |= {f"result.{name}": value for name, value in (data["result"] or {}).items()}
+        memory = "" if data["peak_memory"] is None else f", {data['peak_memory'] / 1e6:.0f} MB at most"
+        lines["took"] = f"{data['seconds']:.3g} s{memory}, attempts: {data['attempts']}"
+        versions = ", ".join(f"{name} {number}" for name, number in data["versions"].items())
+        lines["where"] = f"{data['host']}, {data['finished']}, {versions}"
+    for name, value in lines.items():
+        text = value if isinstance(value, str) else json.dumps(value)
+        tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
 
 
 def print_tasks(name: str | None, as_json: bool) -> None:
@@ -201,7 +151,3 @@ _NEEDS = {
     "member": '"family", or files of kind [family]',
     "member or other": '"family", files of kind [family], or any other system together with a second one (other)',
 }
-
-
-def _compact(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)

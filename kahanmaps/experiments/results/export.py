@@ -23,9 +23,10 @@ from __future__ import annotations
 import json
 import os
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from fractions import Fraction
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from functools import lru_cache
 from importlib import import_module
+from math import inf
 from typing import IO, Any, NamedTuple
 
 from kahanmaps.algebra.written.cells import NUMBER, csv_line, guarded
@@ -41,6 +42,7 @@ OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # with stderr and v
 RESERVED = frozenset((*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN, "system", "options", "result", "stderr", "versions"))
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
+_MAX_DIGITS = 2_000  # characters of a text that counts as a number
 _ROW_GROUP = 10_000
 _CHARACTERS = 50_000_000  # of one row group: long lists would otherwise add up to gigabytes
 
@@ -88,11 +90,17 @@ def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tup
 
 
 def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
-    """The parts of the recipe, the options and the entries of the result of a row."""
+    """The options, the parts of the recipe and the entries of the result of a row."""
     result = row.record.result if row.record is not None else None
-    for section, data in (("system", row.task.system), ("option", row.task.options), ("result", result)):
+    for section, data in (("option", row.task.options), ("system", row.task.system), ("result", result)):
         for path, value in flatten(data or {}):
             yield Entry(section, path), value
+
+
+@lru_cache(10_000)  # thousands of rows have the same few entries
+def names_of_entry(entry: Entry) -> tuple[str, str]:
+    """What an entry may be called, the short name first."""
+    return entry.name, entry.full_name
 
 
 def names_of(found: Iterable[Entry]) -> dict[Entry, str]:
@@ -131,12 +139,32 @@ def plain(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, (int, float)):
         return repr(value)
-    return _json(value)
+    return _ENCODER.encode(value)
 
 
 def cell(value: Any) -> str:
     """The text of a value in a CSV file: texts that a spreadsheet would run get an apostrophe, numbers never do."""
     return guarded(plain(value)) if isinstance(value, str) else plain(value)
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a finite number, or the text of an exact one: 7/3, 21.2031. True and False are."""
+    if isinstance(value, str):
+        return len(value) <= _MAX_DIGITS and NUMBER.fullmatch(value) is not None
+    return isinstance(value, int | float) and -inf < value < inf
+
+
+def nearest(value: Any) -> float:
+    """The double nearest to an exact number, infinite where it is beyond their range.
+
+    >>> nearest("7/3"), nearest("0.1"), nearest(-(10**400))
+    (2.3333333333333335, 0.1, -inf)
+    """
+    numerator, _, denominator = str(value).partition("/") if isinstance(value, str) else (value, "", "")
+    try:  # Python rounds quotients of integers correctly, and decimals
+        return int(numerator) / int(denominator) if denominator else float(numerator)
+    except OverflowError:
+        return inf if int(numerator) > 0 else -inf
 
 
 def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -> None:
@@ -146,11 +174,12 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
     """
     from kahanmaps.maps.convention import CONVENTION  # loads FLINT: not before something is written
 
+    left_out = {*OF_THE_RUN, "stderr", "versions"} if stable else set()
     header = {"record": "header"} if stable else {"record": "header", "version": __version__}
     stream.write(_line({**header, "convention": CONVENTION}))
     count = 0
     for row in rows:
-        stream.write(_line(_result(row, stable)))
+        stream.write(_line({"record": "result", **{k: v for k, v in known(row).items() if k not in left_out}}))
         count += 1
     stream.write(_line({"record": "end", "results": count}))
 
@@ -162,7 +191,8 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
     layout = _Layout(rows(), stable)
     stream.write(csv_line(map(cell, layout.names)))
     for row in rows():
-        stream.write(csv_line(map(cell, layout.values(row))))
+        cells = layout.cells(row)
+        stream.write(csv_line(cell(cells.get(name)) for name in layout.names))
 
 
 def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:
@@ -175,65 +205,78 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     """
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
-    except ModuleNotFoundError as error:
-        raise InputError("Parquet files need pyarrow, which is not installed: pip install pyarrow") from error
+    except ImportError as error:
+        raise InputError(f"Parquet files need pyarrow ({error}): pip install 'kahanmaps[tables]'") from error
     from kahanmaps.maps.convention import CONVENTION
 
-    layout = _Layout(rows(), stable)
+    layout = _Layout(rows(), stable, typed=True)
+    beside = {name: f"{name}.number" for name in layout.numbers if f"{name}.number" not in layout.types}
     types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}
-    metadata = {"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__}
-    fields = [arrow.field(plain(name), types[kind]) for name, kind in zip(layout.names, layout.types, strict=True)]
-    beside = [place for place, is_number in enumerate(layout.numbers) if is_number]
-    fields += [arrow.field(f"{plain(layout.names[place])}.number", types["float64"]) for place in beside]
-    schema = arrow.schema(fields, metadata=metadata)
+    fields = {**layout.types, **dict.fromkeys(beside.values(), "float64")}
+    schema = arrow.schema(
+        [arrow.field(plain(name), types[kind]) for name, kind in fields.items()],
+        metadata={"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__},
+    )
     with whole_file(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
-        for columns in _row_groups(layout, rows()):
-            columns += [list(map(_double, columns[place])) for place in beside]
-            arrays = [arrow.array(values, field.type) for values, field in zip(columns, fields, strict=True)]
-            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema), row_group_size=_ROW_GROUP)
+
+        def write(group: list[dict[str, Any]]) -> None:
+            try:
+                writer.write_table(arrow.Table.from_pylist(group, schema))
+            except (arrow.ArrowInvalid, arrow.ArrowTypeError) as error:
+                raise InputError(_CHANGED.format("a value", "")) from error
+
+        group: list[dict[str, Any]] = []
+        characters = 0
+        for row in rows():
+            line = {}
+            for name, value in layout.cells(row).items():
+                if value is not None and layout.types[name] == "string":
+                    if name in beside:
+                        line[beside[name]] = nearest(value)
+                    value = plain(value)
+                    characters += len(value)
+                line[plain(name)] = value
+            group.append(line)
+            if len(group) == _ROW_GROUP or characters > _CHARACTERS:
+                write(group)
+                group, characters = [], 0
+        if group:
+            write(group)
 
 
 class _Layout:
-    """The columns of a table, with the kinds of values that occur in those that are not always there."""
+    """The columns of a table: their `names`; if `typed`, their `types`, and those of texts that are exact `numbers`."""
 
-    def __init__(self, rows: Iterable[Row], stable: bool) -> None:
+    def __init__(self, rows: Iterable[Row], stable: bool, typed: bool = False) -> None:
         """The layout for these rows; they are read, not kept."""
         kinds: defaultdict[Entry, set[str]] = defaultdict(set)
         for row in rows:
             for entry, value in entries(row):
-                kinds[entry].add(_kind(value))
-        called = names_of(kinds)
+                kinds[entry].add(_kind(value) if typed else "text")
+        self._called = names_of(kinds)
         recipe, options, result = (
-            [entry for entry in called if entry.section == section] for section in ("system", "option", "result")
+            [self._called[entry] for entry in self._called if entry.section == section]
+            for section in ("system", "option", "result")
         )
-        last = AFTER if stable else AFTER + OF_THE_RUN
-        columns: Sequence[str | Entry] = (*BEFORE, *recipe, *options, *BETWEEN, *result, *last)
-        self.names = [called[column] if isinstance(column, Entry) else column for column in columns]
-        self.types = [
-            _type(kinds[column]) if isinstance(column, Entry) else _FIXED.get(column, "string") for column in columns
-        ]
-        self.numbers = [
-            isinstance(column, Entry)
-            and {"number"} <= kinds[column] <= {*_NUMBERS, "none"}
-            and f"{name}.number" not in self.names
-            for column, name in zip(columns, self.names, strict=True)
-        ]
-        self._place = {entry: place for place, entry in enumerate(columns) if isinstance(entry, Entry)}
-        self._fixed = [(place, name) for place, name in enumerate(columns) if isinstance(name, str)]
+        self._always = (*BEFORE, *BETWEEN, *AFTER) if stable else (*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN)
+        last = AFTER if stable else (*AFTER, *OF_THE_RUN)
+        self.names = (*BEFORE, *recipe, *options, *BETWEEN, *result, *last)
+        held = {name: kinds[entry] for entry, name in self._called.items()}
+        self.types = {name: _type(held[name]) if name in held else _FIXED.get(name, "string") for name in self.names}
+        self.numbers = [name for name in self.names if {"number"} <= held.get(name, set()) <= {*_NUMBERS, "none"}]
 
-    def values(self, row: Row) -> list[Any]:
-        """The values of a row, one for each column, None where it has none."""
+    def cells(self, row: Row) -> dict[str, Any]:
+        """The values of a row by the names of their columns."""
         fixed = known(row)
-        values = [None] * len(self.names)
-        for place, name in self._fixed:
-            values[place] = fixed[name]
+        cells = {name: fixed[name] for name in self._always}
         for entry, value in entries(row):
-            if entry not in self._place:
-                raise _changed(row, entry.name)
-            values[self._place[entry]] = value
-        return values
+            if entry not in self._called:
+                raise InputError(_CHANGED.format(f"the value {quoted(entry.name)}", f" of task {row.number}"))
+            cells[self._called[entry]] = value
+        return cells
 
 
+_CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
 # Types of Parquet and the kinds of values that each holds without loss; a column gets the first that will do.
 _HOLDS = {
     "bool": {"bool", "none"},
@@ -241,7 +284,6 @@ _HOLDS = {
     "float64": {"small", "float64", "none"},
     "string": {"bool", "small", "int64", "float64", "number", "text", "none"},
 }
-_LONGEST_NUMBER = 2_000  # characters of a text that gets a double beside it
 _NUMBERS = {"small", "int64", "float64", "number"}
 _FIXED = {"number": "int64", "seconds": "float64", "peak_memory": "int64"}
 
@@ -253,17 +295,7 @@ def _kind(value: Any) -> str:
         return "small" if abs(value) <= 2**53 else "int64" if -(2**63) <= value < 2**63 else "text"
     if isinstance(value, float):
         return "float64"
-    if isinstance(value, str) and len(value) <= _LONGEST_NUMBER and NUMBER.fullmatch(value):
-        return "number"
-    return "none" if value is None else "text"
-
-
-def _double(text: str | None) -> float | None:
-    """The double nearest to an exact number; None where it is beyond their range."""
-    try:
-        return None if not text else float(Fraction(text))
-    except OverflowError:
-        return None
+    return "none" if value is None else "number" if isinstance(value, str) and is_number(value) else "text"
 
 
 def _type(kinds: Set[str]) -> str:
@@ -272,43 +304,13 @@ def _type(kinds: Set[str]) -> str:
     >>> [_type(kinds) for kinds in ({"small", "none"}, {"small", "float64"}, {"int64", "float64"}, {"none"})]
     ['int64', 'float64', 'string', 'string']
     """
-    if kinds <= {"none"}:
-        return "string"
-    return next(name for name, holds in _HOLDS.items() if kinds <= holds)
-
-
-def _changed(row: Row, name: str) -> InputError:
-    return InputError(
-        f"found the value {quoted(name)} of task {row.number} changed while the table was written: "
-        "export again when nobody works on the batch"
-    )
-
-
-def _row_groups(layout: _Layout, rows: Iterable[Row]) -> Iterator[list[list[Any]]]:
-    """The columns of so many rows at a time, converted to their types."""
-    columns: list[list[Any]] = [[] for _ in layout.names]
-    characters = 0
-    for row in rows:
-        for column, name, kind, value in zip(columns, layout.names, layout.types, layout.values(row), strict=True):
-            if _kind(value) not in _HOLDS[kind]:
-                raise _changed(row, name)
-            if kind == "string" and value is not None:
-                value = plain(value)
-                characters += len(value)
-            elif kind == "float64" and value is not None:
-                value = float(value)
-            column.append(value)
-        if len(columns[0]) == _ROW_GROUP or characters > _CHARACTERS:
-            yield columns
-            columns = [[] for _ in layout.names]
-            characters = 0
-    if columns[0]:
-        yield columns
+    return "string" if kinds <= {"none"} else next(name for name, holds in _HOLDS.items() if kinds <= holds)
 
 
 def known(row: Row) -> dict[str, Any]:
     """What every row has, in the order of JSON lines; of a missing task, None for what its record would say."""
     task, record = row.task, row.record
+    of_record = ("verdict", "result", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished")
     return {
         "experiment": row.experiment,
         "number": row.number,
@@ -317,20 +319,10 @@ def known(row: Row) -> dict[str, Any]:
         "system": task.system,
         "options": task.options,
         "outcome": record and str(record.outcome),
-        **{name: getattr(record, name, None) for name in ("verdict", "result", "message", "stderr")},
-        **{name: getattr(record, name, None) for name in ("seconds", "peak_memory", "host", "versions", "finished")},
+        **{name: getattr(record, name, None) for name in of_record},
     }
-
-
-def _result(row: Row, stable: bool) -> dict[str, Any]:
-    left_out = {*OF_THE_RUN, "stderr", "versions"} if stable else set()
-    return {"record": "result", **{name: value for name, value in known(row).items() if name not in left_out}}
 
 
 def _line(record: Mapping[str, Any]) -> str:
     """A line of JSON: the record in its own order, all within it sorted."""
-    return "{" + ", ".join(f"{json.dumps(name)}: {_json(value)}" for name, value in record.items()) + "}\n"
-
-
-def _json(value: Any) -> str:
-    return _ENCODER.encode(value)
+    return "{" + ", ".join(f"{json.dumps(name)}: {_ENCODER.encode(value)}" for name, value in record.items()) + "}\n"
