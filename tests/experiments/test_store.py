@@ -1,18 +1,20 @@
-"""Plans, results and what is pending in a store.
+"""Plans, results, what is pending, and one store made of two.
 
 Plans with tasks that come twice, shards and retries are compared with a model in plain Python.
 """
 
 from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
+from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, seeds, small_chunks, task, tasks
 
 from kahanmaps.experiments.results.records import Limits, Outcome, Record, Row, digest
-from kahanmaps.experiments.results.store import Planned, Store, StoreError
+from kahanmaps.experiments.results.store import Merged, Planned, Store, StoreError
 
 # Records
 
@@ -22,18 +24,18 @@ def test_a_record_comes_back_as_it_was(store):
         task(1).key,
         Outcome.OK,
         {"b": ["1/3", 0.1, None, True], "a": {"ä": "\x00'\""}},
-        "supported",
-        "a message",
-        "the end\nof stderr",
-        1.25,
-        1 << 40,
-        "a host",
-        {"kahanmaps": "1.0", "flint": "3.3"},
-        "2026-01-02T03:04:05+00:00",
+        verdict="supported",
+        message="a message",
+        stderr=b"the end\nof caf\xe9".decode(errors="surrogateescape"),  # a child may print what is no text
+        seconds=1.25,
+        peak_memory=1 << 40,
+        host="a host",
+        versions={"kahanmaps": "1.0", "flint": "3.3"},
+        finished="2026-01-02T03:04:05+00:00",
     )
     store.plan("a", "1", LIMITS, tasks(1), {})
     store.add([record])
-    assert list(store.rows()) == [Row("a", 0, task(1), record)]
+    assert list(store.rows()) == [Row("a", 0, task(1), replace(record, stderr="the end\nof caf\\udce9"))]
 
 
 @pytest.mark.parametrize("bad", [{"result": {"x": float("inf")}}, {"seconds": float("nan")}])
@@ -42,13 +44,6 @@ def test_numbers_that_are_not_finite_stay_outside_with_all_that_came_along(store
     with pytest.raises(ValueError, match=r"JSON compliant|nan seconds"):
         store.add([ok(1), replace(ok(2), **bad)])
     assert list(store.rows()) == []
-
-
-def test_a_child_that_printed_no_text_does_no_harm(store):
-    store.plan("a", "1", LIMITS, tasks(1), {})
-    store.add([replace(failed(1), stderr=b"caf\xe9".decode(errors="surrogateescape"))])
-    (row,) = store.rows()
-    assert row.record.stderr == "caf\\udce9"
 
 
 def test_a_result_without_a_task_is_refused_with_all_that_came_along(store):
@@ -122,10 +117,8 @@ def test_tasks_are_forgotten_when_neither_a_plan_nor_a_result_needs_them(store):
     store.plan("b", "1", LIMITS, tasks(3), {})
     store.add([ok(1)])
     store.plan("a", "2", LIMITS, [], {})
-    assert store.task(task(1).key) == task(1)  # has a result
-    assert store.task(task(3).key) == task(3)  # is planned
-    with pytest.raises(StoreError, match="no task"):
-        store.task(task(2).key)
+    # 1 has a result, 3 is planned.
+    assert [len(store.find(task(number).key)) for number in (1, 2, 3)] == [1, 0, 1]
 
 
 def test_a_plan_that_cannot_be_finished_leaves_the_old_one(store):
@@ -152,44 +145,27 @@ def test_documents_are_kept_and_may_come_up_while_tasks_are_made(store):
     assert store.document(digest("x' = x^2")) == "x' = x^2"
     with pytest.raises(StoreError, match="no document 0123"):
         store.document("0123")
-
-
-def test_a_document_under_a_wrong_digest_is_refused(store):
     with pytest.raises(StoreError, match="not the one with this digest"):
-        store.plan("a", "1", LIMITS, [], {"0123": "text"})
-    assert store.experiments() == []
+        store.plan("b", "1", LIMITS, [], {"0123": "text"})
+    assert [one.name for one in store.experiments()] == ["a"]
 
 
 # What is pending
 
 
-def test_results_added_meanwhile_change_nothing_about_what_has_been_handed_out(store):
-    with small_chunks():
-        numbers = [*range(10), *range(10), 10]
-        store.plan("a", "1", LIMITS, tasks(*numbers), {})
-        seen = []
-        for job in store.pending():
-            seen.append(seed(job.task))
-            store.add([Record(job.task.key, Outcome.OK, {})])
-        assert seen == list(range(11))
-        assert store.count_pending() == 0
-
-
-def test_a_retried_task_that_fails_again_does_not_come_twice(store):
+def test_each_task_is_handed_out_once_whatever_is_added_meanwhile(store):
     with small_chunks():
         store.plan("a", "1", LIMITS, tasks(*range(8), *range(8)), {})
         store.plan("b", "1", LIMITS, tasks(*range(8)), {})
         store.add([failed(number) for number in range(0, 8, 2)])
         store.add([ok(1)])
-        assert seeds(store.pending()) == [3, 5, 7]
         seen = []
         for job in store.pending(retry_failed=True):
             seen.append(seed(job.task))
             assert len(seen) < 20
             store.add([failed(seen[-1], "again")])
         assert seen == [0, 2, 3, 4, 5, 6, 7]
-        assert store.count_pending() == 0
-        assert store.count_pending(retry_failed=True) == 7
+        assert (store.count_pending(), store.count_pending(retry_failed=True)) == (0, 7)
 
 
 def test_a_job_has_the_limits_of_the_experiment_that_it_comes_from(store):
@@ -273,3 +249,112 @@ def test_a_task_is_found_by_the_beginning_of_its_key(store):
 def test_what_is_no_beginning_of_a_key_is_refused(store, prefix):
     with pytest.raises(StoreError, match="at least 4 of its 32 hexadecimal digits"):
         store.find(prefix)
+
+
+# Merging
+
+
+def contents(path: Path) -> list[object]:
+    with Store.open(path, readonly=True) as store:
+        return [store.experiments(), list(store.rows(missing=True)), store.unplanned()]
+
+
+def test_a_merge_into_an_empty_database_is_a_copy(path):
+    source = path.with_name("source.db")
+    with Store.open(source, create=True) as store:
+        store.plan("a", "1", LIMITS, tasks(1, 2, 2, 3), {digest("d"): "d"})
+        store.plan("b", "2", Limits(), tasks(3, 4), {})
+        store.add([ok(1), failed(3), ok(4)])
+        store.plan("b", "3", Limits(), tasks(3), {})
+    with small_chunks(), Store.open(path, create=True) as store:
+        assert store.merge(source) == Merged(tasks=4, results=3, replaced=0, conflicts=0)
+        assert store.document(digest("d")) == "d"
+        assert store.unplanned() == 1
+        assert store.merge(source) == Merged(0, 0, 0, 0)
+    assert contents(path) == contents(source)
+
+
+MINE_AND_THEIRS = [
+    (None, ok(1), ok(1), Merged(0, 1, 0, 0)),
+    (ok(1), None, ok(1), Merged(0, 0, 0, 0)),
+    (failed(1), ok(1), ok(1), Merged(0, 0, 1, 0)),
+    (ok(1), failed(1), ok(1), Merged(0, 0, 0, 0)),
+    (failed(1, "mine"), failed(1, "theirs"), failed(1, "mine"), Merged(0, 0, 0, 0)),
+    (ok(1), replace(ok(1), seconds=9.0, host="there"), ok(1), Merged(0, 0, 0, 0)),
+    (ok(1, "1/2"), ok(1, "1/3"), ok(1, "1/2"), Merged(0, 0, 0, 1, (task(1).key,))),
+    (ok(1, verdict="proved"), ok(1, verdict="refuted"), ok(1, verdict="proved"), Merged(0, 0, 0, 1, (task(1).key,))),
+]
+
+
+@pytest.mark.parametrize(("mine", "theirs", "kept", "merged"), MINE_AND_THEIRS)
+def test_of_two_results_of_a_task_the_right_one_is_kept(path, mine, theirs, kept, merged):
+    source = planned(path.with_name("source.db"), 1, records=[r for r in [theirs] if r])
+    planned(path, 1, records=[r for r in [mine] if r])
+    with Store.open(path) as store:
+        assert store.merge(source) == merged
+        assert [row.record for row in store.rows(missing=True)] == [kept]
+        again = store.merge(source)
+        assert again == replace(merged, results=0, replaced=0)
+        assert [row.record for row in store.rows(missing=True)] == [kept]
+
+
+def test_attempts_come_along_and_do_not_grow_when_merged_again(path):
+    source = planned(path.with_name("source.db"), 1, 2, records=[failed(1), failed(1), ok(1), failed(2), failed(2)])
+    planned(path, 1, 2, records=[failed(1)])
+    with Store.open(path) as store:
+        for _ in range(2):
+            store.merge(source)
+            assert [store.find(task(number).key)[0].attempts for number in (1, 2)] == [4, 2]
+
+
+def test_all_conflicts_are_counted_and_the_first_few_named(path):
+    source = planned(path.with_name("source.db"), *range(9), records=[ok(number, "1") for number in range(9)])
+    planned(path, *range(9), records=[ok(number, "2") for number in range(9)])
+    with Store.open(path) as store:
+        assert store.merge(source) == Merged(0, 0, 0, 9, tuple(task(number).key for number in range(5)))
+
+
+def test_an_experiment_defined_in_two_ways_stops_the_merge_and_nothing_is_changed(path):
+    source = path.with_name("source.db")
+    with Store.open(source, create=True) as store:
+        store.plan("new", "1", LIMITS, tasks(7, 8), {})
+        store.plan("a", "other", LIMITS, tasks(1), {})
+        store.add([ok(1), ok(7)])
+    planned(path, 1)
+    before = contents(path)
+    with Store.open(path) as store, pytest.raises(StoreError, match="experiment a is defined in one way"):
+        store.merge(source)
+    assert contents(path) == before
+
+
+def test_a_database_is_not_merged_with_itself_nor_with_anything_else(path, store):
+    with pytest.raises(StoreError, match="is this database itself"):
+        store.merge(path)
+    with pytest.raises(StoreError, match="there is no database"):
+        store.merge(path.with_name("nothing.db"))
+    path.with_name("text").write_text("text" * 1000)
+    with pytest.raises(StoreError, match="text is not an SQLite database"):
+        store.merge(path.with_name("text"))
+
+
+@settings(max_examples=8)
+@given(plan=st.lists(numbers, max_size=9), bad=st.sets(numbers), parts=st.integers(1, 3))
+def test_shards_merged_in_any_order_are_the_whole(plan, bad, parts):
+    def run(path: Path, shard: tuple[int, int]) -> Path:
+        with Store.open(path, create=True) as store:
+            store.plan("a", "1", LIMITS, tasks(*plan), {})
+            for job in store.pending(shard=shard):
+                number = seed(job.task)
+                store.add([failed(number) if number in bad else ok(number)])
+        return path
+
+    with TemporaryDirectory(dir=MEMORY) as name, small_chunks():
+        folder = Path(name)
+        whole = contents(run(folder / "whole.db", (1, 1)))
+        shards = [run(folder / f"{part}.db", (part, parts)) for part in range(1, parts + 1)]
+        for count, order in enumerate(permutations(shards)):
+            with Store.open(folder / f"merged{count}.db", create=True) as store:
+                for shard in (*order, order[0]):
+                    store.merge(shard)
+                assert store.count_pending() == 0
+            assert contents(folder / f"merged{count}.db") == whole

@@ -721,13 +721,6 @@ class Store(Displayed):
             for id, key, text, *row in tasks
         ]
 
-    def task(self, key: str) -> Task:
-        """The task with this key."""
-        rows = self._fetch("SELECT text FROM task WHERE key = ?", (key,))
-        if not rows:
-            raise StoreError(f"{self.name} has no task {key}: plan the experiment that has it")
-        return self._task(key, rows[0][0])
-
     def document(self, digest: str) -> str:
         """The text of the document with this digest."""
         rows = self._fetch("SELECT text FROM document WHERE digest = ?", (digest,))
