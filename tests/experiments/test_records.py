@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.experiments.results.records import KEY_LENGTH, Outcome, Record, Task, canonical, digest
+from kahanmaps.experiments.results.records import Outcome, Record, Task, canonical, digest
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(max_size=5),
@@ -20,13 +20,9 @@ TASK = Task("orbit", {"family": {"m": 2, "seed": 7}}, {"eps": "1/10", "steps": 5
 FILE = Task("orbit", {"document": "d", "name": "top", "parameters": {"a": "2"}}, {"eps": "1/10"})
 
 
-@given(plain)
-def test_canonical_text_says_what_the_data_say(data):
-    assert json.loads(canonical(data)) == data
-
-
 @given(tables)
-def test_canonical_text_does_not_depend_on_the_order_of_names(table):
+def test_canonical_text_says_what_the_data_say_and_does_not_depend_on_the_order_of_names(table):
+    assert json.loads(canonical(table)) == table
     assert canonical(dict(reversed(table.items()))) == canonical(table)
 
 
@@ -36,11 +32,6 @@ def test_what_is_not_plain_has_no_canonical_text(value):
         canonical({"a": value})
 
 
-def test_digests_are_those_of_sha256():
-    # printf abc | sha256sum, GNU coreutils 9.1
-    assert digest("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"[:KEY_LENGTH]
-
-
 @given(tasks)
 def test_a_task_is_made_again_from_its_text(task):
     again = Task.from_text(task.text)
@@ -48,8 +39,9 @@ def test_a_task_is_made_again_from_its_text(task):
 
 
 def test_keys_stay_the_same_from_version_to_version():
-    # printf of the canonical text | sha256sum, GNU coreutils 9.1. Databases hold keys: when this fails, every old
-    # result is lost to its task.
+    # printf of the canonical text | sha256sum, GNU coreutils 9.1, the first 32 digits. Databases hold keys: when this
+    # fails, every old result is lost to its task.
+    assert digest("abc") == "ba7816bf8f01cfea414140de5dae2223"
     assert (TASK.key, FILE.key) == ("9bb970790bd9ee91d5fab53e891129a2", "c6de480710a5912168ac18d97b312d9f")
 
 
@@ -60,7 +52,6 @@ def test_keys_stay_the_same_from_version_to_version():
         (TASK, "start", None),
         (TASK, "m", 2),
         (TASK, "parameters.a", None),
-        (TASK, "nothing", None),
         (FILE, "parameters.a", "2"),
         (FILE, "m", None),
         (Task("verify-universal", None, {"m": 3}), "parameters.a", None),
@@ -71,18 +62,7 @@ def test_a_task_tells_its_options_and_the_pieces_of_its_system(task, name, value
     assert task.value(name) == value
 
 
-@given(
-    st.builds(
-        Record,
-        key=st.text(max_size=5),
-        outcome=st.sampled_from(Outcome),
-        result=st.none() | tables,
-        verdict=st.none() | st.text(max_size=5),
-        message=st.text(max_size=5),
-        seconds=st.floats(0, 1e6),
-        peak_memory=st.none() | st.integers(0, 10**12),
-        versions=st.dictionaries(st.text(max_size=3), st.text(max_size=3), max_size=2),
-    )
-)
-def test_a_record_is_made_again_from_its_json(record):
+@given(tables, st.none() | tables, st.sampled_from(Outcome))
+def test_a_record_is_made_again_from_its_json(versions, result, outcome):
+    record = Record("key", outcome, result, "proved", "message", "stderr", 0.1, 10**12, "host", versions, "2026-01-02")
     assert Record.from_json(json.loads(json.dumps(record.to_json()))) == record
