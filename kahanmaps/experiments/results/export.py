@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from functools import lru_cache
 from importlib import import_module
 from math import inf
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 from kahanmaps.algebra.written.cells import NUMBER, csv_line, guarded
 from kahanmaps.errors import InputError, quoted
@@ -47,37 +47,12 @@ _ROW_GROUP = 10_000
 _CHARACTERS = 50_000_000  # of one row group: long lists would otherwise add up to gigabytes
 
 
-class Entry(NamedTuple):
-    """Where a value stands: in the "system", among the "option"s or in the "result", and the keys that lead to it."""
-
-    section: str
-    path: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        """What it is called where nobody else has that name.
-
-        >>> Entry("system", ("family", "m")).name, Entry("system", ("parameters", "a")).name
-        ('m', 'parameters.a')
-        """
-        return ".".join(self.path[self._of_family :])
-
-    @property
-    def full_name(self) -> str:
-        """What it is called otherwise.
-
-        >>> Entry("system", ("family", "m")).full_name, Entry("option", ("eps",)).full_name
-        ('family.m', 'option.eps')
-        """
-        return ("family" if self._of_family else self.section) + "." + self.name
-
-    @property
-    def _of_family(self) -> bool:
-        return self.section == "system" and self.path[0] == "family" and len(self.path) > 1
+# Where a value stands: "option", "system" or "result", and the keys that lead to it.
+Entry = tuple[str, ...]
 
 
 def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """The entries of nested dicts, each with the keys that lead to it; lists are left whole.
+    """The values in nested dicts, each with the keys that lead to it; lists are left whole.
 
     >>> list(flatten({"a": 1, "b": {"c": [2, 3]}}))
     [(('a',), 1), (('b', 'c'), [2, 3])]
@@ -93,36 +68,19 @@ def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
     """The options, the parts of the recipe and the entries of the result of a row."""
     result = row.record.result if row.record is not None else None
     for section, data in (("option", row.task.options), ("system", row.task.system), ("result", result)):
-        for path, value in flatten(data or {}):
-            yield Entry(section, path), value
+        yield from flatten(data or {}, (section,))
 
 
 @lru_cache(10_000)  # thousands of rows have the same few entries
-def names_of_entry(entry: Entry) -> tuple[str, str]:
-    """What an entry may be called, the short name first."""
-    return entry.name, entry.full_name
+def names_of(entry: Entry) -> tuple[str, str]:
+    """What an entry is called where nobody else has that name, and what otherwise.
 
-
-def names_of(found: Iterable[Entry]) -> dict[Entry, str]:
-    """One name for each entry, different from all others: the rule is at the top of this file.
-
-    >>> names_of([Entry("result", ("seed",)), Entry("option", ("seed",)), Entry("option", ("verdict",))])
-    ... # doctest: +NORMALIZE_WHITESPACE
-    {Entry(section='option', path=('seed',)): 'seed',
-     Entry(section='option', path=('verdict',)): 'option.verdict',
-     Entry(section='result', path=('seed',)): 'result.seed'}
+    >>> names_of(("system", "family", "m")), names_of(("result", "heights", "max"))
+    (('m', 'family.m'), ('heights.max', 'result.heights.max'))
     """
-    taken = set(RESERVED)
-    names = {}
-    for entry in sorted(found, key=lambda entry: (("option", "system", "result").index(entry.section), entry.path)):
-        name = entry.name
-        if name in taken:
-            name = entry.full_name
-        while name in taken:  # {"a": {"b": 1}, "a.b": 2}, or a result that is called result.seed
-            name = f"{entry.section}.{name}"
-        taken.add(name)
-        names[entry] = name
-    return names
+    section, *keys = entry[entry[:2] == ("system", "family") and len(entry) > 2 :]
+    name = ".".join(keys)
+    return name, f"{section}.{name}"
 
 
 def plain(value: Any) -> str:
@@ -253,14 +211,21 @@ class _Layout:
         for row in rows:
             for entry, value in entries(row):
                 kinds[entry].add(_kind(value) if typed else "text")
-        self._called = names_of(kinds)
-        recipe, options, result = (
-            [self._called[entry] for entry in self._called if entry.section == section]
-            for section in ("system", "option", "result")
-        )
-        self._always = (*BEFORE, *BETWEEN, *AFTER) if stable else (*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN)
+        self._called: dict[Entry, str] = {}
+        taken = set(RESERVED)
+        parts: dict[str, list[str]] = {"option": [], "system": [], "result": []}
+        for section, names in parts.items():
+            for entry in sorted(entry for entry in kinds if entry[0] == section):
+                name, full = names_of(entry)
+                name = full if name in taken else name
+                while name in taken:  # {"a": {"b": 1}, "a.b": 2}, or a result that is called result.seed
+                    name = f"{section}.{name}"
+                taken.add(name)
+                names.append(name)
+                self._called[entry] = name
         last = AFTER if stable else (*AFTER, *OF_THE_RUN)
-        self.names = (*BEFORE, *recipe, *options, *BETWEEN, *result, *last)
+        self._always = (*BEFORE, *BETWEEN, *last)
+        self.names = (*BEFORE, *parts["system"], *parts["option"], *BETWEEN, *parts["result"], *last)
         held = {name: kinds[entry] for entry, name in self._called.items()}
         self.types = {name: _type(held[name]) if name in held else _FIXED.get(name, "string") for name in self.names}
         self.numbers = [name for name in self.names if {"number"} <= held.get(name, set()) <= {*_NUMBERS, "none"}]
@@ -271,7 +236,7 @@ class _Layout:
         cells = {name: fixed[name] for name in self._always}
         for entry, value in entries(row):
             if entry not in self._called:
-                raise InputError(_CHANGED.format(f"the value {quoted(entry.name)}", f" of task {row.number}"))
+                raise InputError(_CHANGED.format(f"the value {quoted(names_of(entry)[0])}", f" of task {row.number}"))
             cells[self._called[entry]] = value
         return cells
 

@@ -94,21 +94,18 @@ def _read(text: str, parameters: str) -> SystemFile:
 @lru_cache(_KEPT)
 def _drawn(text: str) -> SystemFile:
     recipe = json.loads(text)
-    member = _draw(recipe)
+    seed, m, size = recipe["seed"], recipe.get("m"), recipe.get("size")
+    if recipe.get("chi"):
+        member = draw_with_chi(parse_chi(recipe["chi"]), seed, size or 1)
+    elif recipe.get("eigenvalues"):
+        member = draw_with_eigenvalues(FAMILY["eigenvalues"].make(recipe["eigenvalues"]), seed, size or 2)
+    elif m is None:
+        raise InputError("a random member of the family needs m, eigenvalues or chi")
+    elif recipe["draw"] == "generic":
+        member = draw_generic(m, seed, size or 1)
+    else:
+        member = draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
     if recipe.get("signs"):
         member = FamilyMember(member.A, member.H, FAMILY["signs"].make(recipe["signs"]))
     how = f", {recipe['draw']}" if recipe["draw"] != "eigenvalues" else ""
-    return SystemFile.from_member(member, f"random member{how}, m = {member.m}, seed {recipe['seed']}")
-
-
-def _draw(recipe: Mapping[str, Any]) -> FamilyMember:
-    seed, m, size = recipe["seed"], recipe.get("m"), recipe.get("size")
-    if recipe.get("chi"):
-        return draw_with_chi(parse_chi(recipe["chi"]), seed, size or 1)
-    if recipe.get("eigenvalues"):
-        return draw_with_eigenvalues(FAMILY["eigenvalues"].make(recipe["eigenvalues"]), seed, size or 2)
-    if m is None:
-        raise InputError("a random member of the family needs m, eigenvalues or chi")
-    if recipe["draw"] == "generic":
-        return draw_generic(m, seed, size or 1)
-    return draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
+    return SystemFile.from_member(member, f"random member{how}, m = {member.m}, seed {seed}")

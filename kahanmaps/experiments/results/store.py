@@ -337,17 +337,9 @@ class Store(Displayed):
         """What is executed in it is done completely or not at all."""
         if self._is_readonly:
             raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
-        with self._errors():
-            connection = self._opened()
+        with self._errors(), self._opened() as connection:  # which commits at the end, or rolls back
             connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-                connection.execute("COMMIT")
-            except BaseException:
-                if connection.in_transaction:  # after some errors SQLite has rolled back by itself
-                    with suppress(sqlite3.Error):
-                        connection.execute("ROLLBACK")
-                raise
+            yield
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
@@ -529,20 +521,14 @@ class Store(Displayed):
             for key, text in rows
         )
 
-    def count_pending(
-        self,
-        experiments: Sequence[str] | None = None,
-        *,
-        retry_failed: bool = False,
-        shard: tuple[int, int] = (1, 1),
-    ) -> int:
+    def count_pending(self, experiments: Sequence[str] | None = None, **options: Any) -> int:
         """How many jobs `pending` has with these arguments."""
-        sql, chosen = self._pending(experiments, retry_failed, shard)
+        sql, chosen = self._pending(experiments, **options)
         sql = sql.format("count(*)", "")
         return sum(self._fetch(sql, (one.id, 0, one.total, *values))[0][0] for one, *values in chosen)
 
     def _pending(
-        self, experiments: Sequence[str] | None, retry_failed: bool, shard: tuple[int, int]
+        self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
     ) -> tuple[str, list[tuple[Experiment, int, int, int]]]:
         """A query for the tasks without a result in a stretch of the plan, and its values for each experiment."""
         part, parts = shard
@@ -614,12 +600,11 @@ class Store(Displayed):
         Experiments that this one lacks come with their plans. Of two results of a task the one that is ok is kept, and
         this one's if both are or neither is. Of two experiments with one name the definitions must agree.
         """
-        results = replaced = conflicts = 0
+        new = results = replaced = conflicts = 0
         conflicting: list[str] = []
         with Store.open(other, readonly=True) as source, self._transaction():
             if source.path.samefile(self.path):
                 raise StoreError(f"{source.name} is this database itself: there is nothing to merge")
-            new = 0
             mine = dict(self._execute("SELECT name, digest FROM experiment").fetchall())
             for experiment in source.experiments():
                 if mine.get(experiment.name, defined := digest(experiment.definition)) != defined:
@@ -652,8 +637,8 @@ class Store(Displayed):
                         self._put_result(task, theirs, attempts + (own_attempts or 0))
                     elif theirs[0] == Outcome.OK and theirs[1:3] != own[1:3]:
                         conflicts += 1
-                        conflicting.append(key)
-        return Merged(new, results, replaced, conflicts, tuple(conflicting[:CONFLICTS_SHOWN]))
+                        conflicting += [key] if conflicts <= CONFLICTS_SHOWN else []
+        return Merged(new, results, replaced, conflicts, tuple(conflicting))
 
     # Looking
 

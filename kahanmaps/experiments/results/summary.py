@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.experiments.results.export import Entry, entries, is_number, known, names_of_entry, nearest, plain
+from kahanmaps.experiments.results.export import Entry, entries, is_number, known, names_of, nearest, plain
 from kahanmaps.experiments.results.records import KEPT, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
@@ -175,11 +175,11 @@ def summarise(
         measured = {} if stable or row.record is None else {name: getattr(row.record, name) for name in OF_THE_RUN}
         for entry, value in entries(row):
             seen.add(entry)
-            short, full = names_of_entry(entry)
+            short, full = names_of(entry)
             for name in (short, full):
                 if name in by:
                     keys.setdefault(name, value)  # the first to have a name keeps it
-            if entry.section == "result":
+            if entry[0] == "result":
                 has_results = True
                 measured[full if short in OF_THE_RUN else short] = value
         places = [_place(row, name, keys.get(name)) for name in by]
@@ -200,8 +200,8 @@ def summarise(
                 else:
                     group.numbers[name].append(nearest(value))
     if groups:  # nobody can tell a mistaken name in nothing
-        names = {*_WORDS, *(entry.name for entry in seen)}
-        for name in set(by) - {entry.full_name for entry in seen}:
+        names = {*_WORDS, *(names_of(entry)[0] for entry in seen)}
+        for name in set(by) - {names_of(entry)[1] for entry in seen}:
             _must_exist(name, names, "to group by" if has_results else "to group by (there is no result yet)")
         for name in values or ():
             _must_exist(name, numeric, "of numbers")
