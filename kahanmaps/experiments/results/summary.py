@@ -200,9 +200,11 @@ def summarise(
                 else:
                     group.numbers[name].append(nearest(value))
     if groups:  # nobody can tell a mistaken name in nothing
-        names = {*_WORDS, *(names_of(entry)[0] for entry in seen)}
-        for name in set(by) - {names_of(entry)[1] for entry in seen}:
-            _must_exist(name, names, "to group by" if has_results else "to group by (there is no result yet)")
+        short_names, full_names = ({names_of(entry)[k] for entry in seen} for k in (0, 1))
+        for name in by:
+            if name not in full_names:
+                what = "to group by" if has_results else "to group by (there is no result yet)"
+                _must_exist(name, short_names.union(_WORDS), what)
         for name in values or ():
             _must_exist(name, numeric, "of numbers")
     return Summary(by, tuple(groups[identity].group() for identity in sorted(groups)))
