@@ -19,22 +19,22 @@ _VALUE_WIDTH = 300
 
 def status_data(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
     """How far the experiments are, as plain data."""
-    found = store.status()
-    require_experiments(only, [one.name for one in found])
+    experiments = store.status()
+    require_experiments(only, [experiment.name for experiment in experiments])
     return {
         **envelope("batch status"),
         "experiments": [
             {
-                "name": one.name,
-                "tasks": one.tasks,
-                "missing": one.missing,
-                "outcomes": {str(outcome): count for outcome, count in one.outcomes.items() if count},
-                "verdicts": dict(one.verdicts),
-                "seconds": round(one.seconds, 3),
-                "skipped": [{"system": system, "reason": reason} for system, reason in one.skipped],
+                "name": experiment.name,
+                "tasks": experiment.tasks,
+                "missing": experiment.missing,
+                "outcomes": {str(outcome): count for outcome, count in experiment.outcomes.items()},
+                "verdicts": dict(experiment.verdicts),
+                "seconds": round(experiment.seconds, 3),
+                "skipped": [{"system": system, "reason": reason} for system, reason in experiment.skipped],
             }
-            for one in found
-            if not only or one.name in only
+            for experiment in experiments
+            if not only or experiment.name in only
         ],
         "unplanned": store.unplanned(),
     }

@@ -1,7 +1,7 @@
 """Results written out: JSON lines with all that is known, CSV and Parquet with one column for every entry.
 
 JSON lines lose nothing. A table has one cell for a value, so dicts become several columns (heights.max), lists JSON
-text, and neither None nor what is absent is told from an empty cell. Its columns, in this order:
+text, and None and what is absent are both empty cells. Its columns, in this order:
 
     experiment number key task      always
     document m seed parameters.a    the parts of the recipe of the system, those of a family by their own names
@@ -12,7 +12,7 @@ text, and neither None nor what is absent is told from an empty cell. Its column
     seconds peak_memory host finished   unless the export is to be stable
 
 A name belongs to the first of these that has it: the columns that are always there, options, the recipe, the result.
-Whoever comes later is called option.seed, family.seed (system.document) or result.seed, in all rows of the export.
+A later one is called option.seed, family.seed (system.document) or result.seed, in all rows of the export.
 
 A stable export leaves out what depends on where, when and how the work was done, so that two exports of the same work
 are the same bytes.
@@ -73,7 +73,7 @@ def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
 
 @lru_cache(10_000)  # thousands of rows have the same few entries
 def names_of(entry: Entry) -> tuple[str, str]:
-    """What an entry is called where nobody else has that name, and what otherwise.
+    """The name of an entry where no other has it, and its name otherwise.
 
     >>> names_of(("system", "family", "m")), names_of(("result", "heights", "max"))
     (('m', 'family.m'), ('heights.max', 'result.heights.max'))

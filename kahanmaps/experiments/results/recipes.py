@@ -37,7 +37,7 @@ _KEPT = 16  # systems that a child keeps: tasks that differ in eps only come one
 
 
 def document_text(file: SystemFile) -> str:
-    """What a system file says of its system, as canonical text; what the catalogue tells about it is left out."""
+    """What a system file says of its system, as canonical text; what the catalogue adds about it is left out."""
     return canonical({key: value for key, value in file.document.items() if key != "catalog"})
 
 

@@ -249,7 +249,7 @@ class Store(Displayed):
             raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
-            # Reading may have to write, to play back what a killed writer left. Where nobody may write, nobody does.
+            # Reading has to write where a killed writer left a journal. Where no process may write, none does.
             may_write = os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
             has_journal = any(Path(f"{self.path}{end}").exists() for end in ("-journal", "-wal"))
             mode = "rw" if may_write or has_journal else "ro&immutable=1"
@@ -262,7 +262,7 @@ class Store(Displayed):
             self._take_lock()
             self._execute(f"PRAGMA cache_size = -{_CACHE}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
-            if not self._is_made(create):  # under the lock once more: somebody else may have been making it
+            if not self._is_made(create):  # under the lock once more: another process may have been making it
                 with self._transaction():
                     for statement in SCHEMA.split(";"):  # executescript would commit
                         self._execute(statement)
@@ -431,8 +431,8 @@ class Store(Displayed):
 
         `definition` is what the tasks were made from: if it is the one planned before, `tasks` is not even begun, and
         only the limits are set. If it is another one, this plan replaces the old; results stay, planned or not.
-        `documents` (digest to text) is read after `tasks`, so whoever makes the tasks may fill it meanwhile. `skipped`
-        are systems that are left out, and why.
+        `documents` (digest to text) is read after `tasks`, so that making the tasks may fill it. `skipped` are systems
+        that are left out, and why.
         """
         with self._transaction():
             sql = "SELECT digest, total, tasks FROM experiment WHERE name = ?"

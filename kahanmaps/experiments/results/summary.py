@@ -199,7 +199,7 @@ def summarise(
                     group.flags[name][plain(value)] += 1
                 else:
                     group.numbers[name].append(nearest(value))
-    if groups:  # nobody can tell a mistaken name in nothing
+    if groups:  # without rows no name can be known as mistaken
         short_names, full_names = ({names_of(entry)[k] for entry in seen} for k in (0, 1))
         for name in by:
             if name not in full_names:
@@ -213,12 +213,12 @@ def summarise(
 def _place(row: Row, name: str, value: Any) -> tuple[Any, Any]:
     """What the row is sorted and recognized by, and its value, for a name to group by; `value` is that of an entry."""
     if name == "system":
-        word = system_words(row.task.system)
+        word: str | None = system_words(row.task.system)
         return (2, word, canonical(row.task.system)), word  # other files may have the same name
     if name not in _WORDS:
         return _order(value), value
-    found = (row.task.system or {}).get(name) if name == "document" else known(row)[name] or None
-    return ((3,) if found is None else (2, found)), found
+    word = (row.task.system or {}).get(name) if name == "document" else known(row)[name] or None
+    return ((3,) if word is None else (2, word)), word
 
 
 def _order(value: Any) -> tuple[Any, ...]:
