@@ -346,11 +346,10 @@ class Store(Displayed):
         try:
             yield
         except sqlite3.Error as error:
-            kind: type[KahanmapsError] = StoreError
             # Errors of Python's module have no code: text that is not UTF-8.
             code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
-            if code in _OF_THE_MACHINE:
-                kind = Unavailable
+            kind = Unavailable if code in _OF_THE_MACHINE else StoreError
+            if kind is Unavailable:
                 reason = (
                     f"cannot be read or written: {error}; what was stored before is safe, look after the disk, its "
                 )
@@ -726,7 +725,7 @@ def _row_of(record: Record) -> tuple[Any, ...]:
     """The record as values of `_COLUMNS`; what JSON cannot hold is a ValueError."""
     if not math.isfinite(record.seconds):
         raise ValueError(f"a record cannot have taken {record.seconds} seconds")
-    return (
+    return (  # not asdict, which copies results
         str(record.outcome),
         None if record.result is None else canonical(dict(record.result)),
         None if record.verdict is None else encodable(record.verdict),
