@@ -73,6 +73,7 @@ from kahanmaps.experiments.results.export import write_csv as write_csv
 from kahanmaps.experiments.results.export import write_jsonl as write_jsonl
 from kahanmaps.experiments.results.export import write_parquet as write_parquet
 from kahanmaps.experiments.results.records import KEPT as KEPT
+from kahanmaps.experiments.results.records import VERDICTS as VERDICTS
 from kahanmaps.experiments.results.records import Executor as Executor
 from kahanmaps.experiments.results.records import Job as Job
 from kahanmaps.experiments.results.records import Record as Record
@@ -81,7 +82,6 @@ from kahanmaps.experiments.results.records import system_words as system_words
 from kahanmaps.experiments.results.store import Found as Found
 from kahanmaps.experiments.results.store import Planned as Planned
 from kahanmaps.experiments.results.store import Store as Store
-from kahanmaps.experiments.results.summary import VERDICTS as VERDICTS
 from kahanmaps.experiments.results.summary import summarise as summarise
 from kahanmaps.experiments.running.children import TRIES as TRIES
 from kahanmaps.experiments.running.run import Batch as Batch

@@ -140,6 +140,7 @@ class Outcome(StrEnum):
     LOST = "lost"
 
 
+VERDICTS = ("proved", "supported", "refuted", "undecided")  # of checks; tasks of one's own may have others
 KEPT = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
 
 

@@ -19,11 +19,10 @@ from typing import Any, NamedTuple
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.export import Entry, entries, is_number, known, names_of, nearest, plain
-from kahanmaps.experiments.results.records import KEPT, Row, canonical, system_words
+from kahanmaps.experiments.results.records import KEPT, VERDICTS, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
 _SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # in tables, and their headings
-VERDICTS = ("proved", "supported", "refuted", "undecided")
 OF_THE_RUN = ("seconds", "peak_memory")
 
 # Names whose values are words, also when they look like numbers: an experiment may be called 007, a digest be 12e34567.
