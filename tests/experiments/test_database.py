@@ -14,17 +14,10 @@ from pathlib import Path
 import pytest
 from small_databases import LIMITS, ok, planned, seed, seeds, small_chunks, start, tasks
 
-from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.experiments.results import store as store_module
 from kahanmaps.experiments.results.store import Store, StoreError, Unavailable
 
 # Files that cannot be used
-
-
-def test_a_wrong_file_is_an_error_of_input_and_a_full_disk_is_not():
-    assert issubclass(StoreError, InputError)
-    assert not issubclass(Unavailable, InputError)
-    assert issubclass(Unavailable, (KahanmapsError, OSError))
 
 
 def test_a_missing_file_is_not_made_unless_asked_for(path):

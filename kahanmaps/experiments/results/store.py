@@ -9,7 +9,8 @@ Three rules keep it whole:
 * what is reported as stored is stored: each method that writes is one transaction, and a kill at any moment leaves the
   state before it or after it;
 * one writer: opening for writing takes a lock that the operating system frees when the process ends, however it ends;
-* no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out.
+* no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out;
+  only counts are one query, which takes a second for a million tasks.
 
 SQLite's rollback journal is used, never WAL: it is sound on every file system, those of networks among them.
 """
