@@ -1,11 +1,9 @@
 """Systems and their Kahan maps as files for other programs.
 
-formulas      what there is to write: right-hand sides, the equation of the map, integrals, a density, the closed form
-language      a language as a table, with its names; the tables are the files of `tables/`
-writer        the file, from formulas and a table
-latex         the document in LaTeX
-convert       all of it as one function
+formulas        what there is to write: right-hand sides, the equation of the map, integrals, a density, the closed form
+convert         all of it as one function, and the files of all languages but LaTeX
+languages.toml  how these languages write functions and linear equations; expressions are written by SymPy's printers
+latex           the document in LaTeX
 
-A further language is a table, an entry in `language.LANGUAGES` and one in the list of the command. Its tests need the
-program itself, or files that somebody who knows the language has read.
+A further language is a table in languages.toml and an entry in the lists of `convert` and of its command.
 """

@@ -1,19 +1,38 @@
-"""One function for all languages: a system, its Kahan map, integrals and density as a file for another program."""
+"""A system, its Kahan map, integrals and density as a file for another program.
+
+Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; what stands around
+them is in languages.toml. Exact numbers stay exact in all languages but C, Fortran and NumPy, whose numbers are floats.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+import textwrap
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib.resources import files
+from string import Template
+from typing import Any
 
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.written.numerals import is_name
+from kahanmaps.algebra.written.reading import Notation, terms_of
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas
-from kahanmaps.languages.language import LANGUAGES as TABLES
-from kahanmaps.languages.language import Language
 from kahanmaps.languages.latex import write_latex
-from kahanmaps.languages.writer import PARTS, write
 
-LANGUAGES = ("latex", *TABLES)
+LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
+PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
+
+_LINE = 100  # characters of a line of an expression, after which it is broken
+_TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recurse
+_MAX_INTEGER = 2**31  # of the integers of C and Fortran
+# Names that mean nothing else in any of the languages: a small letter with digits (but not i, which may be the
+# imaginary unit, and e), and words with an underscore (but those of GP's debugger). All other words may be functions.
+_FREE = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
 
 
 def convert(
@@ -43,13 +62,14 @@ def convert(
 
     Raises:
         InputError: for an unknown language or part, a name that is none, integrals or a density where none is known,
-            and a closed form ("map-formulas") that is too large.
+            a closed form ("map-formulas") that is too large, and where SymPy is needed and missing.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(convert(load("harmonic"), "pari", ["system"]).split("\\n\\n")[1].strip())
     \\\\ x' = f(x)
     {vector_field(point) =
-      my(x = point[1], y = point[2]);
+      my(x = point[1]);
+      my(y = point[2]);
       [y, -x]~
     }
     """
@@ -61,7 +81,7 @@ def convert(
     parts = _parts(what, formulas)
     if language == "latex":
         return write_latex(formulas, parts, command)
-    return write(Language.load(language), formulas, parts, name, command)
+    return _Writer(language, formulas, name).text(parts, command)
 
 
 def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
@@ -71,16 +91,272 @@ def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
         return [*first, *(part for part in ("integrals", "density") if part not in formulas.missing)]
     if isinstance(what, str):
         raise InputError(f"found the text {what[:40]!r}, expected a list of parts such as ['system', 'map']")
-    asked = list(what)
-    for part in asked:
+    requested = list(what)
+    for part in requested:
         if part not in PARTS:
             raise InputError(f"found the part {str(part)[:40]!r}, expected one of {', '.join(PARTS)}")
-    if not asked:
+    if not requested:
         raise InputError(f"found no part, expected some of {', '.join(PARTS)}")
-    if not formulas.rhs and (fields := [part for part in ("system", "jacobian") if part in asked]):
+    if not formulas.rhs and (fields := [part for part in ("system", "jacobian") if part in requested]):
         expected = "map, map-formulas, inverse, integrals or density"
         raise InputError(f"found the part {fields[0]} of {formulas.map.kind}, expected {expected}")
     for part in formulas.missing:
-        if part in asked:
+        if part in requested:
             raise InputError(formulas.missing[part])
-    return [part for part in PARTS if part in asked]
+    return [part for part in PARTS if part in requested]
+
+
+class _Writer:
+    """One file: names are chosen first, then functions are written in the order of their needs."""
+
+    def __init__(self, language: str, formulas: Formulas, prefix: str) -> None:
+        tables = tomllib.loads(files(__package__).joinpath("languages.toml").read_text("utf-8"))
+        self.language: dict[str, Any] = tables["defaults"] | tables[language]
+        self.formulas = formulas
+        self.polynomial = _polynomial_writer(self.language)
+        self.written: dict[str, str] = {}  # name in the language -> text
+        self.used = {"point", "image", "eps", "value"}  # names, in small letters: Fortran does not tell them apart
+        self.prefix = [prefix] if prefix else []
+        kind = "kahan" if formulas.rhs else "map"
+        called = {f"kahan_{what}": f"{kind}_{what}" for what in ("matrix", "vector", "inverse", "jacobian")}
+        called |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
+        called |= {"kahan_map_formula": called["kahan_map"] + "_formula"}
+        called |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
+        # Of functions: what they are -> how they are called.
+        self.names = {key: self._fresh_name(*self.prefix, name) for key, name in called.items()}
+        for key in (*formulas.integrals, *formulas.forms):
+            self.names[f"integral {key}"] = self._fresh_name(*self.prefix, "integral", key)
+        self.words = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
+        self.words |= {key: self._fresh_name(*self.prefix, "kahan", key) for key in ("solve", "module")}
+        self.words |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
+        # Every variable and symbol with its name here: itself where it means nothing else, always different ones.
+        names = (*formulas.names, *formulas.new)
+        free = {name for name in names if _FREE.fullmatch(name) and (self.language["underscores"] or "_" not in name)}
+        self.safe = {name: self._fresh_name(name) for name in names if name in free}
+        self.safe |= {name: self._fresh_name("v", name) for name in names if name not in free} | {"eps": "eps"}
+        self.eps = ["eps"] if formulas.map.has_eps else []
+        self.symbols = [self.safe[name] for name in formulas.symbols]
+
+    def _fresh_name(self, *words: str) -> str:
+        """A name of these words that is not in use, with a number behind it where it has to be, and in use from now."""
+        number = 1
+        while True:
+            numbered = [*words, str(number)] if number > 1 else words
+            pieces = [piece for word in numbered for piece in re.split(r"[^A-Za-z0-9]+", word) if piece]
+            if self.language["underscores"]:
+                name = "_".join(pieces)
+            else:  # a small letter first: Sin and Integral would make a name of Mathematica
+                name = pieces[0][0].lower() + pieces[0][1:] + "".join(p[0].upper() + p[1:] for p in pieces[1:])
+            if name.lower() not in self.used:
+                self.used.add(name.lower())
+                return name
+            number += 1
+
+    def text(self, parts: Sequence[str], command: str) -> str:
+        """The whole file."""
+        for part in parts:
+            self._write_part(part)
+        language, formulas = self.language, self.formulas
+        lines = formulas.header(command)
+        renamed = [f"{name} is called {used}" for name in formulas.names if (used := self.safe[name]) != name]
+        if renamed:
+            lines.append(f"Names that {language['title']} cannot use or reads otherwise: {', '.join(renamed)}")
+        if self.names["kahan_map"] in self.written:
+            values = [str(k) for k in range(1, formulas.dim + 1)]
+            more = "".join(f", {value}" for value in [*[language["tenth"]] * len(self.eps), *self.symbols])
+            shown = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
+            lines.append(f"For example: {self._fill('usage', values=shown, more=more)}")
+        needs_solver = any(self.words["solve"] in text for text in self.written.values())
+        pieces = [
+            "\n".join(map(self._comment, lines)),
+            self._fill("head", functions=", ".join(self.written)),
+            self._fill("solver") if needs_solver else "",
+            *self.written.values(),
+            self._fill("tail"),
+        ]
+        return "\n\n".join(filter(None, pieces)) + "\n"
+
+    def _write_part(self, part: str) -> None:
+        """Write the functions of a part, and those that they call; one that is there already is written again."""
+        formulas, is_kahan = self.formulas, bool(self.formulas.rhs)
+        point = {"point": formulas.variables}
+        if part == "system":
+            self._function("vector_field", "x' = f(x)", "vector", self._vector(formulas.rhs), point, eps=False)
+        elif part == "map":
+            words = ["M", "r", "The map x -> x~, where M x~ = r"]
+            if is_kahan:
+                words = ["M = I - eps f'(x)", "r = M x + 2 eps f(x)"]
+                words.append("The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r")
+            rows = [self._listed("row", list(map(self._expression, row[:-1]))) for row in formulas.equation]
+            matrix = self._listed("matrix", rows, self.language["between_rows"])
+            self._function("kahan_matrix", words[0], "matrix", matrix, point)
+            right = self._vector([row[-1] for row in formulas.equation])
+            self._function("kahan_vector", words[1], "vector", right, point)
+            self._function("kahan_map", words[2], "vector", self._solved("solve", self._call("kahan_vector", "point")))
+        elif part == "inverse" and not is_kahan:
+            inverse = self._vector(formulas.inverse_form())
+            self._function("kahan_inverse", "The inverse of the map", "vector", inverse, point)
+        elif part == "inverse":
+            self._write_part("map")
+            inverse = self._call("kahan_map", "point", "-eps")
+            self._function("kahan_inverse", "Its inverse, which is the map with -eps", "vector", inverse)
+        elif part == "jacobian":
+            self._write_part("map")
+            right = self._call("kahan_matrix", self._call("kahan_map", "point"), "-eps")
+            words_ = "Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))"
+            solve = "solve_matrix" if self.language["solve_matrix"] else "solve"
+            self._function("kahan_jacobian", words_, "matrix", self._solved(solve, right))
+        elif part == "map-formulas":
+            what, of = "Kahan map" if is_kahan else "map", "x and eps" if self.eps else "x"
+            components = self._vector(formulas.closed_form())
+            self._function(
+                "kahan_map_formula", f"The {what} as rational functions of {of}", "vector", components, point
+            )
+        elif part == "density" and formulas.density is not None:
+            words_ = "phi; the file says that dx/phi is invariant under the map"
+            self._function("density", words_, "number", self._expression(formulas.density), point)
+        elif part == "density":
+            self._write_part("map")
+            words_ = "dx/phi is invariant under the map, by a theorem: phi = det(I - eps f'(x))"
+            self._function("density", words_, "number", self._solved("det"))
+        elif part == "integrals":
+            for name, function in formulas.integrals.items():
+                words_ = f"{name}: the file says that it is an integral of the map"
+                self._function(f"integral {name}", words_, "number", self._expression(function), point)
+            for key, words_, function in formulas.integrals_by_theorem():
+                self._write_part("map")
+                self.names[f"{key} of two points"] = self._fresh_name(self.names[key], "of")
+                value = self._expression(function)
+                self._function(f"{key} of two points", words_, "number", value, point | {"image": formulas.new})
+                value = self._call(f"{key} of two points", "point", self._call("kahan_map", "point"), "eps")
+                self._function(key, "An integral of the map, by a theorem", "number", value)
+
+    def _function(
+        self,
+        key: str,
+        words: str,
+        kind: str,
+        value: str,
+        points: Mapping[str, Sequence[str]] | None = None,
+        eps: bool = True,
+    ) -> None:
+        """Write a function; `points` are its points and what their coordinates are called in the body.
+
+        Without them it has one point, which is used as a whole.
+        """
+        numbers = [*(self.eps if eps else []), *self.symbols]
+        local = {point: [self.safe[name] for name in names] for point, names in (points or {"point": ()}).items()}
+        arguments = [self._fill("point", name=point) for point in local]
+        arguments += [self._fill("number" if name == "eps" else "symbol", name=name) for name in numbers]
+        lines = [
+            self._fill("take", name=name, point=point, number=str(k + 1), index=str(k))
+            for point, names in local.items()
+            for k, name in enumerate(names)
+        ]
+        if lines and self.language["exact"]:
+            lines += [self._fill("exact", name=name) for name in numbers]
+        names = [name for every in local.values() for name in every]
+        indent = re.split(r"\$\{?lines", self.language["function"])[0].rpartition("\n")[2]
+        text = self._fill(
+            "function",
+            name=self.names[key],
+            kind=self._fill(f"{kind}_kind"),
+            arguments=", ".join(arguments),
+            declared=", ".join([*(f"{point}({self.formulas.dim})" for point in local), *numbers]),
+            local=self._fill("local", names=", ".join(names)) if names else "",
+            lines="".join(f"{line}\n{indent}" for line in lines),
+            value=value,
+        ).lstrip("\n")
+        if self.language["continued"]:  # lines of Fortran have 132 characters
+            joined = text.replace("\n        ", " ").splitlines()
+            wrapped = [textwrap.wrap(line, 110, break_long_words=False) for line in joined]
+            text = "\n".join(f"{self.language['continued']}\n        ".join(line) for line in wrapped)
+        self.written[self.names[key]] = f"{self._comment(words)}\n{text}"
+
+    def _expression(self, function: RationalFunction | fmpq_mpoly) -> str:
+        """A polynomial or a quotient of two as an expression, exactly, on several lines where it is long."""
+        sides = [function]
+        if isinstance(function, RationalFunction):
+            sides = [function.numerator] if function.is_polynomial else [function.numerator, function.denominator]
+        texts = []
+        for side in sides:
+            terms = list(terms_of(side))
+            groups = [dict(terms[k : k + _TERMS_TOGETHER]) for k in range(0, len(terms), _TERMS_TOGETHER)] or [{}]
+            sums = [self.polynomial(side.context().from_dict(group), self.safe) for group in groups]
+            texts.append(sums[0] if len(sums) == 1 else " + ".join(f"({text})" for text in sums))
+        whole = texts[0] if len(texts) == 1 else f"({texts[0]})/({texts[1]})"
+        lines = [""]  # each but the last ends with + or -: in no language that is a whole statement
+        for piece in re.split(r"(?<= [+-] )", whole):
+            if lines[-1] and len(lines[-1]) + len(piece) > _LINE:
+                lines.append("")
+            lines[-1] += piece
+        broken = "\n        ".join(line.rstrip() for line in lines)
+        return f"({broken})" if len(lines) > 1 else broken
+
+    def _vector(self, entries: Iterable[RationalFunction | fmpq_mpoly]) -> str:
+        return self._listed("vector", list(map(self._expression, entries)))
+
+    def _listed(self, kind: str, entries: Sequence[str], between: str = ",") -> str:
+        """Entries in the brackets of a vector, a row or a matrix, on one line where there is room."""
+        has_room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= _LINE
+        before, after = (Template(bracket).substitute(self.words) for bracket in self.language[kind])
+        return before + (between + (" " if has_room else "\n        ")).join(entries) + after
+
+    def _call(self, key: str, point: str, *arguments: str) -> str:
+        return self._fill(
+            "call", name=self.names[key], arguments=", ".join([point, *(arguments or self.eps), *self.symbols])
+        )
+
+    def _solved(self, template: str, right: str = "") -> str:
+        return self._fill(template, M=self._call("kahan_matrix", "point"), right=right)
+
+    def _fill(self, template: str, **more: str) -> str:
+        return Template(self.language[template]).substitute(self.words | more)
+
+    def _comment(self, line: str) -> str:
+        # A backslash at its end would continue the comment of C and Maple, the brackets are those of Mathematica.
+        safe = re.sub(r"\\$", "/", line.replace("(*", "( *").replace("*)", "* )"))
+        before, after = self.language["comment"]
+        return f"{before}{safe}{after}".rstrip()
+
+
+def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Mapping[str, str]], str]:
+    """The function that writes a polynomial, given the names of the language for those of its ring.
+
+    Raises InputError where SymPy is needed and not installed.
+    """
+    if not language["printer"]:  # PARI
+        return lambda polynomial, safe: Notation(
+            safe.__getitem__, str, "{}^{}".format, ("-", " + ", " - "), gap="", eps_first=False
+        ).polynomial(polynomial)
+    try:
+        import sympy
+        from sympy.printing.str import StrPrinter
+    except ImportError as error:
+        raise InputError(
+            f"{language['title']} is written by SymPy ({error}): pip install 'kahanmaps[sympy]'"
+        ) from error
+
+    class ExactPrinter(StrPrinter):  # type: ignore[misc]
+        def _print_Rational(self, value: Any) -> str:  # 1/2 would be a float of Python
+            return f"Rational({value.p}, {value.q})"
+
+    is_fortran = language["printer"] == "fcode"
+    settings = {"source_format": "free", "standard": 95} if is_fortran else {}
+    code = ExactPrinter().doprint if language["printer"] == "ExactPrinter" else getattr(sympy, language["printer"])
+
+    def write(polynomial: fmpq_mpoly, safe: Mapping[str, str]) -> str:
+        symbols = [sympy.Symbol(safe[name]) for name in names_of(polynomial)]
+        terms = []
+        for powers, value in terms_of(polynomial):
+            coefficient = sympy.Rational(int(value.p), int(value.q))
+            if language["floats"] and max(abs(value.p), value.q) >= _MAX_INTEGER:
+                coefficient = sympy.Float(coefficient, 17)
+            terms.append(sympy.Mul(coefficient, *map(sympy.Pow, symbols, powers)))
+        try:
+            text = str(code(sympy.Add(*terms), **settings))
+        except ValueError as error:  # Python makes no text of more than 4300 digits
+            raise InputError(f"found a number that is too long for SymPy: {error}") from error
+        return re.sub(r"&\n\s*", "", text)  # long lines of Fortran are broken where all are
+
+    return write

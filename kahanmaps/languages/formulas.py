@@ -6,7 +6,9 @@ symbols and, where it may occur, eps.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,13 +16,16 @@ from flint import fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import AlgebraicMap
+from kahanmaps.maps.convention import eps_share
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
+from kahanmaps.sources import SOURCES
+from kahanmaps.version import __version__
 
 # The closed form of the map, all components together, before common factors are removed.
 MAX_TERMS = 4_000
@@ -117,23 +122,29 @@ class Formulas:
         J = member.chosen.hamiltonian.J
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
 
-    def of_two_points(self, form: fmpq_mat | None = None) -> RationalFunction:
-        """An integral in x and x~, variables `new`: x^T M x~/eps with a matrix M, else H(x) + grad H(x)^T (x~ - x)/3.
+    def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
+        """Integrals of a Hamiltonian system in x and x~: name, formula in words, function.
 
-        In the variables, those of x~, the symbols and eps.
+        x^T M x~/eps with the matrices of a member, else H(x) + grad H(x)^T (x~ - x)/3; in the variables, those of x~
+        (`new`), the symbols and eps.
         """
+        if self.H is None:
+            return
         n = self.dim
         context = ring((*self.variables, *self.new, *self.symbols, "eps"))
         generators = context.gens()
-        x, y, eps, one = generators[:n], generators[n : 2 * n], generators[-1], context.constant(1)
-        if form is not None:
+        x, y, eps = generators[:n], generators[n : 2 * n], generators[-1]
+        for k, (name, form) in enumerate(self.forms.items()):
+            words = "J" if k == 0 else "J A^T" if k == 1 else f"J (A^T)^{k}"
             terms = (x[i] * entry * y[j] for i, row in enumerate(form.tolist()) for j, entry in enumerate(row))
-            return RationalFunction(sum(terms, context.constant(0)), eps)
-        assert self.H is not None
-        images = (*x, *generators[2 * n : -1])
-        slopes = [self.H.derivative(k).compose(*images, ctx=context) for k in range(n)]
-        change = sum((slope * (b - a) for slope, a, b in zip(slopes, x, y, strict=True)), context.constant(0))
-        return RationalFunction(self.H.compose(*images, ctx=context) + change / 3, one)
+            function = RationalFunction(sum(terms, context.constant(0)), eps)
+            yield f"integral {name}", f"x^T M x~/eps with M = {words}", function
+        if not self.forms:
+            images = (*x, *generators[2 * n : -1])
+            slopes = [self.H.derivative(k).compose(*images, ctx=context) for k in range(n)]
+            change = sum((slope * (b - a) for slope, a, b in zip(slopes, x, y, strict=True)), context.constant(0))
+            function = RationalFunction(self.H.compose(*images, ctx=context) + change / 3, context.constant(1))
+            yield "modified_hamiltonian", "H + grad H . (x~ - x)/3, where f = J grad H", function
 
     @cached_property
     def missing(self) -> dict[str, str]:
@@ -189,6 +200,44 @@ class Formulas:
         if total > MAX_TERMS:
             raise _too_large(f"{total} terms, expected at most {MAX_TERMS}")
         return found
+
+    def header(self, command: str, width: int = 100) -> list[str]:
+        """What the comment on top says, line by line: the system, eps, parameters, sources, and what made it."""
+        file = self.file
+        title = file.catalog.get("title", "")
+        lines = [f"{file.name}: {title}" if title else file.name]
+        if not self.rhs:
+            rows = str(self.map).split("\n")[:12]
+            lines += [f"  {line if len(line) <= width else line[: width - 4] + ' ...'}" for line in rows]
+        elif len(self.rhs) <= 12:
+            texts = [format_polynomial(polynomial) for polynomial in self.rhs]
+            lines += [
+                f"  {name}' = {text if len(text) <= width else text[: width - 4] + ' ...'}"
+                for name, text in zip(self.variables, texts, strict=True)
+            ]
+        if share := eps_share(self.map):
+            lines.append(f"{share}: the time step is {2 * self.map.time_steps} eps.")
+        numbers = [f"{name} = {value}" for name, value in file.parameters.items() if name not in self.symbols]
+        if numbers:
+            lines.append(f"Parameters: {', '.join(numbers)}")
+        if self.symbols:
+            lines.append(f"Parameters left as symbols: {', '.join(self.symbols)}")
+        if (root := file.map.root) is not None:
+            lines.append(
+                f"where {self.symbols[0]} is a {root}{root.decimal}: give that number, or any of its conjugates."
+            )
+        convention = file.catalog.get("convention")
+        lines += [f"Convention of the source: {convention}"] if convention else []
+        lines += [f"Source: {SOURCES[key]}" for key in file.catalog.get("sources", ())]
+        made = f"Written by kahanmaps {__version__}" + (f": {command}" if command else "")
+        lines.append(made)
+        wrapped: list[str] = []
+        for line in lines:
+            shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+            keep = line is made or line.startswith("  ")  # a command is to be copied as a whole
+            wrapped += [shown] if keep else textwrap.wrap(shown, width, subsequent_indent="  ", break_long_words=False)
+        # Python takes "coding: x" in one of the first two lines of a file for the name of its encoding.
+        return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(wrapped)]
 
 
 def _too_large(found: str) -> InputError:

@@ -6,6 +6,7 @@ import pytest
 from language_helpers import questions, systems
 
 import kahanmaps as km
+from kahanmaps.display.latex import latex_name
 from kahanmaps.languages.convert import convert
 
 SYSTEMS = systems()
@@ -68,8 +69,6 @@ def test_a_mistake_would_be_noticed(right, wrong):
 def test_the_lines_of_a_right_hand_side_together_are_all_of_it(name):
     whole = re.sub(r" \\\\\n&\\quad", "", DOCUMENTS[name])
     for variable, polynomial in zip(SYSTEMS[name].variables, SYSTEMS[name].system.rhs, strict=True):
-        from kahanmaps.display.latex import latex_name
-
         assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in whole
 
 
