@@ -1,12 +1,11 @@
 """What a notebook asks a value for, and JSON a formula: how it looks. The answers are in kahanmaps.display.
 
 That folder knows all values and stands above them, so that no value knows HTML or LaTeX. It is imported when somebody
-looks, and so is the font of formulas: hence by their names, the one file where imports point up.
+looks, by its name: this is the one file where imports point up.
 """
 
 from __future__ import annotations
 
-import builtins
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from importlib import import_module
@@ -22,8 +21,7 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         _load(self)
-        html = html_form(self)
-        return _font() + html if "<math" in html else html
+        return html_form(self)
 
 
 class WithoutTruthValue:
@@ -114,16 +112,6 @@ def text_form(value: object) -> str:
 def latex_form(value: object) -> str:
     """The value as LaTeX: the files of kahanmaps.display register what they know."""
     raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as a formula")
-
-
-def _font() -> str:
-    """The font of formulas, where it is a notebook that shows one, and it has not got the font yet."""
-    shell: Any = getattr(builtins, "get_ipython", lambda: None)()
-    if not hasattr(shell, "kernel") or hasattr(shell, "kahanmaps_font"):
-        return ""
-    shell.kahanmaps_font = True
-    style = import_module("kahanmaps.reports.stylesheet")
-    return f"<style>{style.font_face()} .formula {style.FORMULAS}</style>"
 
 
 def _load(value: object) -> None:

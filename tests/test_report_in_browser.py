@@ -13,7 +13,8 @@ import pytest
 
 import kahanmaps as km
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.display.mathml import formula
+from kahanmaps.display.latex import latex_rational_function
+from kahanmaps.reports.page import mathml
 from kahanmaps.reports.report import report_html
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -126,7 +127,8 @@ def test_the_page_is_the_same_without_scripts(tmp_path, html):
 @pytest.mark.slow
 def test_formulas_are_laid_out(tmp_path):
     """A fraction is higher than a line of text, and narrower than its parts one after the other."""
-    fraction = formula(parse_rational_function("123456789*x/(987654321 + x)", ["x"]))
+    latex = latex_rational_function(parse_rational_function("123456789*x/(987654321 + x)", ["x"]))
+    fraction = mathml(rf"\displaystyle {latex}")
     script = (
         "const [a, b] = ['math', '#t'].map(which => document.querySelector(which).getBoundingClientRect());"
         "document.title = JSON.stringify([a.width, a.height, b.width, b.height]);"

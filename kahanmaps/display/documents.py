@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
-from kahanmaps.display.mathml import formula, matrix
+from kahanmaps.display.formulas import formula, matrix
 from kahanmaps.display.systems import CHARACTERS, map_html
 from kahanmaps.displayed import html_form
 from kahanmaps.documents.files import SystemFile

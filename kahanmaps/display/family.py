@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
-from kahanmaps.display.mathml import formula, matrix
+from kahanmaps.display.formulas import formula, matrix
 from kahanmaps.display.systems import CHARACTERS, equations_html
 from kahanmaps.displayed import html_form
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
+from kahanmaps.display.formulas import equations
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
-from kahanmaps.display.mathml import equations
 from kahanmaps.displayed import latex_form
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan

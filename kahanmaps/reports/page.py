@@ -1,117 +1,177 @@
 """A page: a title, what it is about, sections with ids that stay the same, and how to make it again.
 
-The page is one file. It asks nothing of a network, it has no JavaScript (but explore_page.py), and the same input gives
-the same bytes.
+The page is one file, made by page.html, a template of Jinja2. It asks nothing of a network, it has no JavaScript (but
+that of explore.py), and the same input gives the same bytes. What is text here is escaped by the template; `Html` is
+HTML already. Formulas come as LaTeX and become MathML, which browsers show by themselves.
 """
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
 from hashlib import sha256
+from html import unescape
+from importlib import resources
+from typing import Any
+from xml.etree import ElementTree
 
+from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display import markup
-from kahanmaps.display.checks import Room
-from kahanmaps.plots.recipe import Recipe
-from kahanmaps.reports.pictures import Pictures
-from kahanmaps.reports.stylesheet import font_face, stylesheet
+from kahanmaps.display.formulas import formula
+from kahanmaps.display.systems import equations_html
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, printable
+from kahanmaps.version import __version__
 
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
-ROOM = Room(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
 _LONGEST_SYSTEM = 200_000
+_MAX_EQUATIONS = 40
+# Commands of text, for names with such characters, which latex2mathml would print as they stand.
+_TEXT_COMMANDS = {
+    r"\textbackslash{}": r"\backslash ",
+    r"\textasciicircum{}": r"\wedge ",
+    r"\textasciitilde{}": r"\sim ",
+}
+
+
+class Html(str):
+    """Text that is HTML already: the template does not escape it."""
+
+    __slots__ = ()
+
+    def __html__(self) -> str:
+        return self
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: its id, to be linked to, its title as text, and its HTML."""
+    """A part of a page: its id, to be linked to, its title, and what stands in it; left out where that is nothing."""
 
     id: str
     title: str
-    html: str
+    conclusion: tuple[str, str] | None = None  # in large letters: a word, a sentence
+    paragraphs: Sequence[str] = ()
+    items: Sequence[str] = ()  # of a list
+    statements: Sequence[tuple[str, str]] = ()  # a word and what it says
+    pieces: Sequence[str] = ()
+    folded: Sequence[tuple[str, str]] = ()  # what is unfolded by a click, and what is seen then
+    claims: Sequence[Mapping[str, Any]] = ()
+    explore: Mapping[str, Any] | None = None  # the orbit that moves, of explore.py
+
+    def __bool__(self) -> bool:
+        return any(getattr(self, field.name) for field in fields(self)[2:])
 
 
 def page(
     title: str,
     lead: str,
     sections: Sequence[Section],
-    pictures: Pictures,
-    recipe: Recipe,
+    *,
+    command: str = "",
     seed: int | None = None,
+    file: SystemFile | None = None,
     script: str = "",
 ) -> str:
-    """The whole page. `title` is text, `lead` is HTML; sections that are empty are left out.
+    """The whole page; sections that are empty are left out. `script` is the one program that browsers may run.
 
-    `recipe` and `seed` (None where nothing is drawn at random) say how it was made. Its policy lets browsers load
-    nothing and run no script but `script`, which it names by its hash.
+    `command`, `seed` (None where nothing is drawn at random) and `file` say how it was made.
     """
-    digest = b64encode(sha256(script.encode()).digest()).decode()
-    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; font-src data:; base-uri 'none'"
-    policy += f"; form-action 'none'; script-src '{f'sha256-{digest}' if script else 'none'}'"
-    program = f"<script>{script}</script>\n" if script else ""
-    note = Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else "")
-    present = [section for section in (*sections, note, _remake(recipe, seed)) if section.html]
-    links = "".join(f'<li><a href="#{one.id}">{markup.escape(one.title)}</a></li>' for one in present)
-    body = "\n".join(
-        f'<section aria-labelledby="{one.id}">\n<h2 id="{one.id}">{markup.escape(one.title)}</h2>\n'
-        f"{one.html}\n</section>"
-        for one in present
+    remake = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
+    remake += [("version", f"kahanmaps {__version__}")]
+    remake += [("seed", str(seed))] if seed is not None else []
+    html = page_template().render(
+        title=title,
+        lead=lead,
+        sections=[section for section in sections if section],
+        remake=remake,
+        system_file="" if file is None else Html(markup.escape(markup.shortened(file.to_toml(), _LONGEST_SYSTEM))),
+        script=Html(script),
+        script_hash=f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}" if script else "",
+        version=__version__,
+        font=Html(font_face()),
     )
-    font = font_face() if "<math" in lead + body else ""
-    name = markup.escape(title)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8"/>
-<meta http-equiv="Content-Security-Policy" content="{policy}"/>
-<meta name="viewport" content="width=device-width, initial-scale=1"/>
-<meta name="generator" content="kahanmaps {recipe.version}"/>
-<link rel="icon" href="data:,"/>
-<title>{name}</title>
-<style>{font}{stylesheet()}</style>
-</head>
-<body>
-<header>
-<h1>{name}</h1>
-<p class="lead">{lead}</p>
-</header>
-<nav aria-label="Sections"><ul>{links}</ul></nav>
-<main>
-{body}
-</main>
-{program}</body>
-</html>
-"""
+
+    def with_mathml(span: re.Match[str]) -> str:
+        return re.sub(r"\\\((.*?)\\\)", lambda piece: mathml(unescape(piece[1])), span[0])
+
+    return re.sub(r'<span class="formula">.*?</span>', with_mathml, html)
 
 
-def wide(table: str) -> str:
-    """A table that is scrolled by itself where the page is too narrow for it."""
-    return f'<div class="wide">{table}</div>'
+@cache
+def font_face() -> str:
+    """The font of formulas as a rule of a stylesheet, which nothing has to be fetched for.
+
+    Without a font that has a table for mathematics, browsers do not know where exponents and primes belong.
+    """
+    font = resources.files("kahanmaps.reports") / "fonts" / "kahanmaps-math.woff"
+    code = b64encode(font.read_bytes()).decode("ascii")
+    return f'@font-face {{ font-family: "kahanmaps math"; src: url(data:font/woff;base64,{code}) format("woff"); }}'
 
 
-def text(words: object) -> str:
+@cache
+def page_template() -> Any:
+    """The template of all pages. Raises InputError where the extra [report] is not installed."""
+    try:
+        import latex2mathml.converter  # noqa: F401 (whether it is there)
+        from jinja2 import Environment
+    except ImportError as error:
+        needed = "a report needs Jinja2 and latex2mathml"
+        raise InputError(f"{needed} ({error}): pip install 'kahanmaps[report]'") from error
+
+    def shown(value: Any) -> Any:
+        return value if hasattr(value, "__html__") else printable(markup.shortened(value, CHARACTERS))
+
+    environment = Environment(autoescape=True, finalize=shown, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string((resources.files("kahanmaps.reports") / "page.html").read_text(encoding="utf-8"))
+
+
+@cache
+def mathml(latex: str) -> str:
+    r"""A formula as MathML, with its LaTeX as `alttext`; as code where it cannot be converted.
+
+    latex2mathml raises for few mistakes: what it gives is parsed, and unknown commands that it leaves are seen.
+    """
+    from latex2mathml.converter import convert
+
+    known = latex
+    for command, other in _TEXT_COMMANDS.items():
+        known = known.replace(command, other)
+    try:
+        text = convert(known)
+        is_known = all(re.match(r"\\\w", element.text or "") is None for element in ElementTree.fromstring(text).iter())
+    except Exception:  # one of latex2mathml's own, KeyError, IndexError or ParseError
+        is_known = False
+    if not is_known:
+        return f"<code>{markup.escape(latex)}</code>"
+    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # a sign behind = is none between terms
+    text = text.replace(sign, sign.replace("><mo>&#x02212", '><mo form="prefix">&#x02212'))
+    return re.sub("^<math[^>]*>", lambda _: f'<math alttext="{markup.escape(latex)}">', text)
+
+
+def text(words: object) -> Html:
     """Text as HTML; what is far too long for a page loses its middle."""
-    return markup.escape(markup.shortened(words, CHARACTERS))
+    return Html(markup.escape(markup.shortened(words, CHARACTERS)))
 
 
-def statements(lines: Sequence[tuple[str, str]]) -> str:
-    """Lines of a word, which is HTML, and what it says, which is HTML."""
-    if not lines:
-        return ""
-    rows = (f"<li><span>{word}</span><div>{what}</div></li>" for word, what in lines)
-    return "\n".join(['<ul class="statements">', *rows, "</ul>"])
+def wide(table: str) -> Html:
+    """A table that is scrolled by itself where the page is too narrow for it."""
+    return Html(f'<div class="wide">{table}</div>')
 
 
-def _remake(recipe: Recipe, seed: int | None) -> Section:
-    rows = [("version", f"kahanmaps {markup.escape(recipe.version)}")]
-    if recipe.command:
-        rows.insert(0, ("command", f"<code>{text(recipe.command)}</code>"))
-    if seed is not None:
-        rows.append(("seed", str(seed)))
-    inside = wide(markup.definitions(rows))
-    if recipe.system:
-        shown = markup.escape(markup.shortened(recipe.system, _LONGEST_SYSTEM))
-        inside += "\n" + markup.details(
-            "The system file, to be saved as NAME.toml and given as SYSTEM", f"<pre>{shown}</pre>"
-        )
-    return Section("remake", "How to make this page again", inside)
+def system_section(file: SystemFile) -> Section:
+    """Equations, parameters and the Hamiltonian of a system."""
+    if file.is_quadratic:
+        pieces = [Html(f"<p>{equations_html(file.system, CHARACTERS, _MAX_EQUATIONS)}</p>")]
+    else:
+        pieces = [Html(f"<pre>{text(file.map)}</pre>")]
+    if file.parameters:
+        values = ", ".join(f"{name} = {format_number(value)}" for name, value in file.parameters.items())
+        pieces.append(Html(f"<p>with {text(values)}</p>"))
+    if file.hamiltonian is not None:
+        kind = "the standard J" if file.hamiltonian.is_standard else "a constant J of the file"
+        shown = formula(file.hamiltonian.H, "H", CHARACTERS)
+        pieces.append(Html(f"<p>x' = J grad H(x) with {kind}, {shown}</p>"))
+    return Section("system", "The system", pieces=pieces)

@@ -4,36 +4,59 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import islice
 from math import inf
 from typing import TYPE_CHECKING, Any
 
+from flint import fmpq
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.checks.settings import random_starts
 from kahanmaps.display import markup
-from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.errors import InputError, KahanmapsError, counted
+from kahanmaps.maps.convention import eps_told
+from kahanmaps.maps.floats.ensemble import starts_in_box
+from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves
+from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
 from kahanmaps.plots.figures import require_matplotlib, svg_text
+from kahanmaps.plots.point_functions import point_function
+from kahanmaps.plots.portraits.automatic_starts import automatic_starts
+from kahanmaps.plots.portraits.draw_portrait import draw_portrait
+from kahanmaps.plots.portraits.flow import plane_flow
+from kahanmaps.plots.portraits.portrait import portrait_of
+from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.plots.style import Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from kahanmaps.documents.files import SystemFile
+
+DEFAULT_EPS = fmpq(1, 20)  # where a page is for every eps
 _STYLE = Style(width=14, font_size=11, dpi=150)  # letters that are readable on a telephone as well
-_RASTERISE_ABOVE = 1_500  # points: as elements of the page they would be a hundred bytes each
+_MAX_ELEMENTS = 1_500  # points: as elements of the page they would be a hundred bytes each
+_STEPS = 600
+_INITIAL_POINTS = 16
+_CURVES = 3
+_CURVE_STEPS = 300
 
 
 class Pictures:
-    """Draws pictures into a page, or leaves them out: `wanted` says whether the reader wants any.
+    """Draws pictures into a page, or leaves them out: `requested` says whether the reader wants any.
 
     None is begun after `until`, a value of time.monotonic(): a sentence says so in its place. `note` is a sentence for
     the page: that matplotlib is missing, and what to do; empty where it is there.
     """
 
-    def __init__(self, wanted: bool = True, until: float = inf) -> None:
+    def __init__(self, requested: bool = True, until: float = inf) -> None:
         self.note, self._until = "", until
-        self._wanted = wanted
-        if wanted:
+        self._requested = requested
+        if requested:
             try:
                 require_matplotlib()
             except InputError as error:
-                self._wanted, self.note = False, f"Pictures are left out: {error}"
+                self._requested, self.note = False, f"Pictures are left out: {error}"
 
     def draw(
         self, name: str, caption: str, alt: str, drawing: Callable[[Style], Figure], remarks: Sequence[str] = ()
@@ -43,13 +66,20 @@ class Pictures:
         `remarks` are read after `drawing` was called, which may have written into them what the picture does not show;
         they stand below the caption. Empty without pictures; where it cannot be drawn, the reason.
         """
-        if not self._wanted:
+        if not self._requested:
             return ""
         try:
             if time.monotonic() > self._until:
                 raise InputError("the time was over (--seconds)")
             figure = drawing(_STYLE)
-            _rasterise(figure)
+            for axes in figure.axes:
+                # What has many points becomes an image within the picture; axes and letters stay lines.
+                lines: list[Any] = list(axes.lines)
+                clouds: list[Any] = list(axes.collections)
+                points = sum(len(line.get_xdata()) for line in lines) + sum(len(dots.get_offsets()) for dots in clouds)
+                if points > _MAX_ELEMENTS:
+                    for artist in (*lines, *clouds):
+                        artist.set_rasterized(True)
             svg = svg_text(figure, name, _STYLE, alt)
         except KahanmapsError as error:
             what = markup.escape(caption.removesuffix("."))
@@ -57,13 +87,51 @@ class Pictures:
         words = "<br/>".join(map(markup.escape, (caption, *remarks)))
         return f'<figure id="{name}">\n{svg}\n<figcaption>{words}</figcaption>\n</figure>'
 
+    def portrait(self, file: SystemFile, eps: Any) -> str:
+        """Sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
 
-def _rasterise(figure: Figure) -> None:
-    """Store what has many points as an image within the picture; axes and letters stay lines."""
-    for axes in figure.axes:
-        lines: list[Any] = list(axes.lines)
-        clouds: list[Any] = list(axes.collections)
-        points = sum(len(line.get_xdata()) for line in lines) + sum(len(dots.get_offsets()) for dots in clouds)
-        if points > _RASTERISE_ABOVE:
-            for artist in (*lines, *clouds):
-                artist.set_rasterized(True)
+        They start around the fixed points of a vector field, and at random where there is none.
+        """
+        at = DEFAULT_EPS if eps is None else rational(eps)
+        remarks: list[str] = []
+        axes = file.variables[:2] if file.dim > 1 else ("step", file.variables[0])
+
+        def drawing(style: Style) -> Figure:
+            rounded = file.rounded
+            if is_field := rounded.is_quadratic:
+                starts = automatic_starts(rounded.system, at)
+            else:
+                starts = starts_in_box(_INITIAL_POINTS, file.dim, 2.0, 0)
+            orbits = walked(ensemble_for(rounded.map, at, starts, _STEPS), _STEPS)
+            functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
+            shown = portrait_of(orbits, functions)
+            if is_field:
+                shown = replace(shown, flow=plane_flow(rounded.system, range(file.dim), shown.window))
+            for reason, count in orbits.ended.items():
+                remarks.append(f"{count} of {counted(orbits.orbits, 'orbit')} ended early: {reason}.")
+            if shown.left_out:
+                remarks.append(f"{shown.left_out} of {orbits.points[..., 0].size} points lie outside the window.")
+            return draw_portrait(shown, style)
+
+        where = " and ".join(axes)
+        sentence = f"{eps_told(at, file.map)}, {_STEPS} steps in machine numbers".removeprefix(", ")
+        caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {where}: {sentence}."
+        return self.draw("portrait", caption, f"Portrait of orbits in {where}, {sentence}", drawing, remarks)
+
+    def invariant_curves(self, file: SystemFile, eps: Any) -> str:
+        """Three orbits of a member of the family, plane by plane, on the cubic curves that they never leave."""
+        at = DEFAULT_EPS if eps is None else rational(eps)
+        remarks: list[str] = []
+
+        def drawing(style: Style) -> Figure:
+            starts = list(islice(random_starts(file.system.dim, 0), _CURVES))
+            curves = find_invariant_curves(file, starts, at, _CURVE_STEPS)
+            for k, pole in enumerate(curves.poles, 1):
+                if pole is not None:
+                    remarks.append(f"Orbit {k} ends before step {pole}: a pole, or closer to one than 2^-96.")
+            return draw_invariant_curves(curves, style)
+
+        sentence = f"{eps_told(at)}, {_CURVE_STEPS} steps".removeprefix(", ")
+        caption = f"{_CURVES} orbits in the planes of the normal form, and the invariant curves through them: "
+        alt = f"Invariant plane cubics with orbits on them, {sentence}"
+        return self.draw("invariant-curves", f"{caption}{sentence}.", alt, drawing, remarks)

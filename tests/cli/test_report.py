@@ -1,8 +1,7 @@
-"""kahanmaps report: pages of an analysis, of verify, of checks and of a batch; what is refused; exit statuses."""
+"""kahanmaps report: pages of an analysis, of verify and of checks; what is refused; exit statuses."""
 
 import pytest
 from page_helpers import require_sound
-from small_databases import ok, planned
 
 SMALL = "report --vars x,y --rhs 'x*y' --rhs=-x^2 --no-pictures"
 
@@ -56,13 +55,6 @@ def test_a_refuted_claim_gives_status_1_and_a_page_all_the_same(kahanmaps, tmp_p
     outcome = kahanmaps("report", tmp_path / "a.toml", "--from checks --no-pictures")
     assert outcome.status == 1
     assert "✗ refuted" in require_sound(outcome.out).text
-
-
-def test_a_batch(kahanmaps, tmp_path):
-    path = planned(tmp_path / "a.db", 1, 2, records=[ok(1, 7, "proved")])
-    outcome = kahanmaps("report --no-pictures --db", path)
-    assert outcome.status == 0
-    assert "1 of 2 tasks done" in require_sound(outcome.out).text
 
 
 def test_a_folder_that_cannot_be_written_is_told_before_the_work(kahanmaps, tmp_path, monkeypatch):

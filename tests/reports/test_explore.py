@@ -17,7 +17,7 @@ from page_helpers import Page
 import kahanmaps as km
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import to_float, to_floats
-from kahanmaps.reports.explore_page import explore_data
+from kahanmaps.reports.explore import explore_data
 from kahanmaps.reports.report import report_html
 
 NODE = shutil.which("node")

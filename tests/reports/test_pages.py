@@ -1,22 +1,27 @@
 """Pages: what stands in them, that they fetch nothing, that they are the same every time, and hostile names."""
 
 import re
+import string
 import sys
+from html import unescape
+from importlib import resources
 
 import pytest
-from page_helpers import Page, require_sound
-from small_databases import ok, planned
+from fontTools.pens.boundsPen import BoundsPen
+from fontTools.ttLib import TTFont
+from page_helpers import Page, letters_of_formulas, letters_of_the_font, require_sound
 
 import kahanmaps as km
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.display.formulas import formula
+from kahanmaps.display.latex import GREEK_NAMES
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 from kahanmaps.paper.verifier import VerifyOptions
+from kahanmaps.reports.page import font_face, mathml, page_template
 from kahanmaps.reports.pictures import Pictures
-from kahanmaps.reports.portraits import portrait_figure
-from kahanmaps.reports.report import report_html, write_report
-from kahanmaps.reports.statement_formulas import formulas_of
+from kahanmaps.reports.report import formulas_of, report_html, write_report
 
 EVIL = "<script>alert(1)</script>"
 
@@ -63,12 +68,25 @@ def test_the_page_of_an_analysis_has_the_verdict_first_and_every_section(drawn, 
             assert line.status in page.text
 
 
-def test_formulas_are_formulas_and_their_plain_text_is_exact(volterra):
+def test_formulas_are_mathml_of_exact_latex(volterra):
     page = require_sound(report_html(volterra, pictures=False))
-    assert "x' =" in page.alttexts
-    assert "y' =" in page.alttexts
-    assert "x*y - y" in page.alttexts
-    assert page.alttexts[page.alttexts.index("phi =") + 1] == volterra.densities.densities[0].text
+    assert {"x' = -x y + x", "y' = x y - y"} <= set(page.alttexts)
+    phi = volterra.densities.densities[0].function
+    assert any(rf"\phi = {km.latex_rational_function(phi)}" in text for text in page.alttexts)
+    assert "<code>\\" not in page.html, "a formula that was not converted"
+
+
+def test_relations_are_set_as_they_read_in_the_analysis():
+    terms = (("x^2", "1"), ("y^2", "c1"), ("x", "-5/(18*eps^2)"), ("1", "-2"))
+    file = km.load("planar_cubic_hamiltonian")
+    found = Analysis(file, None, 1.0, 0, relations=(SparseRelation(terms, ("c1",)),))
+    html = formulas_of(found)["along orbits x^2 + c1*y^2 - 5/(18*eps^2)*x - 2 = 0"]
+    assert re.findall(r"\\\((.*?)\\\)", html) == [
+        "x^2",
+        "{}+ c_1 y^2",
+        r"{}- \frac{5 x}{18 \varepsilon^2}",
+        "{}- 2 = 0",
+    ]
 
 
 def test_pictures_are_inside_with_a_title_each(drawn):
@@ -88,6 +106,15 @@ def test_the_page_says_how_it_was_made(drawn, volterra):
     assert system == volterra.file
 
 
+@pytest.mark.parametrize("library", ["jinja2", "latex2mathml"])
+def test_without_the_extra_it_is_said_what_to_install(volterra, monkeypatch, library):
+    monkeypatch.setitem(sys.modules, library, None)
+    monkeypatch.setitem(sys.modules, f"{library}.converter", None)
+    page_template.cache_clear()
+    with pytest.raises(InputError, match=r"pip install 'kahanmaps\[report\]'"):
+        report_html(volterra)
+
+
 def test_without_matplotlib_the_page_says_what_to_install(volterra, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
@@ -104,21 +131,21 @@ def test_no_picture_is_begun_when_the_time_is_over(volterra):
 
 def test_a_portrait_says_which_orbits_ended_and_what_lies_outside():
     nowhere = km.QuadraticSystem.from_text(["x"], ["x"])  # at eps = 1
-    html = portrait_figure(km.SystemFile.from_system(nowhere), 1, Pictures())
+    html = Pictures().portrait(km.SystemFile.from_system(nowhere), 1)
     assert "16 of 16 orbits ended early: met a singular matrix I - eps f&#x27;." in html
     riccati = km.QuadraticSystem.from_text(["x"], ["x^2 + 1"])
-    assert "points lie outside the window" in portrait_figure(km.SystemFile.from_system(riccati), "1/20", Pictures())
-    harmonic = portrait_figure(km.load("harmonic"), "1/20", Pictures())
+    assert "points lie outside the window" in Pictures().portrait(km.SystemFile.from_system(riccati), "1/20")
+    harmonic = Pictures().portrait(km.load("harmonic"), "1/20")
     assert "ended early" not in harmonic
     assert "outside" not in harmonic
 
 
 def test_a_system_with_an_algebraic_parameter_is_drawn_around_its_fixed_points():
     field = "x' = x*(a - y); y' = y*(x - 1)"
-    html = portrait_figure(km.System(field, a="root of t^2 - 2 near 1.4"), None, Pictures())
+    html = Pictures().portrait(km.System(field, a="root of t^2 - 2 near 1.4"), None)
     assert "separatrix" in html
     assert "outside" not in html
-    which = portrait_figure(km.System(field, a="root of t^2 - 2"), None, Pictures())
+    which = Pictures().portrait(km.System(field, a="root of t^2 - 2"), None)
     assert "machine numbers: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
 
 
@@ -190,37 +217,6 @@ def test_a_second_system_its_eps_and_an_orbit_cut_short_are_told():
     assert "ended early" not in report_html(km.check_integrals(top), pictures=False)
 
 
-def test_relations_are_set_as_they_read_in_the_analysis():
-    file = km.load("planar_cubic_hamiltonian")
-    terms = (("x^2", "1"), ("y^2", "c1"), ("x", "-5/(18*eps^2)"), ("1", "-2"))
-    found = Analysis(file, None, 1.0, 0, relations=(SparseRelation(terms, ("c1",)),))
-    html = formulas_of(found)["along orbits x^2 + c1*y^2 - 5/(18*eps^2)*x - 2 = 0"]
-    alttexts = Page(html).alttexts
-    assert alttexts == ["x^2", "+", "c1*y^2", "-", "5*x/(18*eps^2)", "-", "2", "= 0"]
-
-
-def test_a_batch_has_its_tables(tmp_path):
-    path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(1, 7, "proved"), ok(2, 9, "refuted")])
-    with km.Store.open(path, readonly=True) as store:
-        page = require_sound(report_html(store))
-        assert "2 of 3 tasks done" in page.text
-        assert "✓ proved" in page.text
-        assert report_html(store) == page.html
-
-
-def test_the_tasks_of_a_batch_that_failed_or_were_refuted_are_listed(tmp_path):
-    path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(1, 7, "proved"), ok(2, 8, "refuted")])
-    with km.Store.open(path, readonly=True) as store:
-        keys = {row.record.verdict: row.task.key[:12] for row in store.rows()}
-        page = require_sound(report_html(store, pictures=False))
-    assert "exceptions" in page.ids
-    assert keys["refuted"] in page.text
-    assert keys["proved"] not in page.text
-    path = planned(tmp_path / "b.db", 1, records=[ok(1, 7, "proved")])
-    with km.Store.open(path, readonly=True) as store:
-        assert "exceptions" not in require_sound(report_html(store, pictures=False)).ids
-
-
 @pytest.mark.parametrize("wrong", [[], "text", [1], 7.0])
 def test_other_things_are_refused(wrong):
     with pytest.raises((InputError, TypeError), match=r"expected an Analysis|not iterable"):
@@ -240,3 +236,33 @@ def test_a_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch, volterra):
         write_report(path, volterra, pictures=False, title="another")
     assert path.read_bytes() == before
     assert [one.name for one in tmp_path.iterdir()] == ["page.html"]
+
+
+# -- the font of formulas
+
+
+def test_the_font_is_part_of_the_page_and_its_licence_lies_beside_it(drawn):
+    folder = resources.files("kahanmaps.reports") / "fonts"
+    assert "LaTeX Project Public License" in (folder / "GUST-FONT-LICENSE.txt").read_text()
+    assert re.fullmatch(r'@font-face {[^{}]*url\(data:font/woff;base64,[\w+/=]+\) format\("woff"\); }', font_face())
+    assert font_face() in drawn
+
+
+def test_the_font_has_every_letter_of_formulas():
+    names = [*string.ascii_letters, *GREEK_NAMES.split("|"), "eps", "my_name12"]
+    polynomial = km.parse_polynomial("123456789/70" + "".join(f"+{name}^2-{name}" for name in names), names)
+    html = formula(polynomial, "x1'") + formula(polynomial, "y", characters=9)
+    formulas = "".join(mathml(unescape(piece)) for piece in re.findall(r"\\\((.*?)\\\)", html))
+    assert letters_of_formulas(formulas) - letters_of_the_font() == set()
+    assert letters_of_formulas("<math><mi>я</mi></math>") - letters_of_the_font() == {"я"}
+
+
+def test_primes_are_drawn_to_stand_in_an_exponent():
+    """They begin near the base line; the ordinary ones are raised already, and would be raised twice."""
+    with (resources.files("kahanmaps.reports") / "fonts" / "kahanmaps-math.woff").open("rb") as file:
+        font = TTFont(file)
+        pen = BoundsPen(font.getGlyphSet())
+        font.getGlyphSet()[font.getBestCmap()[ord("′")]].draw(pen)
+    x_height = 430  # of Latin Modern, in thousandths; there its ordinary prime begins
+    assert pen.bounds is not None
+    assert pen.bounds[1] < x_height / 2

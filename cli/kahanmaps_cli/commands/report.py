@@ -37,9 +37,6 @@ _ONLY_FOR = {
     help="What the page is made of.",
 )
 @click.option("--explore", is_flag=True, help="A page with sliders: eps and the start of an orbit move.")
-@click.option("--db", metavar="BATCH.db", help="Instead: the results of a batch.")
-@click.option("--by", metavar="NAME,...", help="With --db: group results by these (default: experiment).")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="With --db: only this number, with a picture.")
 @opt.eps_options
 @opt.symbolic_option
 @opt.seconds_option(
@@ -62,14 +59,13 @@ _ONLY_FOR = {
 @click.option("--no-pictures", is_flag=True, help="Formulas and tables only.")
 @opt.quiet_option
 def command(system: str | None, **options: Any) -> int:
-    """One HTML page about SYSTEM, a member of the family or a batch, to be read, printed or sent.
+    """One HTML page about SYSTEM or a member of the family, to be read, printed or sent.
 
     \b
       kahanmaps report euler_top -o top.html
       kahanmaps report henon_heiles -p c=-6 --seconds 30 -o hh.html
       kahanmaps report euler_top --explore -o explore.html
       kahanmaps report --from verify --m 2 -o paper.html
-      kahanmaps report --db first.db --by m -o batch.html
 
     analyze: what the map preserves and how it grows, the verdict first. verify: the paper's claims for a member of the
     family, section by section. checks: the four checks, those that apply. The page is one file with its pictures
@@ -77,7 +73,7 @@ def command(system: str | None, **options: Any) -> int:
     and the start move by sliders, and the exact verdict stands beside the picture of the orbit. A verdict at one --eps
     leaves only the start to move.
 
-    Exit status: as the command that the page is made of, and 0 for a batch.
+    Exit status: as the command that the page is made of.
     """
     _require_consistent(system, options)
     if options["output"] == "-" and sys.stdout.isatty():
@@ -95,16 +91,6 @@ def command(system: str | None, **options: Any) -> int:
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
     context = click.get_current_context()
-    if options["db"] is not None:
-        names = ("source", "variables", "rhs", "parameters", "eps", "time_step", "seed", *_ONLY_FOR)
-        clash = [_option_name(name) for name in names if _is_given(context, name)]
-        clash += ["SYSTEM"] * (system is not None)
-        if clash:
-            raise click.UsageError(f"found --db and {clash[0]}, expected one of the two: a batch has its own systems")
-    else:
-        clash = [_option_name(name) for name in ("by", "values") if _is_given(context, name)]
-        if clash:
-            raise click.UsageError(f"{clash[0]} is for --db BATCH.db")
     for name, sources in _ONLY_FOR.items():
         if _is_given(context, name) and options["source"] not in sources:
             raise click.UsageError(f"{_option_name(name)} is for --from {' or '.join(sources)}")
@@ -143,10 +129,6 @@ def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tu
         "pictures": not options["no_pictures"],
         "command": command_line(),
     }
-    if options["db"] is not None:
-        with lib.Store.open(options["db"], readonly=True) as store:
-            by = [name.strip() for name in (options["by"] or "").split(",") if name.strip()]
-            return lib.report_html(store, by=by, values=options["values"], **how), 0
     if options["source"] == "analyze":
         return _analysis(system, options, progress, how)
     file = _system_or_member(system, options)

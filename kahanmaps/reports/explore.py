@@ -1,0 +1,123 @@
+"""A page with sliders: eps and the start move, the orbit is drawn by the reader's browser, the exact verdict beside it.
+
+What the browser computes are machine numbers, from the same polynomials M and r (M x~ = r) as all orbits of the
+library; explore.js solves the linear system of each step. What is proved was proved before, and is text.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, names_of
+from kahanmaps.algebra.written.text import format_number, format_rational_function
+from kahanmaps.display import markup
+from kahanmaps.display.formulas import formula
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analysis import Analysis
+from kahanmaps.maps.floats.doubles import to_float, to_floats
+from kahanmaps.plots.portraits.automatic_starts import automatic_starts
+from kahanmaps.reports.page import CHARACTERS, Html, Section, system_section
+from kahanmaps.reports.pictures import DEFAULT_EPS
+
+_LARGEST_EPS = 0.5
+_DEFAULT_STEPS, _MAX_STEPS = 800, 5000
+_MAX_TERMS = 2000  # of all polynomials: the browser evaluates them at every step
+_MAX_VARIABLES = 12
+
+
+def explore_script() -> str:
+    """The program of the page."""
+    return (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
+
+
+def explore_sections(found: Analysis) -> list[Section]:
+    """The sections of the page about what `analyze` found, with an orbit that its reader moves.
+
+    Raises InputError where a map has too many variables or terms for a browser to follow the slider.
+    """
+    data, final = explore_data(found), found.conclusion
+    names, reach, eps = data["variables"], data["reach"], data["eps"]
+    sliders = [(f"x{k}", name, -reach, reach, data["start"][k], "any") for k, name in enumerate(names)]
+    if data["has_eps"]:
+        largest = max(_LARGEST_EPS, 2 * abs(eps))
+        sliders.insert(0, ("eps", "eps", -largest if eps < 0 else 0, largest, eps, "any"))
+    sliders.append(("steps", "steps", 10, _MAX_STEPS, _DEFAULT_STEPS, "10"))
+    where = "for every eps" if found.eps is None else f"at eps = {format_number(found.eps)} only"
+    integrals = found.integrals.integrals if found.integrals is not None else ()
+    explore = {
+        "axes": [*names, "step"],
+        "chosen": (1, 0) if len(names) == 1 else (0, 1),
+        "sliders": sliders,
+        "eps_moves": data["eps_moves"],
+        "verdict": f"The verdict{f', {where}' if found.file.map.has_eps else ''}",
+        "conclusion": (final.kind, final.sentence),
+        "integrals": [
+            (Html(markup.verdict(str(one.verdict.value))), Html(formula(one.function, one.name or "I", CHARACTERS)))
+            for one in integrals
+        ],
+        "functions": data["functions"],
+        # in a script element < could begin a tag, in text of JSON it can be written otherwise
+        "data": Html(json.dumps(data, sort_keys=True).replace("<", "\\u003c")),
+    }
+    return [Section("explore", "An orbit", explore=explore), system_section(found.file)]
+
+
+def explore_data(found: Analysis) -> dict[str, Any]:
+    """What explore.js works with: the rows of (M | -r), the functions to be watched, where to begin."""
+    file = found.file
+    map_, n = file.map, file.dim
+    if n > _MAX_VARIABLES:
+        raise InputError(f"found {n} variables, expected at most {_MAX_VARIABLES} to have a slider each")
+    names = (*file.variables, "eps")
+    rows = [[_terms(entry, names, {}) for entry in row] for row in map_.rows]
+    size = sum(len(terms) for row in rows for terms in row)
+    if size > _MAX_TERMS:
+        raise InputError(f"found a map of {size} terms, expected at most {_MAX_TERMS} for a browser to step")
+    integrals = found.integrals.integrals if found.integrals is not None else ()
+    functions = [(one.name, one.function, str(one.verdict.value)) for one in integrals]
+    if file.hamiltonian is not None and "H" not in {name for name, *_ in functions}:
+        H = file.hamiltonian.H
+        functions.append(("H", RationalFunction(H, H.context().constant(1)), "of the flow"))
+    watched = []
+    for name, function, word in functions:
+        sides = [_terms(part, names, file.parameters) for part in (function.numerator, function.denominator)]
+        if sum(map(len, sides)) <= _MAX_TERMS:
+            text = format_rational_function(function)
+            watched.append({"name": name, "text": text, "word": word, "above": sides[0], "below": sides[1]})
+    start, reach = _start(file, found.eps)
+    return {
+        "variables": list(file.variables),
+        "rows": rows,
+        "has_eps": map_.has_eps,
+        "eps": to_float(DEFAULT_EPS if found.eps is None else found.eps),
+        "eps_moves": found.eps is None,
+        "start": [float(f"{value:.4g}") for value in start],
+        "reach": reach,
+        "functions": watched,
+    }
+
+
+def _terms(polynomial: fmpq_mpoly, names: tuple[str, ...], values: Mapping[str, fmpq]) -> list[list[Any]]:
+    """The terms, each its coefficient and the powers of the names; symbols have their values."""
+    places = names_of(polynomial)
+    terms = []
+    for powers, coefficient in polynomial.terms():
+        power = dict(zip(places, powers, strict=True))
+        for name in set(places) - set(names):
+            coefficient *= values[name] ** int(power[name])
+        terms.append([to_float(coefficient), *(int(power.get(name, 0)) for name in names)])
+    return terms
+
+
+def _start(file: SystemFile, eps: fmpq | None) -> tuple[Any, float]:
+    """A start whose orbit stays, in the middle of those that a portrait takes, and how far the sliders go."""
+    if file.is_quadratic:
+        starts = automatic_starts(file.system, DEFAULT_EPS if eps is None else eps)
+        return starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
+    return to_floats([fmpq(k + 1, 2 * (k + 2)) for k in range(file.dim)]), 3.0

@@ -1,0 +1,121 @@
+"""Formulas in HTML: their pieces together are the whole formula, and MathML of them is sound."""
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+from flint import fmpq, fmpq_mat
+from helpers import rationals, some
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
+from kahanmaps.display.formulas import equations, formula, matrix, typeset
+from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
+from kahanmaps.reports.page import mathml
+
+NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]
+RING = ring(NAMES)
+LONG = parse_polynomial("(x + y + 1)^6", ["x", "y"])
+MATHML = {"math", "mrow", "mi", "mn", "mo", "mfrac", "mstyle", "msup", "msub", "msubsup", "mtext", "mover"}
+MATHML |= {"mtable", "mtr", "mtd"}
+
+
+def pieces(html):
+    """The LaTeX of the pieces of a formula, as a notebook finds it."""
+    text = "".join(ElementTree.fromstring(f"<div>{html}</div>").itertext())
+    return [piece.removesuffix(r"\)") for piece in text.split(r"\(")[1:] for piece in [piece.strip()]]
+
+
+def together(html):
+    return " ".join(piece.removeprefix("{}") for piece in pieces(html))
+
+
+def sound(latex):
+    """Its MathML, with nothing in it that is no MathML, and no command that was not understood."""
+    root = ElementTree.fromstring(mathml(latex))
+    assert {element.tag for element in root.iter()} <= MATHML
+    assert not [element.text for element in root.iter() if (element.text or "").startswith("\\") and element.text[1:]]
+    assert root.get("alttext") == latex
+    return root
+
+
+def polynomials():
+    exponents = st.tuples(*[st.integers(0, 12)] * len(NAMES))
+    terms = st.dictionaries(exponents, rationals().filter(bool), max_size=6)
+    return terms.map(lambda found: RING.from_dict(found))
+
+
+@some
+@given(polynomials(), polynomials().filter(bool))
+def test_every_piece_of_a_formula_becomes_sound_mathml(numerator, denominator):
+    for html in (formula(numerator, "I1"), formula(RationalFunction(numerator, denominator), "x1'")):
+        for piece in pieces(html):
+            sound(piece)
+
+
+@some
+@given(polynomials())
+def test_the_pieces_of_a_polynomial_are_all_of_it(polynomial):
+    shown = together(formula(polynomial)).removeprefix(r"\displaystyle ")
+    assert shown == latex_polynomial(polynomial)
+
+
+def test_a_short_formula_is_one_piece_and_a_long_one_has_one_for_each_term():
+    assert pieces(formula(parse_polynomial("x^2 - 1", ["x"]), "H")) == ["H = x^2 - 1"]
+    assert len(pieces(formula(LONG))) == len(LONG)
+
+
+def test_a_quotient_is_a_fraction_where_it_is_short_and_has_a_slash_where_it_is_long():
+    short = parse_rational_function("x/(1 + y)", ["x", "y"])
+    assert pieces(formula(short)) == [rf"\displaystyle {latex_rational_function(short)}"]
+    long = parse_rational_function("-3*(x - y)^2*(x + 2*y)^2*(x + 5*y)/(2*y*(x + 3*y)*(x - 7*y)^2)", ["x", "y"])
+    shown = together(formula(long))
+    plain = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", shown)
+    assert r"\frac" not in shown
+    assert parse_rational_function(plain, ["x", "y"]) == long
+
+
+def test_what_is_too_long_is_cut_and_its_terms_are_told():
+    power = parse_polynomial("(x + y)^40", ["x", "y"])
+    assert together(formula(power, characters=60)).endswith(r"+ \cdots\ \text{(41 terms)}")
+    assert len(pieces(formula(power, characters=10_000))) == 41
+    assert pieces(formula(parse_polynomial("10^100*x", ["x"]), characters=60)) == [r"\text{(1 term, not shown)}"]
+    assert r"(41 terms)}) / (" in together(formula(RationalFunction(power, LONG), characters=60))
+
+
+def test_the_derivative_has_a_prime_beside_its_index():
+    (piece,) = pieces(equations(["x1"], [parse_polynomial("-x1^2", ["x1"])]))
+    assert piece == "x_1' = -x_1^2"
+    root = sound(piece)
+    assert "".join(next(root.iter("msubsup")).itertext()) == "x1′"
+    assert [one.text for one in root.iter("mo") if one.get("form") == "prefix"] == ["−"]
+
+
+def test_terms_are_not_parted_within_braces_and_no_bracket_needs_its_partner():
+    assert pieces(typeset(r"\frac{x - 1}{y} + \left(z - 2\right) = 0")) == [r"\frac{x - 1}{y}", "{}+ (z", "{}- 2) = 0"]
+
+
+@pytest.mark.parametrize(
+    "name", ["m12", "epsilon", "Omega1", "<b>&", "a_b", "\\", "I 1 {50%}", "x^~$#", "{q1,p1}", "x1~"]
+)
+def test_names_of_every_kind_become_mathml(name):
+    root = sound(latex_name(name))
+    assert "b" not in {element.tag for element in root.iter()}
+
+
+@pytest.mark.parametrize("wrong", [r"x \right)", r"\nothing x", r"\begin{aligned} x &= 1 \\ y &= 2 \end{aligned}"])
+def test_what_latex2mathml_cannot_convert_is_shown_as_code(wrong):
+    """It raises for the first only; of an unknown command it makes an element, and of `aligned` no XML."""
+    assert mathml(wrong).startswith("<code>")
+
+
+def test_a_matrix_is_shown_row_by_row_up_to_eight_and_by_its_size_beyond():
+    (piece,) = pieces(matrix(fmpq_mat([[1, fmpq(-1, 2)], [0, 3]]), "A"))
+    rows = [["".join(cell.itertext()) for cell in row] for row in sound(piece).iter("mtr")]
+    assert rows == [["1", "−12"], ["0", "3"]]
+    assert len(list(sound(pieces(matrix(fmpq_mat(8, 8)))[0]).iter("mtd"))) == 64
+    for rows_, columns in ((9, 1), (1, 9)):
+        assert f"a matrix with {rows_} rows and {columns} columns" in matrix(fmpq_mat(rows_, columns))
+    assert "2 columns" in matrix(fmpq_mat([[1, fmpq(10) ** 100]]))
