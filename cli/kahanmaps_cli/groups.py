@@ -50,6 +50,10 @@ def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
 
 # (command, option) -> what to use instead of an option that is there no longer
 REMOVED_OPTIONS = {
+    **{
+        ("report", name): "'kahanmaps batch show' shows the results of a batch, 'batch export' writes them for pandas"
+        for name in ("--db", "--by", "--value")
+    },
     ("ensemble", "--arithmetic"): "ensembles are in floating point; kahanmaps orbit has exact, mod:P and ball:BITS",
     ("plot portrait", "--density"): "kahanmaps ensemble -o FILE.npy and numpy.histogram2d count points in cells",
     ("plot portrait", "--from"): "a portrait is computed from a SYSTEM; matplotlib draws the points of a file",
