@@ -19,9 +19,9 @@ from kahanmaps.checks.table import CHECKS
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
-from kahanmaps_cli.screen.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.screen.progress import as_typed, say
 from kahanmaps_cli.screen.streams import have_standard_streams, leave_nothing_to_flush, output_was_lost
+from kahanmaps_cli.screen.terminal import colour_option, with_colour_option
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

@@ -42,8 +42,7 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
         plain = PLAIN.rational(function) if isinstance(function, RationalFunction) else PLAIN.polynomial(function)
         is_long = max(map(len, plain.split("/"))) > _ONE_PIECE if is_quotient else len(plain) > _ONE_PIECE
         notation = _FLAT if is_long else LATEX
-        is_rational = isinstance(function, RationalFunction)
-        text = notation.rational(function) if is_rational else notation.polynomial(function)
+        text = notation.rational(function) if isinstance(function, RationalFunction) else notation.polynomial(function)
     if left:
         name = latex_name(left) if left == "'" or not left.endswith("'") else f"{latex_name(left[:-1])}'"
         text = f"{name} = {text}"

@@ -275,9 +275,10 @@ class _Writer:
 
     def _expression(self, function: RationalFunction | fmpq_mpoly) -> str:
         """A polynomial or a quotient of two as an expression, exactly, on several lines where it is long."""
-        sides = [function]
         if isinstance(function, RationalFunction):
             sides = [function.numerator] if function.is_polynomial else [function.numerator, function.denominator]
+        else:
+            sides = [function]
         texts = []
         for side in sides:
             terms = list(terms_of(side))

@@ -79,7 +79,7 @@ def page(
 
     `command`, `seed` (None where nothing is drawn at random) and `file` say how it was made.
     """
-    remake = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
+    remake: list[tuple[str, str]] = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
     remake += [("version", f"kahanmaps {__version__}")]
     remake += [("seed", str(seed))] if seed is not None else []
     html = page_template().render(

@@ -1,51 +1,29 @@
-"""Colours: where they go, who decides, and that they are readable and never alone."""
+"""Colours: where they go and who decides."""
 
 import re
-from pathlib import Path
 
 import pytest
-from cli_helpers import terminal
 
-import kahanmaps_cli
-
-ESCAPE = "\x1b["
 CHECK = "check-integrals euler_top --integral x1 --integral known"
-GREEN, RED = "\x1b[32m", "\x1b[31m"
+ESCAPE = "\x1b["
 
 
-@pytest.fixture(autouse=True)
-def no_wishes(monkeypatch):
+def test_the_option_is_stronger_than_the_environment_and_changes_nothing_but_colours(kahanmaps, monkeypatch):
     for name in ("NO_COLOR", "FORCE_COLOR", "CLICOLOR_FORCE"):
         monkeypatch.delenv(name, raising=False)
-
-
-@pytest.mark.parametrize("command", ["systems", CHECK, "degrees weierstrass"])
-def test_always_gives_them_to_a_pipe_and_changes_nothing_else(kahanmaps, command):
-    coloured = kahanmaps("--color always", command).out
-    assert ESCAPE in coloured
-    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == kahanmaps(command).out
-
-
-def test_the_option_may_stand_before_the_command_and_after_it(kahanmaps):
-    assert kahanmaps("--color always", CHECK) == kahanmaps(CHECK, "--color always")
-
-
-def test_no_colour_is_stronger_than_force_and_the_option_stronger_than_both(kahanmaps, monkeypatch):
-    monkeypatch.setenv("NO_COLOR", "1")
+    plain, coloured = kahanmaps(CHECK), kahanmaps("--color always", CHECK)
+    assert ESCAPE not in plain.out
+    assert "\x1b[32mproved" in coloured.out
+    assert "\x1b[31mrefuted" in coloured.out
+    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured.out) == plain.out
+    assert kahanmaps(CHECK, "--color always") == coloured
     monkeypatch.setenv("FORCE_COLOR", "1")
-    assert ESCAPE not in kahanmaps("systems").out
-    assert ESCAPE in kahanmaps("--color always systems").out
+    assert ESCAPE in kahanmaps(CHECK).out
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert ESCAPE not in kahanmaps(CHECK).out
+    assert kahanmaps("--color always", CHECK) == coloured
 
 
-def test_a_terminal_gets_colours():
-    out = terminal(*CHECK.split()).out
-    assert GREEN in out
-    assert RED in out
-
-
-@pytest.mark.parametrize("style", ["yellow", "blue", "bright_", "dim", "white", "black"])
-def test_no_colour_is_used_that_one_ground_swallows(style):
-    folder = Path(kahanmaps_cli.__file__).parent
-    own = [*folder.glob("*.py"), *(folder / "commands").glob("*.py")]
-    named = re.compile(rf"""(style|fg|COLOURS)[^\n]*["'](bold )?{style}""")
-    assert [path.name for path in own if named.search(path.read_text())] == []
+@pytest.mark.parametrize("command", ["systems", "degrees weierstrass"])
+def test_headings_are_bold_where_colours_are_wanted(kahanmaps, command):
+    assert "\x1b[1m" in kahanmaps("--color always", command).out

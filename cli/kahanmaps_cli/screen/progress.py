@@ -28,10 +28,9 @@ _CENTURIES = 22.0  # a growth of the time, as a logarithm, that nobody waits for
 
 
 def say(message: str) -> None:
-    """Print a message, with nothing in it that a terminal would obey; a terminal gets lines broken at words."""
-    text = printable(message)
+    """Print a message, with nothing in it that a terminal would obey."""
     with suppress(OSError):
-        click.echo(_fitted(text) if sys.stderr.isatty() else text, err=True)
+        click.echo(printable(message), err=True)
 
 
 def as_typed(words: Iterable[str]) -> str:
@@ -169,25 +168,6 @@ def _width() -> int:
         return max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
     except (OSError, ValueError):
         return 80
-
-
-def _fitted(text: str) -> str:
-    """The text in lines that fit the terminal; but a caret and the line above it stay, or it would point elsewhere, and
-    so do commands that are to be copied.
-    """
-    from kahanmaps_cli.screen.terminal import wrapped
-
-    lines = text.split("\n")
-    found = []
-    for line, below in zip(lines, [*lines[1:], ""], strict=True):
-        is_command = ": kahanmaps " in line and not line.startswith("Usage: ")
-        if len(line) <= _width() or is_command or "^" in (line.strip(), below.strip()):
-            found.append(line)
-        else:
-            words = line.lstrip()
-            margin = " " * (len(line) - len(words))
-            found += wrapped(words, _width(), margin, margin + "  ")
-    return "\n".join(found)
 
 
 def _write(text: str) -> None:

@@ -8,12 +8,11 @@ yellow, no blue, no grey, no dim.
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import sys
 from collections.abc import Sequence
-from textwrap import TextWrapper
-from typing import TYPE_CHECKING, TextIO
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -27,11 +26,8 @@ if TYPE_CHECKING:
 COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
 # On a terminal long numbers are shortened to this many characters.
 NUMBER_WIDTH = 40
-NARROW = 60  # columns, below which there is no room for a table of texts
 _LABEL = 12
-_WORD_WIDTH = 10  # what words keep in a table that is too wide
-_BREAKABLE = re.compile(r"(?<=[*/,;])")
-_JOINED = "\0"  # a blank at which no line ends
+_WHEN = {"auto": None, "always": True, "never": False}
 
 
 def on_terminal() -> bool:
@@ -119,85 +115,70 @@ def styled(text: str, style: str = "") -> Text:
 def tell_entry(head: str, text: str, style: str = "") -> None:
     """Print an entry of a list whose heads have the same length; on a terminal its text goes on below itself."""
     head, text = printable(head), printable(text)
-    lines = [head + text]
-    if on_terminal():
-        lines = wrapped(text, columns(), head, " " * (len(head) if columns() >= NARROW else 4))
-    lines[0] = paint(lines[0][: len(head)], style) + lines[0][len(head) :]
-    click.echo("\n".join(lines), color=is_coloured())
+    lines = _filled(text, head, len(head)) if on_terminal() else head + text
+    click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_coloured())
 
 
 def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers.
 
-    A broken number looks like two: where a terminal is too narrow for the numbers, cells stand below each other.
+    A broken number looks like two: a terminal that is too narrow for the numbers gets tabs as well.
     """
-    if not on_terminal():
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    least = sum(min(width, 10) for width in widths[:words]) + sum(widths[words:]) + 3 * len(widths) + 1
+    if not on_terminal() or least > columns():
         for row in rows:
             echo("\t".join(row))
         return
     from rich.table import Table
 
-    screen = console()
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    padding = 1 if sum(widths) + 3 * len(widths) < screen.width else 0
-    # Where a table is too wide words are broken.
-    least = sum(min(width, _WORD_WIDTH) for width in widths[:words])
-    least += sum(widths[words:]) + (1 + 2 * padding) * len(widths) + 1
-    if least > screen.width:
-        _print_cells(rows)
-        return
-    table = Table(header_style="bold", padding=(0, padding))
+    table = Table(header_style="bold")
     for k, heading in enumerate(rows[0]):
-        table.add_column(
-            styled(heading, COLOURS.get(heading, "")),
-            justify="left" if k < words else "right",
-            overflow="fold",
-            no_wrap=k >= words,
-        )
+        header, side = styled(heading, COLOURS.get(heading, "")), "left" if k < words else "right"
+        table.add_column(header, justify=side, overflow="fold", no_wrap=k >= words)  # type: ignore[arg-type]
     for row in rows[1:]:
         table.add_row(*map(styled, row))
-    screen.print(table)
-
-
-def _print_cells(rows: Sequence[Sequence[str]]) -> None:
-    """One cell a line behind its heading, and an empty line after each row."""
-    headings, *others = rows
-    width = max(map(len, headings))
-    for row in others:
-        for heading, cell in zip(headings, row, strict=True):
-            echo("\n".join(wrapped(cell, columns(), heading.ljust(width) + "  ", " " * 4)))
-        click.echo()
+    console().print(table)
 
 
 def _laid_out(cells: list[str], hang: int) -> str:
-    width = columns()
     label, *others = cells
     if not others:
-        margin = " " * (len(label) - len(label.lstrip()))
-        return "\n".join(wrapped(label.lstrip(), width, margin, margin + "    "))
-    if width < NARROW:
-        hang = min(hang, 4)
-    first = label.ljust(hang) if len(label) < hang else f"{label}  "
-    # What a long label would push to the right margin stands below it.
-    if len(first) > max(hang, width // 2):
-        return "\n".join([*wrapped(label, width), *wrapped("  ".join(others), width, " " * hang, " " * hang)])
-    return "\n".join(wrapped("  ".join(others), width, first, " " * hang))
+        text = label.lstrip()
+        margin = len(label) - len(text)
+        return _filled(text, label[:margin], margin + 4)
+    return _filled("  ".join(others), label.ljust(hang) if len(label) < hang else f"{label}  ", hang)
 
 
-def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    """The text in lines of at most `width`, broken at blanks, before + and - and not after them, each with its margin.
-
-    A number that is longer than a line is shortened, another word folded, after * / , ; if that is possible.
-    """
-    room = max(8, width - len(rest))
-    text = re.sub(rf"\d{{{room + 1},}}", lambda number: shorten(number[0], NUMBER_WIDTH), text)
-    text = re.sub(r" ([-+]) (?=\S)", r" \1" + _JOINED, text)
-    wrapper = _Wrapper(width, initial_indent=first, subsequent_indent=rest, replace_whitespace=False)
-    return [line.replace(_JOINED, " ").rstrip() for line in wrapper.wrap(text) or [first]]
+def _filled(text: str, first: str, hang: int) -> str:
+    """The text behind `first`, in lines of the terminal's width that are broken at blanks and hang below the text."""
+    margins = {"initial_indent": first, "subsequent_indent": " " * hang}
+    return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first  # type: ignore[arg-type]
 
 
-class _Wrapper(TextWrapper):
-    def _split(self, text: str) -> list[str]:
-        room = self.width - len(self.subsequent_indent)
-        words = (word for word in re.split("( +)", text) if word)
-        return [piece for word in words for piece in (_BREAKABLE.split(word) if len(word) > room else [word]) if piece]
+def _choose(context: click.Context, parameter: click.Parameter, value: Any) -> None:
+    if value is not None:
+        context.color = _WHEN[value]
+
+
+def colour_option() -> click.Option:
+    """The option --color auto|always|never."""
+    return click.Option(
+        ["--color"],
+        type=click.Choice(list(_WHEN)),
+        metavar="WHEN",
+        callback=_choose,
+        expose_value=False,
+        is_eager=True,
+        help="Colours: auto (the default), always or never.",
+    )
+
+
+def with_colour_option(command: click.Command) -> click.Command:
+    """The command, which knows --color from now on, as do the commands below it."""
+    if all("--color" not in parameter.opts for parameter in command.params):
+        command.params.append(colour_option())
+    if isinstance(command, click.Group):
+        for below in command.commands.values():
+            with_colour_option(below)
+    return command
