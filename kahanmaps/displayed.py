@@ -114,11 +114,14 @@ def latex_form(value: object) -> str:
     raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as a formula")
 
 
+_FILES = {"documents": "systems", "family": "systems"}
+
+
 def _load(value: object) -> None:
-    """Import the file that knows this kind of value: it is called like the folder of the kind."""
+    """Import the file that knows this kind of value: it is called like the folder of the kind, or as `_FILES` says."""
     for kind in type(value).__mro__:  # what a user made from one of ours looks like ours
         top, *folders = kind.__module__.split(".")
         if top in ("kahanmaps", "flint"):
             is_formula = top == "flint" or folders[0] == "algebra"
-            import_module(f"kahanmaps.display.{'latex' if is_formula else folders[0]}")
+            import_module(f"kahanmaps.display.{'latex' if is_formula else _FILES.get(folders[0], folders[0])}")
             return

@@ -1,4 +1,4 @@
-"""Pages in a browser: nothing is fetched, nothing complained of, MathML is laid out, and the same text without scripts.
+"""Pages in a browser: nothing is fetched, nothing complained of, and sliders move what they should.
 
 Chromium runs without a window. Its log of the network tells what a page asks for, the printed page what is readable.
 """
@@ -12,9 +12,6 @@ from html import unescape
 import pytest
 
 import kahanmaps as km
-from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.display.latex import latex_rational_function
-from kahanmaps.reports.page import mathml
 from kahanmaps.reports.report import report_html
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -47,15 +44,6 @@ def dumped(tmp_path, html):
     done = browse(page, "--dump-dom", f"--log-net-log={log}")
     console = [line for line in done.stderr.decode().splitlines() if "CONSOLE" in line]
     return done.stdout.decode(), requests(log.read_text()), console
-
-
-def framed(tmp_path, html, attribute=""):
-    """The picture of a page in a frame; with the attribute sandbox the frame runs no scripts."""
-    page, frame, png = (tmp_path / name for name in ("page.html", "frame.html", "frame.png"))
-    page.write_text(html)
-    frame.write_text(f'<body><iframe {attribute} src="page.html" style="width: 700px; height: 2500px"></iframe></body>')
-    browse(frame, f"--screenshot={png}", "--window-size=800,2600", "--allow-file-access-from-files")
-    return png.read_bytes()
 
 
 @pytest.fixture(scope="module")
@@ -115,31 +103,6 @@ def test_at_one_eps_its_slider_stays(tmp_path):
 def test_a_page_that_fetches_or_complains_is_seen(tmp_path):
     assert dumped(tmp_path, FETCHING)[1] == ["http://localhost:9/x.png"]
     assert "undefined_name" in dumped(tmp_path, COMPLAINING)[2][0]
-
-
-@pytest.mark.slow
-def test_the_page_is_the_same_without_scripts(tmp_path, html):
-    assert framed(tmp_path, html) == framed(tmp_path, html, "sandbox")
-    writing = "<!DOCTYPE html><html lang='en'><body><script>document.write('A')</script></body></html>"
-    assert framed(tmp_path, writing) != framed(tmp_path, writing, "sandbox")
-
-
-@pytest.mark.slow
-def test_formulas_are_laid_out(tmp_path):
-    """A fraction is higher than a line of text, and narrower than its parts one after the other."""
-    latex = latex_rational_function(parse_rational_function("123456789*x/(987654321 + x)", ["x"]))
-    fraction = mathml(rf"\displaystyle {latex}")
-    script = (
-        "const [a, b] = ['math', '#t'].map(which => document.querySelector(which).getBoundingClientRect());"
-        "document.title = JSON.stringify([a.width, a.height, b.width, b.height]);"
-    )
-    inside = f'{fraction}<br/><span id="t">123456789987654321</span><script>{script}</script>'
-    page = tmp_path / "page.html"
-    page.write_text(f'<!DOCTYPE html><html lang="en"><title></title><body>{inside}</body></html>')
-    title = re.search("<title>(.*?)</title>", browse(page, "--dump-dom").stdout.decode())[1]
-    width, height, line_width, line_height = json.loads(title)
-    assert width < 0.8 * line_width
-    assert height > 1.5 * line_height
 
 
 @pytest.mark.slow

@@ -13,8 +13,7 @@ from flint import fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.reading import PLAIN, above_and_below, first_terms
-from kahanmaps.algebra.written.text import format_number
-from kahanmaps.display.latex import LATEX, latex_cut, latex_name, latex_number
+from kahanmaps.display.latex import LATEX, latex_cut, latex_matrix, latex_name
 from kahanmaps.display.markup import escape
 
 # A formula of at most so many characters of plain text is one piece: it has room on a telephone.
@@ -77,10 +76,5 @@ def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: i
 
 def matrix(entries: fmpq_mat, left: str = "", most: int = 8) -> str:
     """A matrix over Q as HTML, exact; only its size where it has more than `most` rows or columns, or long entries."""
-    rows, columns = int(entries.nrows()), int(entries.ncols())
-    if max(rows, columns) > most or any(len(format_number(entry)) > _ONE_PIECE for entry in entries.entries()):
-        text = rf"\text{{a matrix with {rows} rows and {columns} columns}}"
-    else:
-        lines = r" \\ ".join(" & ".join(map(latex_number, row)) for row in entries.tolist())
-        text = rf"\begin{{pmatrix}} {lines} \end{{pmatrix}}"
+    text = latex_matrix(entries, most)
     return typeset(f"{latex_name(left)} = {text}" if left else text, False)

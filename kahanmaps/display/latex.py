@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.reading import Notation, first_terms
@@ -108,6 +108,20 @@ def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
     if len(shown) == 0:
         return rf"\text{{({terms}, not shown)}}"
     return rf"{latex_polynomial(shown)} + \cdots\ \text{{({terms})}}"
+
+
+def latex_matrix(entries: fmpq_mat, most: int = 8) -> str:
+    r"""A matrix over Q; only its size where it has more than `most` rows or columns, or entries of many digits.
+
+    >>> print(latex_matrix(fmpq_mat([[1, 0]])))
+    \begin{pmatrix} 1 & 0 \end{pmatrix}
+    """
+    rows, columns = int(entries.nrows()), int(entries.ncols())
+    bits = max((max(int(entry.p.bit_length()), int(entry.q.bit_length())) for entry in entries.entries()), default=0)
+    if max(rows, columns) > most or bits > 100:
+        return rf"\text{{a matrix with {rows} rows and {columns} columns}}"
+    lines = r" \\ ".join(" & ".join(map(latex_number, row)) for row in entries.tolist())
+    return rf"\begin{{pmatrix}} {lines} \end{{pmatrix}}"
 
 
 def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:

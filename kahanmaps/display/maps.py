@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.written.reading import first_terms
 from kahanmaps.display import markup
-from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
+from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_polynomial
 from kahanmaps.display.systems import CHARACTERS, system_latex
 from kahanmaps.displayed import html_form, latex_form, text_form
+from kahanmaps.errors import counted
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 _EQUATIONS = 8
-_TERMS = 12
 _COORDINATES = 8
 _LARGEST_SHOWN = 2_000  # digits: the text of a longer number is not even made
 
@@ -23,10 +28,10 @@ _LARGEST_SHOWN = 2_000  # digits: the text of a longer number is not even made
 def map_latex(kahan: KahanMap) -> str:
     """The equation that defines the map, for its system and its eps."""
     system, field = kahan.system, kahan.field
-    rows = [
-        (rf"\frac{{{_image(name)} - {latex_name(name)}}}{{2 \varepsilon}}", _polarised(system, k))
-        for k, name in enumerate(system.variables[:_EQUATIONS])
-    ]
+    rows = []
+    for name, f in zip(system.variables[:_EQUATIONS], system.rhs, strict=False):
+        change = rf"{latex_name(name + '~')} - {latex_name(name)}"
+        rows.append((rf"\frac{{{change}}}{{2 \varepsilon}}", _polarised(f, system.variables)))
     if system.dim > _EQUATIONS:
         rows.append((r"\vdots", rf"\text{{({system.dim} equations)}}"))
     with field.working():
@@ -53,33 +58,18 @@ def birational_latex(map_: BirationalMap) -> str:
     return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in shown], _EQUATIONS)
 
 
-def _image(name: str) -> str:
-    return rf"\widetilde{{{latex_name(name)}}}"
-
-
-def _polarised(system: QuadraticSystem, k: int) -> str:
-    """The right-hand side Q(x, x~) + B (x + x~)/2 + c of one component."""
-    names = [(latex_name(name), _image(name)) for name in system.variables]
-    polynomial = system.rhs[k]
-    text = ""
-    for at in range(min(len(polynomial), _TERMS)):
-        value = polynomial.coefficient(at)
-        where = [j for j, exponent in enumerate(polynomial.monomial(at)) for _ in range(int(exponent))]
-        if len(where) == 2 and where[0] == where[1]:
-            factors = " ".join(names[where[0]])
-        elif len(where) == 2:
-            (x, x_image), (y, y_image) = (names[j] for j in where)
-            value, factors = value / 2, rf"({x} {y_image} + {x_image} {y})"
-        elif where:
-            value, factors = value / 2, rf"({' + '.join(names[where[0]])})"
-        else:
-            factors = ""
-        number = latex_number(abs(value)) if abs(value) != 1 or not factors else ""
-        number = number if len(number) < 200 else r"\text{(a long number)}"
-        sign = "-" if value < 0 else "+" if text else ""
-        text += f" {sign} {number} {factors}"
-    more = rf" + \cdots\ \text{{({len(polynomial)} terms)}}" if len(polynomial) > _TERMS else ""
-    return " ".join(text.split()) + more or "0"
+def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
+    """The right-hand side Q(x, x~) + B (x + x~)/2 + c of one component, which is 2 f((x + x~)/2) - f(x)/2 - f(x~)/2."""
+    shown = first_terms(polynomial, CHARACTERS // 2)
+    context = ring((*variables, *(f"{name}~" for name in variables)))
+    x, y = context.gens()[: len(variables)], context.gens()[len(variables) :]
+    middle = [(a + b) / 2 for a, b in zip(x, y, strict=True)]
+    at_middle, at_x, at_y = (shown.compose(*point, ctx=context) for point in (middle, x, y))
+    terms = counted(len(polynomial), "term")
+    if not len(shown) and len(polynomial):
+        return rf"\text{{({terms}, not shown)}}"
+    more = rf" + \cdots\ \text{{({terms})}}" if len(shown) < len(polynomial) else ""
+    return latex_polynomial(2 * at_middle - (at_x + at_y) / 2) + more
 
 
 def _plain(text: object) -> str:
