@@ -75,7 +75,65 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: as the command that the page is made of.
     """
-    _require_consistent(system, options)
+    is_named, is_drawn = _require_consistent(system, options)
+    how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
+    with Progress(options["quiet"]) as progress:
+        if options["source"] == "analyze":
+            from kahanmaps_cli.runs.search import symbols_and_eps
+
+            symbols, eps = symbols_and_eps(options)
+            file, seconds, began = opt.load_system(system, options), options["seconds"], time.monotonic()
+            found = lib.analyze(
+                file, symbols=symbols, eps=eps, seconds=seconds, seed=options["seed"], progress=progress, processes=2
+            )
+            progress("the page")
+            until = inf if seconds is None else began + seconds
+            html = lib.report_html(found, explore=options["explore"], until=until, **how)
+            status = 3 if found.conclusion.kind == "undecided" else 0
+        else:
+            # For verify, and where one is to be drawn, a member of the family.
+            draws = not is_named and (is_drawn or options["source"] == "verify")
+            file = drawn_file(options) if draws else opt.load_system(system, options)
+            eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+            settings = lib.Settings(eps=eps, seed=options["seed"], progress=progress)
+            left_out: list[str] = []
+            if options["source"] == "verify":
+                reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
+            else:
+                reports, left_out = _checks(file, settings)
+            progress("the page")
+            html = lib.report_html(reports, file=file, left_out=left_out, **how)
+            verdict = lib.combined(report.verdict for report in reports)
+            status = {lib.Verdict.REFUTED: 1, lib.Verdict.UNDECIDED: 3}.get(verdict, 0)
+    content = html.encode()
+    if options["output"] == "-":
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+    else:
+        lib.write_whole(options["output"], content)
+        if not options["quiet"]:
+            say(f"{options['output']}: {len(content)} bytes")
+    return status
+
+
+def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bool, bool]:
+    """Whether a system is named, and whether a member is to be drawn. Raises UsageError where options do not agree."""
+    context = click.get_current_context()
+    names = {parameter.name: parameter.opts[0] for parameter in context.command.params}
+    given = [
+        name
+        for name in names
+        if name is not None and context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    ]
+    for name, sources in _ONLY_FOR.items():
+        if name in given and options["source"] not in sources:
+            raise click.UsageError(f"{names[name]} is for --from {' or '.join(sources)}")
+    drawn = [name for name in DRAWN if name in given]
+    is_named = system is not None or bool(options["variables"] or options["rhs"])
+    if drawn and is_named:
+        raise click.UsageError(f"give a system or say which member to draw ({names[drawn[0]]}), not both")
+    if not is_named and options["parameters"] and (drawn or options["source"] == "verify"):
+        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
     if options["output"] == "-" and sys.stdout.isatty():
         raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
     if options["explore"] and options["no_pictures"]:
@@ -83,89 +141,7 @@ def command(system: str | None, **options: Any) -> int:
     suffix = Path(options["output"]).suffix
     if suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
         raise click.UsageError(f"found the ending {suffix} of {options['output']}, expected .html: a page is HTML")
-    with Progress(options["quiet"]) as progress:
-        html, status = _page(system, options, progress)
-    _write(html, options)
-    return status
-
-
-def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
-    context = click.get_current_context()
-    for name, sources in _ONLY_FOR.items():
-        if _is_given(context, name) and options["source"] not in sources:
-            raise click.UsageError(f"{_option_name(name)} is for --from {' or '.join(sources)}")
-    drawn = [name for name in DRAWN if _is_given(context, name)]
-    if drawn and (system is not None or options["variables"] or options["rhs"]):
-        raise click.UsageError(f"give a system or say which member to draw ({_option_name(drawn[0])}), not both")
-    no_system = system is None and not (options["variables"] or options["rhs"])
-    if no_system and options["parameters"] and (drawn or options["source"] == "verify"):
-        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
-
-
-def _is_given(context: click.Context, name: str) -> bool:
-    return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-
-
-def _option_name(name: str) -> str:
-    command = click.get_current_context().command
-    return next(parameter.opts[0] for parameter in command.params if parameter.name == name)
-
-
-def _write(html: str, options: dict[str, Any]) -> None:
-    content = html.encode()
-    if options["output"] == "-":
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
-        return
-    lib.write_whole(options["output"], content)
-    if not options["quiet"]:
-        say(f"{options['output']}: {len(content)} bytes")
-
-
-def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tuple[str, int]:
-    """The page, and the exit status."""
-    how: dict[str, Any] = {
-        "title": options["title"],
-        "pictures": not options["no_pictures"],
-        "command": command_line(),
-    }
-    if options["source"] == "analyze":
-        return _analysis(system, options, progress, how)
-    file = _system_or_member(system, options)
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
-    settings = lib.Settings(eps=eps, seed=options["seed"], progress=progress)
-    left_out: list[str] = []
-    if options["source"] == "verify":
-        reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
-    else:
-        reports, left_out = _checks(file, settings)
-    progress("the page")
-    return lib.report_html(reports, file=file, left_out=left_out, **how), _status(reports)
-
-
-def _analysis(system: str | None, options: dict[str, Any], progress: Progress, how: dict[str, Any]) -> tuple[str, int]:
-    from kahanmaps_cli.runs.search import symbols_and_eps
-
-    symbols, eps = symbols_and_eps(options)
-    file = opt.load_system(system, options)
-    began = time.monotonic()
-    found = lib.analyze(
-        file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress, processes=2
-    )
-    progress("the page")
-    until = inf if options["seconds"] is None else began + options["seconds"]
-    return lib.report_html(
-        found, explore=options["explore"], until=until, **how
-    ), 3 if found.conclusion.kind == "undecided" else 0
-
-
-def _system_or_member(system: str | None, options: dict[str, Any]) -> lib.SystemFile:
-    """The system that is named; for verify, and where one is to be drawn, a member of the family."""
-    is_drawn = any(options[name] is not None and options[name] is not False for name in DRAWN)
-    named = system is not None or options["variables"] or options["rhs"]
-    if named or not (is_drawn or options["source"] == "verify"):
-        return opt.load_system(system, options)
-    return drawn_file(options)
+    return is_named, any(options[name] is not None and options[name] is not False for name in DRAWN)
 
 
 def _checks(file: lib.SystemFile, settings: lib.Settings) -> tuple[list[lib.Report], list[str]]:
@@ -181,8 +157,3 @@ def _checks(file: lib.SystemFile, settings: lib.Settings) -> tuple[list[lib.Repo
     if not reports:
         raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
     return reports, left_out
-
-
-def _status(reports: list[lib.Report]) -> int:
-    verdict = lib.combined(report.verdict for report in reports)
-    return {lib.Verdict.REFUTED: 1, lib.Verdict.UNDECIDED: 3}.get(verdict, 0)
