@@ -77,7 +77,7 @@ def convert(
         raise InputError(f"found the language {str(language)[:40]!r}, expected one of {', '.join(LANGUAGES)}")
     if name and not (is_name(name) and name[0] != "_"):
         raise InputError(f"found the name {name[:40]!r}, expected a letter, then letters, digits and _")
-    formulas = Formulas.of(file, symbols)
+    formulas = Formulas(file, symbols)
     parts = _parts(what, formulas)
     if language == "latex":
         return write_latex(formulas, parts, command)

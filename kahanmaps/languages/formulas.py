@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 from flint import fmpq_mat, fmpq_mpoly
@@ -32,81 +31,47 @@ MAX_TERMS = 4_000
 MAX_DIMENSION_OF_FORMULAS = 8
 
 
-@dataclass(frozen=True, eq=False)
 class Formulas:
     """The formulas of a system file, its parameters numbers or, those in `symbols`, symbols.
 
-    An algebraic number is such a symbol. `names` are the variables, then the symbols; `rhs` and `H` are in these names,
-    all else in these names and eps. Of a map that is not Kahan's there is no `rhs`.
+    An algebraic number is such a symbol. `names` are the variables, then the symbols; `rhs`, its derivatives `jacobian`
+    and `H` are in these names, all else in these names and eps. Of a map that is not Kahan's there is no `rhs`. `new`
+    are names for the coordinates of the image x~ of a point.
     """
 
-    file: SystemFile
-    map: BirationalMap
-    rhs: tuple[fmpq_mpoly, ...]
-    integrals: Mapping[str, RationalFunction]
-    density: RationalFunction | None
-    H: fmpq_mpoly | None
-
-    @classmethod
-    def of(cls, file: SystemFile, kept: Sequence[str] = ()) -> Formulas:
-        """The formulas of a file; the parameters `kept` are left as symbols. Raises InputError where that cannot be."""
-        hamiltonian = file.hamiltonian
+    def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
+        """Raises InputError where these parameters cannot be left as symbols."""
+        self.file = file
         if isinstance(file.map, AlgebraicMap):
-            if kept:
+            if symbols:
                 raise InputError(f"found symbols beside a {file.map.root}, expected none: it is one")
-            map_ = file.map.given
+            self.map: BirationalMap = file.map.given
         else:
-            map_ = map_with_symbols(file, kept)
-        rhs = map_.system.rhs if isinstance(map_, Kahan) and "eps" not in map_.system.symbols else ()
-        if not map_.symbols:
-            H = None if hamiltonian is None else hamiltonian.H
-            return cls(file, map_, rhs, file.integrals, file.density, H)
-        symbols, names = map_.symbols, map_.names[:-1]
-        constants = {name: value for name, value in file.parameters.items() if name not in symbols}
-        document = file.document
-
-        def claim(text: object) -> RationalFunction:
-            return parse_rational_function(str(text), (*names, "eps"), constants)
-
-        H = None
-        if file.kind == "hamiltonian":
-            H = parse_polynomial(str(document["hamiltonian"]["H"]), names, constants)
-        integrals = {name: claim(document["integrals"][name]) for name in file.integrals}
-        density = claim(document["density"]["phi"]) if "density" in document else None
-        return cls(file, map_, rhs, integrals, density, H)
-
-    @property
-    def variables(self) -> tuple[str, ...]:
-        """The names of the coordinates."""
-        return self.map.variables
-
-    @property
-    def symbols(self) -> tuple[str, ...]:
-        """The parameters that are left as symbols."""
-        return self.map.symbols
-
-    @property
-    def dim(self) -> int:
-        """The number of variables."""
-        return len(self.variables)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The variables, then the symbols."""
-        return (*self.variables, *self.symbols)
-
-    @cached_property
-    def new(self) -> tuple[str, ...]:
-        """Names for the coordinates of the image x~ of a point."""
+            self.map = map_with_symbols(file, symbols)
+        map_ = self.map
+        self.variables, self.symbols, self.dim = map_.variables, map_.symbols, len(map_.variables)
+        self.names = (*self.variables, *self.symbols)
         ending = "_new"
         while any(variable + ending in self.names for variable in self.variables):
             ending += "_"
-        return tuple(variable + ending for variable in self.variables)
+        self.new = tuple(variable + ending for variable in self.variables)
+        has_field = isinstance(map_, Kahan) and "eps" not in map_.system.symbols
+        self.rhs: tuple[fmpq_mpoly, ...] = map_.system.rhs if has_field and isinstance(map_, Kahan) else ()
+        self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
+        self.integrals: Mapping[str, RationalFunction] = file.integrals
+        self.density, self.H = file.density, None if file.hamiltonian is None else file.hamiltonian.H
+        if self.symbols:  # then claims are read once more, with these names
+            constants = {name: value for name, value in file.parameters.items() if name not in self.symbols}
+            document = file.document
 
-    @cached_property
-    def jacobian(self) -> list[list[fmpq_mpoly]]:
-        """f'(x), row by row."""
-        return [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
+            def claim(text: object) -> RationalFunction:
+                return parse_rational_function(str(text), (*self.names, "eps"), constants)
+
+            self.integrals = {name: claim(document["integrals"][name]) for name in file.integrals}
+            self.density = claim(document["density"]["phi"]) if "density" in document else None
+            is_hamiltonian = file.kind == "hamiltonian"
+            text = str(document["hamiltonian"]["H"]) if is_hamiltonian else ""
+            self.H = parse_polynomial(text, self.names, constants) if is_hamiltonian else None
 
     @cached_property
     def equation(self) -> list[list[fmpq_mpoly]]:
@@ -175,7 +140,7 @@ class Formulas:
 
         >>> from kahanmaps.algebra.written.text import format_rational_function
         >>> from kahanmaps.documents.catalog import load
-        >>> [format_rational_function(component) for component in Formulas.of(load("harmonic")).closed_form()]
+        >>> [format_rational_function(component) for component in Formulas(load("harmonic")).closed_form()]
         ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']
         """
         return self._solved(self.equation)
