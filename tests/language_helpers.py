@@ -43,8 +43,8 @@ NASTY = {
     """,
     "constant": 'variables = ["x", "y"]\n[system]\nrhs = ["1", "1/2"]\n[integrals]\nI = "y/2"\nK = "1/2"\n',
 }
-# Of every kind: with parameters or without, integrals, densities, Hamiltonians, from one variable to six.
-CATALOGUE = ("riccati", "weierstrass", "euler_top", "lorenz", "henon_heiles", "lagrange_top")
+# Of every kind: with parameters or without, integrals, densities, Hamiltonians, from one variable to four.
+CATALOGUE = ("riccati", "weierstrass", "euler_top", "lorenz", "henon_heiles")
 
 
 @cache
