@@ -10,6 +10,7 @@ import errno
 import os
 import stat
 import sys
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,8 @@ class _Files:
     def __init__(self) -> None:
         self.read: set[Identity] = set()
         self.written: dict[Identity, str] = {}
-        self._note_standard_input()
+        with suppress(OSError, ValueError, AttributeError):  # standard input is closed, or there is none
+            self.reads(sys.stdin.fileno())
 
     def reads(self, path: Any) -> None:
         """Note a file that is about to be read."""
@@ -47,12 +49,6 @@ class _Files:
             self._refuse(path)
         if found is not None:
             self.written[found] = path
-
-    def _note_standard_input(self) -> None:
-        try:
-            self.reads(sys.stdin.fileno())
-        except (OSError, ValueError, AttributeError):  # closed, or none
-            return
 
     def _refuse(self, path: str) -> None:
         raise click.UsageError(f"found {path} both to be read and to be written (-o): it would be written over")

@@ -133,21 +133,19 @@ class TimeLeft:
         self._recent = [*self._recent[-3:], (step, spent)]
         if step >= 2 * self._last[0] and step >= _FIRST_TOLD:
             self._before, self._last = self._last, (step, spent)
-        growth = self._growth(step, spent)
-        if growth is None or step >= self._steps:
+        if step >= self._steps:
             return ""
+        # The growth is the logarithm of how much longer all steps take than those up to this one.
+        (first, began), *later = self._recent
+        n, t = self._before
+        if len(later) == 3 and began > _SHORTEST and all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent)):
+            growth = math.log(spent / began) * (self._steps - step) / (step - first)
+        elif step < _FIRST_TOLD or t <= 0 or spent <= t:
+            return ""  # it is too early
+        else:
+            growth = max(1.0, math.log(spent / t) / math.log(step / n)) * math.log(self._steps / step)
         seconds = spent * math.expm1(min(growth, _CENTURIES))
         return f", at least {duration(seconds) if growth < _CENTURIES else 'centuries'} left"
-
-    def _growth(self, step: int, spent: float) -> float | None:
-        """The logarithm of how much longer all steps take than those up to this one; None if it is too early."""
-        (first, began), *later = self._recent
-        if len(later) == 3 and began > _SHORTEST and all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent)):
-            return math.log(spent / began) * (self._steps - step) / (step - first)
-        n, t = self._before
-        if step < _FIRST_TOLD or t <= 0 or spent <= t:
-            return None
-        return max(1.0, math.log(spent / t) / math.log(step / n)) * math.log(self._steps / step)
 
 
 def duration(seconds: float) -> str:

@@ -66,22 +66,15 @@ def verdict_style(finding: lib.Finding) -> str:
 
 
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
-    tell(lib.headline(report), style="bold")
-    shown = _selection(report.findings)
-    _print_table(report, shown, verbose)
-    if len(shown) < len(report.findings):
-        tell(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
-    if not verbose:
-        for line in _below(shown):
-            tell(line)
-    for note in report.notes:
-        tell(f"note: {note}")
-    tell(f"verdict\t{report.verdict}", 9)
-
-
-def _print_table(report: lib.Report, shown: list[lib.Finding], verbose: bool) -> None:
     from rich.table import Table
 
+    # Of many findings the first ones, and every one that is not proved.
+    is_long = len(report.findings) > CLAIMS_SHOWN
+    shown = [
+        f
+        for k, f in enumerate(report.findings)
+        if not is_long or k < CLAIMS_SHOWN or str(f.verdict) != "proved" or f.control
+    ]
     table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
     table.add_column("claim", overflow="fold")
@@ -89,45 +82,36 @@ def _print_table(report: lib.Report, shown: list[lib.Finding], verbose: bool) ->
         table.add_column("decided by", overflow="fold")
     told: set[str] = set()
     for finding in shown:
-        claim = finding.claim
         verdict = styled(lib.verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
         if verbose:
-            for line in lib.details(finding, told, NUMBER_WIDTH):
-                claim += "\n  " + line
-            table.add_row(verdict, styled(claim))
-        else:
-            if report.check != "commute" and finding.formula not in finding.claim:
-                claim += "\n  " + shorten(finding.formula, 300)
-            table.add_row(verdict, styled(claim), styled(_short(finding.evidence)))
+            lines = [finding.claim, *lib.details(finding, told, NUMBER_WIDTH)]
+            table.add_row(verdict, styled("\n  ".join(lines)))
+            continue
+        has_formula = report.check != "commute" and finding.formula not in finding.claim
+        claim = finding.claim + (f"\n  {shorten(finding.formula, 300)}" if has_formula else "")
+        evidence, hypotheses = finding.evidence, finding.evidence.data.get("hypotheses")
+        reason = evidence.summary
+        if hypotheses:
+            reason = f"{evidence.data['theorem']} ({len(hypotheses)} hypotheses verified exactly)"
+        table.add_row(verdict, styled(claim), styled(reason))
+    tell(lib.headline(report), style="bold")
     console().print(table)
-
-
-def _short(evidence: lib.Evidence) -> str:
-    """What decided a claim, in a table cell."""
-    hypotheses = evidence.data.get("hypotheses")
-    if not hypotheses:
-        return evidence.summary
-    return f"{evidence.data['theorem']} ({len(hypotheses)} hypotheses verified exactly)"
-
-
-def _below(findings: list[lib.Finding]) -> list[str]:
-    """What a reader of the short table wants to know next: hypotheses, further evidence, witnesses."""
-    lines = []
-    hypotheses = list(dict.fromkeys(text for f in findings for text in f.evidence.data.get("hypotheses", ())))
-    if hypotheses:
-        more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
-        lines.append(f"verified: {'; '.join(hypotheses[:8])}{more}")
-    also = list(dict.fromkeys(evidence.summary for f in findings if not f.control for evidence in f.also))
-    lines += [f"also: {summary}" for summary in also[:4]]
-    for finding in findings:
-        if finding.witness is not None:
-            lines.append(f"{lib.verdict_text(finding)}: {finding.claim}")
-            lines += [f"  {line}" for line in lib.witness_lines(finding.witness, NUMBER_WIDTH)]
-    return lines
-
-
-def _selection(findings: tuple[lib.Finding, ...]) -> list[lib.Finding]:
-    """All findings, or where they are too many for a terminal the first ones and every one that is not proved."""
-    if len(findings) <= CLAIMS_SHOWN:
-        return list(findings)
-    return [f for k, f in enumerate(findings) if k < CLAIMS_SHOWN or str(f.verdict) != "proved" or f.control]
+    if len(shown) < len(report.findings):
+        tell(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
+    if not verbose:
+        # What a reader of the short table wants to know next: hypotheses, further evidence, witnesses.
+        hypotheses = list(dict.fromkeys(text for f in shown for text in f.evidence.data.get("hypotheses", ())))
+        if hypotheses:
+            more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
+            tell(f"verified: {'; '.join(hypotheses[:8])}{more}")
+        also = dict.fromkeys(evidence.summary for f in shown if not f.control for evidence in f.also)
+        for summary in list(also)[:4]:
+            tell(f"also: {summary}")
+        for finding in shown:
+            if finding.witness is not None:
+                tell(f"{lib.verdict_text(finding)}: {finding.claim}")
+                for line in lib.witness_lines(finding.witness, NUMBER_WIDTH):
+                    tell(f"  {line}")
+    for note in report.notes:
+        tell(f"note: {note}")
+    tell(f"verdict\t{report.verdict}", 9)
