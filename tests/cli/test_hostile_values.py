@@ -134,7 +134,6 @@ def test_numbers_and_paths_that_nobody_means_are_refused_in_a_sentence(words, ca
         "batch summary --db DB",
         "batch show KEY --db DB",
         "batch run SPEC --dry-run --db DB",
-        "report --db DB -o x.html",
     ],
 )
 def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, line):
