@@ -228,6 +228,7 @@ from kahanmaps.plots.squares import pairs_of_member as pairs_of_member
 from kahanmaps.plots.squares import squares as squares
 from kahanmaps.plots.style import Style as Style
 from kahanmaps.processes import processors as processors
+from kahanmaps.reports.page import page_template as page_template
 from kahanmaps.reports.report import report_html as report_html
 from kahanmaps.sources import source as source
 from kahanmaps.systems.quadratic import MAX_DIMENSION as MAX_DIMENSION

@@ -1,7 +1,11 @@
 """kahanmaps report: pages of an analysis, of verify and of checks; what is refused; exit statuses."""
 
+import sys
+
 import pytest
 from page_helpers import require_sound
+
+from kahanmaps.reports.page import page_template
 
 SMALL = "report --vars x,y --rhs 'x*y' --rhs=-x^2 --no-pictures"
 
@@ -63,3 +67,12 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(kahanmaps, tmp_
     outcome = kahanmaps(SMALL, "-o", tmp_path / "a.html")
     assert (outcome.status, outcome.out) == (2, "")
     assert "Permission denied: " in outcome.err
+
+
+def test_what_to_install_is_said_before_the_work(kahanmaps, monkeypatch):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    page_template.cache_clear()
+    monkeypatch.setattr("kahanmaps.laboratory.analysis.analyze", lambda *_, **__: pytest.fail("it was analysed"))
+    outcome = kahanmaps(SMALL, "-o page.html")
+    assert outcome.status == 2
+    assert "pip install 'kahanmaps[report]'" in outcome.err

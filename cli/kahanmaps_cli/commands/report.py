@@ -76,6 +76,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: as the command that the page is made of.
     """
     is_named, is_drawn = _require_consistent(system, options)
+    lib.page_template()  # what has to be installed is said before the work
     how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with Progress(options["quiet"]) as progress:
         if options["source"] == "analyze":
