@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 from importlib import resources
 from itertools import pairwise
 from unicodedata import decomposition
+from xml.etree import ElementTree
 
 from fontTools.ttLib import TTFont
 
@@ -75,6 +76,7 @@ class Page(HTMLParser):
 def require_sound(html: str) -> Page:
     """What every page has to be; returns it."""
     page = Page(html)
+    ElementTree.fromstring(html)  # XML, which browsers need not mend
     assert html.startswith("<!DOCTYPE html>")
     assert page.lang == "en"
     assert "script" not in page.tags

@@ -17,7 +17,7 @@ _TEXT = 400
 
 
 @dataclass(frozen=True)
-class Room:
+class DisplayLimits:
     """How much of a claim is shown: characters of a sentence, a formula and a number, and how many of a list."""
 
     text: int
@@ -26,7 +26,7 @@ class Room:
     entries: int
 
 
-NOTEBOOK = Room(_TEXT, 1_200, 60, 8)
+_NOTEBOOK = DisplayLimits(_TEXT, 1_200, 60, 8)
 
 
 @html_form.register
@@ -52,24 +52,24 @@ def finding_html(finding: Finding) -> str:
     return markup.titled(markup.shortened(finding.claim, _TEXT), markup.definitions(rows))
 
 
-def evidence_rows(finding: Finding, room: Room = NOTEBOOK) -> list[tuple[str, str]]:
+def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
     """What stands below a claim: formula, evidence, witness, source; each row a word and HTML."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
-        rows.append(("formula", f"<code>{_text(finding.formula, room.formula)}</code>"))
-    rows.append(("because", because(finding.evidence, room)))
-    rows += [("also", _text(evidence.summary, room.text)) for evidence in finding.also[: room.entries]]
-    if len(finding.also) > room.entries:
-        rows.append(("also", f"… and {len(finding.also) - room.entries} more"))
+        rows.append(("formula", f"<code>{_text(finding.formula, limits.formula)}</code>"))
+    rows.append(("because", because(finding.evidence, limits)))
+    rows += [("also", _text(evidence.summary, limits.text)) for evidence in finding.also[: limits.entries]]
+    if len(finding.also) > limits.entries:
+        rows.append(("also", f"… and {len(finding.also) - limits.entries} more"))
     if finding.witness is not None:
-        rows.append(("witness", _witness(finding.witness, room)))
+        rows.append(("witness", _witness(finding.witness, limits)))
     last = {**{word: finding.place.get(word) for word in ("misprint", "broken")}, "source": finding.source}
-    return rows + [(word, _text(str(what), room.text)) for word, what in last.items() if what]
+    return rows + [(word, _text(str(what), limits.text)) for word, what in last.items() if what]
 
 
-def because(evidence: Evidence, room: Room = NOTEBOOK) -> str:
+def because(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
     """What decided a claim: a sentence, and the hypotheses that were verified."""
-    return _text(report_text.summary(evidence), room.formula if evidence.data.get("hypotheses") else room.text)
+    return _text(report_text.summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
 
 
 def counts(findings: Iterable[Finding]) -> str:
@@ -145,11 +145,11 @@ def sections_table(findings: Iterable[Finding]) -> str:
     return markup.table(["section", "claims"], rows)
 
 
-def _witness(witness: Witness, room: Room = NOTEBOOK) -> str:
-    lines = report_text.witness_lines(witness, room.number)
-    if (more := len(witness.vectors) - room.entries) > 0:
-        lines[room.entries + 1 : -2] = [f"… and {more} more vectors"]
-    return "<br/>".join(_text(line.strip().removeprefix("witness: "), room.formula) for line in lines)
+def _witness(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
+    lines = report_text.witness_lines(witness, limits.number)
+    if (more := len(witness.vectors) - limits.entries) > 0:
+        lines[limits.entries + 1 : -2] = [f"… and {more} more vectors"]
+    return "<br/>".join(_text(line.strip().removeprefix("witness: "), limits.formula) for line in lines)
 
 
 def _text(text: str, width: int = _TEXT) -> str:

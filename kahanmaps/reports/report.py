@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding
     from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 
-_ROOM = checks.Room(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
+_LIMITS = checks.DisplayLimits(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
 _PARSED = 4_000  # characters of a relation that is read once more, to be set as a formula
 _PAPER = "petrera-suris-2016"
 _EXPLAINED = (
@@ -210,7 +210,7 @@ def formulas_of(found: Analysis) -> dict[str, Html]:
 
 def _formulas(found: Analysis) -> Iterator[tuple[str, str]]:
     def evidence(statement: Any) -> str:
-        because = checks.because(statement.evidence, _ROOM)
+        because = checks.because(statement.evidence, _LIMITS)
         return f"<details><summary>evidence</summary>{because}</details>"
 
     for one in found.integrals.integrals if found.integrals is not None else ():
@@ -309,7 +309,7 @@ def _claim(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
         "verdict": Html(checks.verdict_html(finding)),
         "place": place,
         "words": finding.claim.removeprefix(f"{place}: "),
-        "rows": [(word, Html(what)) for word, what in checks.evidence_rows(finding, _ROOM)],
+        "rows": [(word, Html(what)) for word, what in checks.evidence_rows(finding, _LIMITS)],
     }
 
 
