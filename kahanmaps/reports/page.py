@@ -29,6 +29,8 @@ from kahanmaps.version import __version__
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
 _LONGEST_SYSTEM = 200_000
 _MAX_EQUATIONS = 40
+# Commands with the words that belong to them, and words.
+_WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
 # Commands of text, for names with such characters, which latex2mathml would print as they stand.
 _TEXT_COMMANDS = {
     r"\textbackslash{}": r"\backslash ",
@@ -136,7 +138,9 @@ def mathml(latex: str) -> str:
     """
     from latex2mathml.converter import convert
 
-    known = latex
+    # A name of several letters would look like a product: it is set upright, apart from the factors beside it.
+    known = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
+    known = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", known)
     for command, other in _TEXT_COMMANDS.items():
         known = known.replace(command, other)
     try:

@@ -19,7 +19,7 @@ NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]
 RING = ring(NAMES)
 LONG = parse_polynomial("(x + y + 1)^6", ["x", "y"])
 MATHML = {"math", "mrow", "mi", "mn", "mo", "mfrac", "mstyle", "msup", "msub", "msubsup", "mtext", "mover"}
-MATHML |= {"mtable", "mtr", "mtd"}
+MATHML |= {"mtable", "mtr", "mtd", "mspace"}
 
 
 def pieces(html):
@@ -103,6 +103,14 @@ def test_terms_are_not_parted_within_braces_and_no_bracket_needs_its_partner():
 def test_names_of_every_kind_become_mathml(name):
     root = sound(latex_name(name))
     assert "b" not in {element.tag for element in root.iter()}
+
+
+def test_a_name_of_several_letters_does_not_look_like_a_product():
+    product, fraction = sound("2 px_1 x py"), sound(r"\frac{x px}{2} + \cdots\ \text{(10 terms)}")
+    upright = [one.text for one in product.iter("mi") if one.get("mathvariant") == "normal"]
+    assert upright == ["p", "x", "p", "y"]
+    assert len(list(product.iter("mspace"))) == 2
+    assert "(10\xa0terms)" in "".join(fraction.itertext())
 
 
 @pytest.mark.parametrize("wrong", [r"x \right)", r"\nothing x", r"\begin{aligned} x &= 1 \\ y &= 2 \end{aligned}"])
