@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.plots.portraits.equilibria import equilibria
+from kahanmaps.plots.portraits.flow import equilibria
 from kahanmaps.plots.portraits.trajectories import ensemble_for
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -36,27 +36,29 @@ def automatic_starts(
     ((16, 2), True)
     """
     plane = [index for index in plane if index < system.dim][:2]
-    best: tuple[int, FloatArray] | None = None
-    for centre in _centres(system):
+    # Equilibria, those first at which the field expands least, then those without negative coordinates; the origin.
+    order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
+    centres = [one.point for one in order[:_CENTRES]]
+    if all(centre.any() for centre in centres):
+        centres.append(np.zeros(system.dim))
+    found: list[tuple[int, FloatArray]] = []
+    for centre in centres:
         size = 3 * float(np.abs(centre[plane]).max()) or 1.5
-        # around the origin of a homogeneous field a smaller size is only a slower motion
-        for _ in range(1 if _is_scaled(system, centre) else _SIZES):
+        # Around the origin of a homogeneous field a smaller size is only a slower motion.
+        for _ in range(1 if system.is_homogeneous and not centre.any() else _SIZES):
             starts = _around(system, centre, size, plane)
             staying = _staying(system, eps, starts, centre, backward)
-            if best is None or staying > best[0]:
-                best = staying, starts
             if staying == COUNT:
                 return starts
+            found.append((staying, starts))
             size *= _SHRINK
-    if best is None:
-        raise AssertionError("no centre, and the origin is always one")
-    return best[1]
+    return max(found, key=lambda one: one[0])[1]
 
 
 def _around(system: QuadraticSystem, centre: FloatArray, size: float, plane: Sequence[int]) -> FloatArray:
     starts = np.tile(centre, (COUNT, 1))
     others = [index for index in range(system.dim) if index not in plane]
-    if _is_scaled(system, centre) and len(plane) == 2:
+    if system.is_homogeneous and not centre.any() and len(plane) == 2:
         angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # so that no symmetry takes one start to another
         starts[:, plane[0]] += size * np.cos(angles)
         starts[:, plane[1]] += size * np.sin(angles)
@@ -70,10 +72,6 @@ def _around(system: QuadraticSystem, centre: FloatArray, size: float, plane: Seq
     return starts
 
 
-def _is_scaled(system: QuadraticSystem, centre: FloatArray) -> bool:
-    return system.is_homogeneous and not centre.any()
-
-
 def _staying(system: QuadraticSystem, eps: Any, starts: FloatArray, centre: FloatArray, backward: bool) -> int:
     """How many of the orbits stay near the centre, and move at all."""
     points = np.concatenate(list(ensemble_for(system, eps, starts, _STEPS, backward=backward).records(_STEPS, 1)))
@@ -82,10 +80,3 @@ def _staying(system: QuadraticSystem, eps: Any, starts: FloatArray, centre: Floa
         moved = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
     reach = _FAR * np.abs(starts - centre).max()
     return int(((distance <= reach).all(axis=0) & moved).sum())
-
-
-def _centres(system: QuadraticSystem) -> list[FloatArray]:
-    """Equilibria, those first at which the field expands least, then those without negative coordinates; the origin."""
-    order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
-    centres = [one.point for one in order[:_CENTRES]]
-    return centres if any(not centre.any() for centre in centres) else [*centres, np.zeros(system.dim)]

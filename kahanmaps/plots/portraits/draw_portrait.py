@@ -1,32 +1,43 @@
-"""Phase portraits drawn: dots or lines of orbits, level curves below them, a bar for the colours."""
+"""Phase portraits drawn: dots or lines of orbits, the flow and level curves below them, a bar for the colours."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, new_figure, points
-from kahanmaps.plots.portraits.draw_flow import draw_flow
+from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, legend_above, new_figure, points
+from kahanmaps.plots.portraits.flow import CENTRE, DEGENERATE, FOCUS, NODE, SADDLE, Flow
 from kahanmaps.plots.portraits.portrait import Portrait
 from kahanmaps.plots.portraits.windows import Window, main_range
 from kahanmaps.plots.style import COLOUR_MAP, COLOURS, MARKS, Style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_LEVEL = {"colors": "#999999", "linewidths": 0.5}
-_EULER = "#BBBBBB"
 _ASPECT = 0.75
-_ENDS = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-_MOST_JOINED = 1_000_000  # points: ten seconds, half a gigabyte
-_MARKED = 40  # orbits whose starts are marked: of more they would cover the picture
-_FEW = 60  # points of an orbit, up to which each is worth a mark of its orbit's own
+_EULER, _LEVEL = "#BBBBBB", {"colors": "#999999", "linewidths": 0.5}
+_MAX_JOINED = 1_000_000  # points: ten seconds, half a gigabyte
+_MAX_RINGS = 40  # starts that are marked: more of them would cover the picture
+_MAX_MARKED = 60  # points of an orbit, up to which each is worth a mark of its orbit's own
+_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+
+_ARROWS: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
+_SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 2))}
+_SOLUTION = {"color": "#888888", "linewidth": 0.5}
+_FILLED: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
+_OPEN: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
+_EQUILIBRIA: dict[str, dict[str, Any]] = {
+    SADDLE: {"marker": "x", "markeredgecolor": "black", "markeredgewidth": 1.2, "markersize": 5},
+    CENTRE: {"marker": "o", "markersize": 5, **_OPEN},
+    FOCUS: {"marker": "D", "markersize": 4.5, **_OPEN},
+    NODE: {"marker": "s", "markersize": 5, **_FILLED},
+    DEGENERATE: {"marker": "*", "markersize": 7, **_FILLED},
+}
 
 
 def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = "") -> Figure:
@@ -34,39 +45,51 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
 
     `note` stands above the right corner, small. Raises InputError for more than a million points to be joined.
     """
-    if lines and found.points[..., 0].size > _MOST_JOINED:
-        raise InputError(
-            f"found {found.points[..., 0].size} points to join by lines, expected at most {_MOST_JOINED}: draw dots"
-        )
-    space = len(found.labels) == 3
+    count = found.points[..., 0].size
+    if lines and count > _MAX_JOINED:
+        raise InputError(f"found {count} points to join by lines, expected at most {_MAX_JOINED}: draw dots")
+    in_space = len(found.labels) == 3
     with drawing(style):
         import matplotlib as mpl
+        from matplotlib.collections import LineCollection
 
         figure = new_figure(style, _aspect(found, equal))
-        if space:
+        if in_space:
             mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
-        axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if space else {})
-        inside = _inside(found.points, found.window) if space else found.points
+        axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
         if found.flow is not None:
-            flow = found.flow
-            if space:
-                flow = replace(flow, solutions=tuple(_inside(x[:, None], found.window)[:, 0] for x in flow.solutions))
-            draw_flow(figure, axes, flow, style)
+            _draw_flow(figure, axes, found.flow, found.window if in_space else None, style)
         if found.levels is not None:
-            _draw_levels(axes, found)
+            pieces = [piece for pieces in found.levels.pieces for piece in pieces]
+            axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
         if found.euler is not None:
-            # in the plane lines go on to the edge; what is far beyond may be too large to draw
-            euler = _inside(found.euler, found.window if space else _around(found.window))
-            _draw_orbits(axes, euler, lines, [_EULER] * euler.shape[1])
-        if found.values is not None:
-            _draw_values(figure, axes, found, inside, lines)
-        elif inside.shape[1] <= len(COLOURS):
-            _draw_orbits(axes, inside, lines, list(COLOURS), found)
+            # In the plane lines go on to the edge; what is far beyond it may be too large to draw.
+            around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in found.window)
+            # Dashes, for in a grey copy the colours say less.
+            dashes: dict[str, Any] = {"linewidth": 0.6, "linestyle": (0, (5, 2)), "rasterized": count > RASTERISE_ABOVE}
+            for orbit in _inside(found.euler, found.window if in_space else around).swapaxes(0, 1):
+                if lines:
+                    axes.plot(*orbit.T, color=_EULER, zorder=1.5, **dashes)
+                else:
+                    points(axes, *orbit.T, color=_EULER, zorder=1.5, of=count)
+        # Axes in space do not cut off what lies outside of them.
+        shown = _inside(found.points, found.window) if in_space else found.points
+        if found.values is None and shown.shape[1] <= len(COLOURS):
+            _draw_few(axes, shown, lines, found)
+        elif found.values is None:
+            _draw_many(axes, shown, lines, found)
         else:
-            _draw_many(axes, inside, lines, found)
-        _finish(axes, found.labels, found.window)
-        _write_note(axes, note, style)
-        if space:
+            seen = found.values[~np.isnan(_inside(shown, found.window)).any(axis=2)]
+            low, high = main_range(seen)
+            drawn = _draw_coloured(axes, shown, found.values, range(shown.shape[1]), (low, high), lines, found)
+            beyond = bool((seen < low).any()), bool((seen > high).any())
+            how = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
+            figure.colorbar(drawn, ax=axes, **how).set_label(found.value_label)
+        for side, label, limits in zip("xyz", found.labels, found.window, strict=False):
+            axes.set(**{f"{side}label": label, f"{side}lim": limits})
+        if note:
+            axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
+        if in_space:
             _make_room(axes, found.window if equal else None)
         elif equal:
             axes.set_aspect("equal", adjustable="box")
@@ -83,43 +106,39 @@ def _aspect(found: Portrait, equal: bool) -> float:
     return float(min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if found.values is not None else 1.0))))
 
 
-def _draw_levels(axes: Axes, found: Portrait) -> None:
-    from matplotlib.collections import LineCollection
+def _draw_flow(figure: Figure, axes: Any, flow: Flow, window: Window | None, style: Style) -> None:
+    """What is drawn of the differential equation below the orbits, its equilibria above them, and a legend for it."""
+    handles: dict[str, Any] = {}
+    if len(flow.places):
+        axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
+    for word, curves, look in (("separatrix", flow.separatrices, _SEPARATRIX), ("flow", flow.solutions, _SOLUTION)):
+        for curve in curves:
+            inside = curve if window is None else _inside(curve[:, None], window)[:, 0]
+            (handles[word],) = axes.plot(*inside.T, zorder=1.2, **look)
+    for kind, point in flow.equilibria:
+        (handles[kind],) = axes.plot(*point[:, None], linestyle="none", zorder=4, clip_on=False, **_EQUILIBRIA[kind])
+    if handles:
+        legend_above(figure, list(handles.values()), list(handles), style)
 
-    assert found.levels is not None
-    pieces = [piece for pieces in found.levels.pieces for piece in pieces]
-    axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
 
-
-def _draw_orbits(axes: Any, shown: FloatArray, lines: bool, colours: list[str], found: Portrait | None = None) -> None:
-    """A colour and a mark for each of a few orbits; where there are many dots only the start gets the mark.
-
-    Without the portrait `found` they are those of another method, below.
-    """
+def _draw_few(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
+    """A colour and a mark for each orbit; where there are many dots only the start gets the mark."""
     count = shown.shape[0] * shown.shape[1]
-    below = found is None
-    for k in range(shown.shape[1]):
-        orbit = shown[:, k]
-        how: dict[str, Any] = {"color": colours[k % len(colours)], "zorder": 1.5 if below else 2}
+    for k, orbit in enumerate(shown.swapaxes(0, 1)):
+        how: dict[str, Any] = {"color": COLOURS[k], "zorder": 2}
+        is_marked = not lines and len(orbit) <= _MAX_MARKED
         if lines:
-            dashes: Any = (0, (5, 2)) if below else "-"  # in a grey copy the colours tell less
-            path = orbit if found is None else _path(orbit, found.pairs(k))
-            axes.plot(*path.T, linewidth=0.6, linestyle=dashes, rasterized=count > RASTERISE_ABOVE, **how)
+            pairs = found.pairs(k)
+            path = orbit
+            if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between the lines: plot takes many of them at once
+                ends = orbit[pairs]
+                path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
+            axes.plot(*path.T, linewidth=0.6, rasterized=count > RASTERISE_ABOVE, **how)
         else:
-            few = len(orbit) <= _FEW and not below
-            mark = {"markersize": 3.0, "marker": MARKS[k % len(MARKS)]} if few else {}
-            points(axes, *orbit.T, **mark, **how, of=count)
-        if not below and (lines or len(orbit) > _FEW):
-            start = {"marker": MARKS[k % len(MARKS)], "markersize": 4.0, "markeredgecolor": "white"}
-            axes.plot(*orbit[:1].T, linestyle="none", markeredgewidth=0.5, **start, **{**how, "zorder": 3})
-
-
-def _path(orbit: FloatArray, pairs: NDArray[np.int64]) -> FloatArray:
-    """Points with NaN between the lines that join them, as plot takes many lines at once."""
-    if (pairs[:, 1] == pairs[:, 0] + 1).all():
-        return orbit
-    ends = orbit[pairs]
-    return np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
+            points(axes, *orbit.T, **how, **({"markersize": 3.0, "marker": MARKS[k]} if is_marked else {}), of=count)
+        if not is_marked:
+            start = {"marker": MARKS[k], "markersize": 4.0, "markeredgecolor": "white", "markeredgewidth": 0.5}
+            axes.plot(*orbit[:1].T, linestyle="none", **start, **{**how, "zorder": 3})
 
 
 def _draw_many(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
@@ -131,84 +150,57 @@ def _draw_many(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> No
         scale = extent.max(axis=0, initial=0)
         order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
     numbers = np.broadcast_to(np.arange(orbits, dtype=np.float64), shown.shape[:2])
-    pairs = [found.pairs(int(k)) for k in order] if lines else None
-    _draw_coloured(axes, shown[:, order], numbers[:, order], pairs, (0.0, orbits - 1.0))
-    if orbits <= _MARKED:
+    _draw_coloured(axes, shown, numbers, order, (0.0, orbits - 1.0), lines, found)
+    if orbits <= _MAX_RINGS:
         how = {"markeredgecolor": "black", "markeredgewidth": 0.5, "markerfacecolor": "white", "zorder": 3}
         axes.plot(*shown[0].T, linestyle="none", marker="o", markersize=2.6, **how)
 
 
-def _draw_values(figure: Figure, axes: Any, found: Portrait, shown: FloatArray, lines: bool) -> None:
-    assert found.values is not None
-    seen = found.values[~np.isnan(_inside(shown, found.window)).any(axis=2)]
-    low, high = main_range(seen)
-    beyond = (bool((seen < low).any()), bool((seen > high).any()))
-    pairs = [found.pairs(k) for k in range(shown.shape[1])] if lines else None
-    drawn = _draw_coloured(axes, shown, found.values, pairs, (low, high))
-    pad = 0.1 if len(found.labels) == 3 else 0.02
-    bar = figure.colorbar(drawn, ax=axes, pad=pad, aspect=30, extend=_ENDS[beyond])
-    bar.set_label(found.value_label)
-
-
 def _draw_coloured(
-    axes: Any, shown: FloatArray, values: FloatArray, joined: list[Any] | None, limits: tuple[float, float]
+    axes: Any,
+    shown: FloatArray,
+    values: FloatArray,
+    order: Any,
+    limits: tuple[float, float],
+    lines: bool,
+    found: Portrait,
 ) -> Any:
-    """Dots, or the lines that join these pairs of records of each orbit, in the colours of the values."""
+    """Dots of the orbits in this order, or the lines that join them, in the colours of the values."""
+    import matplotlib as mpl
     from matplotlib.collections import LineCollection
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import ListedColormap, Normalize
 
-    norm = Normalize(*limits)
-    count = shown.shape[0] * shown.shape[1]
-    if joined is None:
-        shown, values = shown.swapaxes(0, 1), values.swapaxes(0, 1)  # orbit after orbit
-        there = ~np.isnan(shown).any(axis=2)
-        size = {"s": dot_size(count) ** 2, "linewidths": 0, "rasterized": count > RASTERISE_ABOVE, "zorder": 2}
-        more = {"depthshade": False} if shown.shape[2] == 3 else {}
-        return axes.scatter(*shown[there].T, c=values[there], norm=norm, cmap=_on_white(), **size, **more)
-    pairs = np.concatenate([shown[found, k] for k, found in enumerate(joined)])
-    colours = np.concatenate([values[found[:, 0], k] for k, found in enumerate(joined)])
-    there = ~np.isnan(pairs).any(axis=(1, 2))
-    how: dict[str, Any] = {"norm": norm, "cmap": _on_white(), "linewidths": 0.6, "rasterized": count > RASTERISE_ABOVE}
-    if shown.shape[2] == 3:
+    # Without the lightest part of the map: dots are small, and paper is white.
+    colours = ListedColormap(mpl.colormaps[COLOUR_MAP](np.linspace(0, 0.78, 256)))
+    is_image = shown.shape[0] * shown.shape[1] > RASTERISE_ABOVE
+    how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colours, "rasterized": is_image, "zorder": 2}
+    in_space, order = shown.shape[2] == 3, list(order)
+    if not lines:
+        ordered, heights = shown[:, order].swapaxes(0, 1), values[:, order].swapaxes(0, 1)
+        there = ~np.isnan(ordered).any(axis=2)
+        how |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
+        return axes.scatter(*ordered[there].T, c=heights[there], **how)
+    joined = [(found.pairs(int(k)), k) for k in order]
+    ends = np.concatenate([shown[pairs, k] for pairs, k in joined])
+    heights = np.concatenate([values[pairs[:, 0], k] for pairs, k in joined])
+    there = ~np.isnan(ends).any(axis=(1, 2))
+    if in_space:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-        collection: Any = axes.add_collection3d(Line3DCollection(pairs[there], **how), autolim=False)
+        del how["zorder"]
+        collection: Any = axes.add_collection3d(Line3DCollection(ends[there], linewidths=0.6, **how), autolim=False)
     else:
-        collection = axes.add_collection(LineCollection(list(pairs[there]), zorder=2, **how), autolim=False)
-    collection.set_array(colours[there])
+        collection = axes.add_collection(LineCollection(list(ends[there]), linewidths=0.6, **how), autolim=False)
+    collection.set_array(heights[there])
     return collection
 
 
-def _on_white() -> Any:
-    """The map of colours without its lightest part: dots are small, and paper is white."""
-    import matplotlib as mpl
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap(mpl.colormaps[COLOUR_MAP](np.linspace(0, 0.78, 256)))
-
-
 def _inside(shown: FloatArray, window: Window) -> FloatArray:
-    """NaN for points outside the window: axes in space do not cut them off."""
+    """NaN for points outside the window."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     with np.errstate(invalid="ignore"):
         inside = np.all((shown >= low) & (shown <= high), axis=2)
     return np.where(np.asarray(inside)[..., None], shown, np.nan)
-
-
-def _around(window: Window) -> Window:
-    return tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in window)
-
-
-def _finish(axes: Any, labels: tuple[str, ...], window: Window) -> None:
-    sides = "xyz"[: len(labels)]
-    for side, label, limits in zip(sides, labels, window, strict=True):
-        getattr(axes, f"set_{side}label")(label)
-        getattr(axes, f"set_{side}lim")(*limits)
-
-
-def _write_note(axes: Any, note: str, style: Style) -> None:
-    if note:
-        axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
 
 
 def _make_room(axes: Any, window: Window | None) -> None:
@@ -216,8 +208,6 @@ def _make_room(axes: Any, window: Window | None) -> None:
 
     With a window the box has the proportions of its sides. Of the twelve edges matplotlib draws those of three planes.
     """
-    from itertools import combinations, product
-
     from matplotlib.ticker import MaxNLocator
 
     axes.set_box_aspect(None if window is None else [high - low for low, high in window], zoom=0.84)
@@ -225,9 +215,9 @@ def _make_room(axes: Any, window: Window | None) -> None:
         axis.pane.set_facecolor("white")
         axis.pane.set_edgecolor("#BBBBBB")
         axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], prune="both"))
+        axis.labelpad = 0
     limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
     for one, other in combinations(product(*limits), 2):
         if sum(a != b for a, b in zip(one, other, strict=True)) == 1:
             axes.plot(*zip(one, other, strict=True), color="#BBBBBB", linewidth=0.4, zorder=0)
     axes.tick_params(pad=0)
-    axes.xaxis.labelpad = axes.yaxis.labelpad = axes.zaxis.labelpad = 0

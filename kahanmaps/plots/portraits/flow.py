@@ -8,24 +8,90 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from flint import fmpq
+from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.portraits.equilibria import SADDLE, Equilibrium, isolated_equilibria
 from kahanmaps.plots.portraits.trajectories import Trajectories
 from kahanmaps.plots.portraits.windows import Window, window_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
+SADDLE, CENTRE, FOCUS, NODE, DEGENERATE = "saddle", "centre", "focus", "node", "degenerate equilibrium"
+_NEWTON_STARTS = 60
+_MAX_DIMENSION = 20  # in which more than the origin and (1, ..., 1) are taken as starts
+_ZERO = 1e-7  # parts of eigenvalues, relative to the largest
 _ARROWS = 21  # along each side
 _FINE = 400  # steps of a curve across the window
-_LONGEST = 6000  # steps: fifteen times across
+_MAX_STEPS = 6000  # fifteen times across
 _SLOW = 1e-4  # of the largest speed in the window: near an equilibrium curves stop
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A point with f = 0 and the eigenvalues of the derivative f' there, with its eigenvectors as columns."""
+
+    point: FloatArray
+    values: NDArray[Any]
+    vectors: NDArray[Any]
+
+    @property
+    def expansion(self) -> float:
+        """The largest real part of an eigenvalue."""
+        return round(float(self.values.real.max()), 6)
+
+    @property
+    def kind(self) -> str:
+        """What the eigenvalues say: a centre is one of the linear part, and terms of degree 2 may undo it."""
+        values, real = self.values, self.values.real
+        least = _ZERO * max(float(np.abs(values).max()), _ZERO)
+        if (np.abs(values) <= least).any():
+            return DEGENERATE
+        if (real > least).any() and (real < -least).any():
+            return SADDLE
+        if (np.abs(real) <= least).all():
+            return CENTRE
+        if (np.abs(real) <= least).any():
+            return DEGENERATE
+        return FOCUS if (np.abs(values.imag) > least).any() else NODE
+
+
+def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
+    """The real equilibria to which Newton's method comes from sixty starts, each once.
+
+    >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
+    >>> sorted((one.point.round(6).tolist(), one.kind) for one in equilibria(pendulum))
+    [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'centre')]
+    """
+    n = system.dim
+    f = VectorField(system)
+    drawn = np.random.default_rng(0).uniform(-3, 3, (_NEWTON_STARTS if n <= _MAX_DIMENSION else 0, n))
+    found: list[Equilibrium] = []
+    for x in (np.zeros(n), np.ones(n), *drawn):
+        point = _newton(f, x)
+        # Where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough.
+        if point is not None and not any(np.allclose(point, other.point, atol=1e-3) for other in found):
+            found.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
+    return found
+
+
+def _newton(f: VectorField, x: FloatArray) -> FloatArray | None:
+    for _ in range(40):
+        value = f(x)
+        scale = 1 + float(np.abs(x).max())
+        if np.abs(value).max() <= 1e-12 * scale:
+            nearest = np.round(x, 9)
+            return nearest if np.abs(f(nearest)).max() <= 1e-12 * scale else x
+        x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
+        if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
+            return None
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,28 +119,31 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     >>> [kind for kind, _ in saddle.equilibria], len(saddle.separatrices)
     (['saddle'], 4)
     """
-    nothing = Flow(np.zeros((0, 2)), np.zeros((0, 2)))
     if system.dim != 2 or sorted(plane) != [0, 1]:
-        return nothing
-    order = list(plane)
+        return Flow(np.zeros((0, 2)), np.zeros((0, 2)))
+    order = list(plane)  # its own inverse
     low, high = (np.array(side) for side in zip(*window, strict=True))
     f = VectorField(system)
     middles = (np.arange(_ARROWS) + 0.5) / _ARROWS
     places = low + (high - low) * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
-    arrows = f(_swapped(places, order))[:, order] / (high - low)
+    arrows = f(places[:, order])[:, order] / (high - low)
     length = np.linalg.norm(arrows, axis=1, keepdims=True)
     with np.errstate(all="ignore"):
         arrows = np.where(length > 0, arrows / length, 0)
-    found = isolated_equilibria(system)
-    shown = [one for one in found if np.all((one.point[order] >= low) & (one.point[order] <= high))]
-    box = tuple(window[order.index(k)] for k in range(2))
-    branches = [curve for one in shown if one.kind == SADDLE for curve in _branches(f, one, box)]
-    return Flow(
-        places,
-        arrows,
-        tuple((one.kind, one.point[order]) for one in shown),
-        tuple(curve[:, order] for curve in branches),
-    )
+    every = equilibria(system)
+    if len(every) > 2**system.dim:  # more than conics have in common: they fill curves
+        every = []
+    shown = [one for one in every if np.all((one.point[order] >= low) & (one.point[order] <= high))]
+    box = tuple(window[k] for k in order)
+    size = np.array([b - a for a, b in box])
+    branches = []
+    for saddle in (one for one in shown if one.kind == SADDLE):
+        for value, vector in zip(saddle.values.real, saddle.vectors.real.T, strict=True):
+            offset = vector / np.linalg.norm(vector / size) * 1e-3
+            for start in (saddle.point + offset, saddle.point - offset):
+                branches.append(np.vstack([saddle.point, _curve(f, start, box, np.copysign(np.inf, value))]))
+    kinds = tuple((one.kind, one.point[order]) for one in shown)
+    return Flow(places, arrows, kinds, tuple(curve[:, order] for curve in branches))
 
 
 def solutions(
@@ -110,41 +179,25 @@ def projected_solutions(
     return tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves)
 
 
-def _branches(f: VectorField, saddle: Equilibrium, box: Window) -> list[FloatArray]:
-    """The four curves that leave a saddle or come to it."""
-    values, vectors = np.linalg.eig(saddle.jacobian)
-    size = np.array([high - low for low, high in box])
-    made = []
-    for value, vector in zip(values.real, vectors.real.T, strict=True):
-        offset = vector / np.linalg.norm(vector / size) * 1e-3
-        made += [
-            np.vstack([saddle.point, _curve(f, saddle.point + side * offset, box, np.copysign(np.inf, value))])
-            for side in (1, -1)
-        ]
-    return made
-
-
 def _curve(f: VectorField, start: FloatArray, box: Window, time: float | None) -> FloatArray:
     low, high = (np.array(side, dtype=np.float64) for side in zip(*box, strict=True))
-    size = high - low
-    middle, step = (low + high) / 2, 1 / _FINE
+    size, middle, step = high - low, (low + high) / 2, 1 / _FINE
     sign = -1.0 if time is not None and time < 0 else 1.0
 
     def speed(x: FloatArray) -> float:
         return float(np.linalg.norm(f(x) / size))
-
-    corners = np.stack([low, high, middle])
-    stop = _SLOW * max(map(speed, (*corners, start)))
 
     def direction(x: FloatArray) -> FloatArray:
         value: FloatArray = sign * f(x)
         found = float(np.linalg.norm(value / size))
         return value / found if found > 0 else value
 
+    stop = _SLOW * max(map(speed, (low, high, middle, start)))
     points, x, spent = [start], start, 0.0
-    for count in range(_LONGEST):
+    for count in range(_MAX_STEPS):
         pace = speed(x)
         spent += step / pace if pace > 0 else np.inf
+        # Separatrices begin slowly, at their saddle, and have all the time.
         slow = pace <= stop and (count > 2 * _FINE or not np.isinf(time or 0.0))
         if slow or (time is not None and spent > abs(time)) or np.abs((x - middle) / size).max() > 1.5:
             break
@@ -159,9 +212,3 @@ def _curve(f: VectorField, start: FloatArray, box: Window, time: float | None) -
             break
         points.append(x)
     return np.array(points)
-
-
-def _swapped(places: FloatArray, order: Sequence[int]) -> FloatArray:
-    found = np.empty_like(places)
-    found[:, list(order)] = places
-    return found

@@ -41,16 +41,15 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     """
     first = points[:0] if starts is None else starts
     reach = float(np.abs(first[np.isfinite(first)]).max(initial=0))
-    return tuple(_range(column, wanted, reach) for column, wanted in zip(points.T, first.T, strict=True))
-
-
-def _range(column: FloatArray, wanted: FloatArray, reach: float) -> tuple[float, float]:
-    low, high = main_range(column, wanted)
-    if 0 < _UNBOUNDED * reach < max(-low, high):
-        low, high = main_range(column[np.abs(column) <= _SHOWN * reach], wanted)
-    unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
-    margin = (high / unit - low / unit) * _MARGIN
-    return (low / unit - margin) * unit, (high / unit + margin) * unit
+    window = []
+    for column, wanted in zip(points.T, first.T, strict=True):
+        low, high = main_range(column, wanted)
+        if 0 < _UNBOUNDED * reach < max(-low, high):
+            low, high = main_range(column[np.abs(column) <= _SHOWN * reach], wanted)
+        unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
+        margin = (high / unit - low / unit) * _MARGIN
+        window.append(((low / unit - margin) * unit, (high / unit + margin) * unit))
+    return tuple(window)
 
 
 def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[float, float]:
@@ -60,30 +59,22 @@ def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[fl
     ((1.0, 2.0), (4.5, 5.5))
     """
     values = np.clip(values[np.isfinite(values)], -_LARGEST, _LARGEST)
-    if not len(values):
-        return -1.0, 1.0
-    low, high = float(values.min()), float(values.max())
-    unit = max(abs(low), abs(high))
+    unit = float(np.abs(values).max(initial=0))
     if unit == 0:
         return -1.0, 1.0
-    first, last = _most(values, unit)
-    wanted = values[:0] if wanted is None else np.clip(wanted[np.isfinite(wanted)], -_LARGEST, _LARGEST)
-    if len(wanted):
-        low_start, high_start = _most(wanted, unit)
-        first, last = min(first, low_start), max(last, high_start)
-    low, high = low / unit, high / unit
+    parts = [values]
+    if wanted is not None and len(wanted := np.clip(wanted[np.isfinite(wanted)], -_LARGEST, _LARGEST)):
+        parts.append(wanted)
+    # What all but a tenth at either end fill, in a unit in which nothing overflows.
+    ends = [np.percentile(part, [_SHARE, 100 - _SHARE], method="nearest") / unit for part in parts]
+    first, last = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
+    low, high = float(values.min()) / unit, float(values.max()) / unit
     if low < first - _REACH * (last - first) or high > last + _REACH * (last - first):
         low = max(low, first - (last - first) / 2)
         high = min(high, last + (last - first) / 2)
     if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding: it stands in the middle
         low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
     return low * unit, high * unit
-
-
-def _most(values: FloatArray, unit: float) -> tuple[float, float]:
-    """The range of all but a tenth at either end."""
-    low, high = np.percentile(values, [_SHARE, 100 - _SHARE], method="nearest") / unit
-    return float(low), float(high)
 
 
 def require_window(numbers: Sequence[float], axes: int) -> Window:
