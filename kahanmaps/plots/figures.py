@@ -12,6 +12,7 @@ A drawing function is `draw_...(values, style) -> Figure`; it makes its figure b
 from __future__ import annotations
 
 import io
+import math
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -37,6 +38,8 @@ FORMATS = ("pdf", "svg", "png")
 RASTERISE_ABOVE = 20_000
 _LETTER = 0.5  # the width of a letter on average, in its height
 _LONGEST = 40  # digits of a number
+_BAND_COLOUR, _BAND_SHARE = "#e8e8e8", 0.09  # where a logarithmic axis shows zeros; of its height
+_MAX_TICKS = 6
 _HANDLE = 5.0  # of a legend, the line or mark with the space around it, in heights of a letter
 
 
@@ -193,6 +196,35 @@ def beside(axes: Axes, text: str, at: Any, offset: tuple[float, float], halo: fl
 
         how["path_effects"] = [withStroke(linewidth=halo, foreground="white")]
     axes.annotate(text, at, xytext=offset, textcoords="offset points", **how)
+
+
+def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: bool) -> float | None:
+    """Make the vertical axis logarithmic for positive values from `least` to `largest`; return the height for zeros.
+
+    An exact zero has its place at that height, in a grey band at the bottom that is marked 0. None where there are no
+    zeros: then there is no band.
+    """
+    axes.set_yscale("log")
+    low, high = math.log10(least), math.log10(largest)
+    margin = max(0.04 * (high - low), 0.1)
+    low, high = low - margin, high + margin
+    if not has_zeros:
+        axes.set_ylim(10**low, 10**high)
+        return None
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    below = low - _BAND_SHARE / (1 - _BAND_SHARE) * (high - low)
+    zero = 10 ** ((below + low) / 2)
+    axes.set_ylim(10**below, 10**high)
+    axes.axhspan(10**below, 10**low, color=_BAND_COLOUR, linewidth=0, zorder=0)
+    powers = range(math.ceil(low), math.floor(high) + 1)
+    every = max(1, -(-len(powers) // _MAX_TICKS))
+    # Ticks of powers stop above the band, where the scale means nothing.
+    axes.yaxis.set_major_locator(FixedLocator([10.0**k for k in powers[::every]]))
+    axes.yaxis.set_minor_locator(NullLocator())
+    where = ("axes fraction", "data")
+    beside(axes, "0", (0, zero), (-3, 0), xycoords=where, ha="right", va="center", fontsize="small")
+    return zero
 
 
 def dot_size(count: int) -> float:

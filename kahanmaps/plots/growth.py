@@ -12,12 +12,12 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-from kahanmaps.plots.curves.zero_band import log_scale_with_zero
 from kahanmaps.plots.figures import (
     drawing,
     label_number,
     legend_above,
     legend_height,
+    log_scale_with_zero,
     new_figure,
     plain,
     shortened_name,

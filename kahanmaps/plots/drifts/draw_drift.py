@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
-from kahanmaps.plots.curves.zero_band import log_scale_with_zero
-from kahanmaps.plots.drifts.drift import METHODS, DriftCurve, DriftSurvey
-from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, wrapped
+from kahanmaps.plots.drifts.drift import METHODS, DriftSurvey
+from kahanmaps.plots.figures import (
+    drawing,
+    label_number,
+    legend_above,
+    legend_height,
+    log_scale_with_zero,
+    new_figure,
+    wrapped,
+)
 from kahanmaps.plots.style import COLOURS, LINES, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 SCALES = ("loglog", "semilog")
 _PANEL = 5.5  # centimetres that a panel needs beside another
@@ -35,10 +41,15 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
         raise InputError(f"found the scale {scale[:40]!r}, expected {' or '.join(SCALES)}")
     style = style or Style()
     count = len(survey.labels)
-    columns = _columns(count, style.width)
+    columns = 1 if count <= 3 else 3 if count > 4 and style.width >= 3 * _PANEL else 2
+    if count <= 3 and style.width >= _PANEL * count:
+        columns = count
     rows = -(-count // columns)
     with drawing(style):
-        labels = _methods(survey)
+        from matplotlib.lines import Line2D
+
+        ended = {method: "" if end.is_whole else f" (ended at step {end.steps})" for method, end in survey.ends.items()}
+        labels = [METHODS[method] + word for method, word in ended.items()]
         panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
         aspect = panel * rows + legend_height(labels, style, title=True)
         figure = new_figure(style, aspect)
@@ -46,8 +57,7 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for axes, name in zip(panels, survey.labels, strict=False):
             _draw_panel(axes, survey, name, scale)
-            kind = "relative" if survey.relative[name] else "absolute"
-            label = f"{kind} error of {survey.labels[name]}"
+            label = f"{'relative' if survey.relative[name] else 'absolute'} error of {survey.labels[name]}"
             axes.set_ylabel(label if label.endswith("$") else wrapped(label, room, style.font_size, most=2))
         for k, axes in enumerate(panels):
             if k >= count:
@@ -56,7 +66,8 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
                 axes.set_xlabel("step $n$")
                 axes.tick_params(labelbottom=True)
         title = rf"time step $2\varepsilon = {label_number(time_step(survey.eps))}$"
-        legend_above(figure, [_handle(method) for method in survey.ends], labels, style, title)
+        handles = [Line2D([], [], linewidth=0.9, **_look(method)) for method in survey.ends]
+        legend_above(figure, handles, labels, style, title)
     return figure
 
 
@@ -69,10 +80,9 @@ def clipped_from(survey: DriftSurvey, name: str) -> float:
     return max([_LOST, *(10 * float(errors.max()) for errors in whole if len(errors))])
 
 
-def _columns(count: int, width: float) -> int:
-    if width >= _PANEL * count and count <= 3:
-        return count
-    return 1 if count <= 3 else 3 if count > 4 and width >= 3 * _PANEL else 2
+def _look(method: str) -> dict[str, Any]:
+    k = list(METHODS).index(method)
+    return {"color": COLOURS[k], "linestyle": LINES[k]}
 
 
 def _draw_panel(axes: Axes, survey: DriftSurvey, name: str, scale: str) -> None:
@@ -88,33 +98,12 @@ def _draw_panel(axes: Axes, survey: DriftSurvey, name: str, scale: str) -> None:
     else:
         axes.set_xlim(0, survey.steps)
     for curve in curves:
-        _draw_curve(axes, curve, zero, limit, survey.ends[curve.method].is_whole)
-
-
-def _draw_curve(axes: Axes, curve: DriftCurve, zero: float | None, limit: float, is_whole: bool) -> None:
-    if not len(curve.steps):
-        return
-    k = list(METHODS).index(curve.method)
-    heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
-    marker = "o" if len(heights) == 1 else None
-    axes.plot(curve.steps, heights, color=COLOURS[k], linestyle=LINES[k], linewidth=0.9, marker=marker)
-    above = np.flatnonzero(heights > limit)
-    if len(above):
-        axes.plot(curve.steps[above[:1]], [limit], color=COLOURS[k], marker="^", markersize=5, clip_on=False)
-    elif not is_whole:
-        axes.plot(curve.steps[-1:], heights[-1:], color=COLOURS[k], marker="x", markersize=5, clip_on=False)
-
-
-def _methods(survey: DriftSurvey) -> list[str]:
-    """The lines of the legend, with the step at which an orbit ended early."""
-    return [
-        METHODS[method] + ("" if end.is_whole else f" (ended at step {end.steps})")
-        for method, end in survey.ends.items()
-    ]
-
-
-def _handle(method: str) -> Line2D:
-    from matplotlib.lines import Line2D
-
-    k = list(METHODS).index(method)
-    return Line2D([], [], color=COLOURS[k], linestyle=LINES[k], linewidth=0.9)
+        look = _look(curve.method)
+        heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
+        axes.plot(curve.steps, heights, linewidth=0.9, marker="o" if len(heights) == 1 else None, **look)
+        end = {"color": look["color"], "markersize": 5, "clip_on": False}
+        beyond = np.flatnonzero(heights > limit)
+        if len(beyond):
+            axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
+        elif len(heights) and not survey.ends[curve.method].is_whole:
+            axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)

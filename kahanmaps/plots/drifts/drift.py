@@ -30,9 +30,9 @@ METHODS = {
 BINS = 200
 MAX_STEPS = 10**9
 MAX_FUNCTIONS = 6
-_TRIED = 40  # random starts
-_HALVED = 5  # of them before the next ones are half as large
-_PROBE = 1000  # steps
+_RANDOM_STARTS = 40
+_OF_ONE_SIZE = 5  # of them; the next ones are half as large
+_PROBE_STEPS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +81,8 @@ def survey_drift(
 ) -> DriftSurvey:
     """Errors |I(x_n) - I(x_0)|/|I(x_0)| of functions along the orbits of several methods, `steps` steps each.
 
-    Every step is looked at; kept is the largest error in each of about 200 bins, which are equally long or (by
-    default) grow with n, so memory does not grow with `steps`. `eps` (half the time step) and `start` are exact;
+    Kept is the maximum over each of about 200 bins of steps, which are equally long or (by default) grow with n, so
+    memory does not grow with `steps`. `eps` (half the time step) and `start` are exact;
     `methods` are names of METHODS, and "normal-form" needs `form`. Raises InputError for wrong values, and where a
     function has no value at the start.
 
@@ -106,11 +106,27 @@ def survey_drift(
             f"found a start with {counted(len(point), 'coordinate')}, expected {system.dim}: "
             f"{', '.join(system.variables)}"
         )
-    origins = [_origin(function, point) for function in functions]
+    origins: list[tuple[float, float]] = []  # the value at the start, and what errors are divided by
+    relative: dict[str, bool] = {}
+    for function in functions:
+        exact, value = function.at(point), float(function(to_floats(point)[None])[0])
+        if exact is None or not np.isfinite(value):
+            raise InputError(f"{function.name} has no value in machine numbers at the start: take another start")
+        # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
+        relative[function.name] = exact != 0 and value != 0.0
+        origins.append((value, abs(value) if relative[function.name] else 1.0))
     edges = _edges(steps, linear_bins)
     curves, ends = [], {}
     for method in methods:
-        orbit = _orbit(system, eps, point, steps, method, form)
+        orbit: Any
+        if method not in METHODS:
+            raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
+        if method == "normal-form" and form is None:
+            raise InputError("the method normal-form needs a normal form, and there is none")
+        if method in ("generic", "normal-form"):
+            orbit = FloatOrbit(system, eps, point, steps, form=form if method == "normal-form" else None)
+        else:
+            orbit = ClassicalOrbit(system, eps, point, steps, method)
         bins = [_Bins(edges) for _ in functions]
         for step, points in orbit.portions():
             if step:  # the start is where errors are 0 by definition
@@ -120,15 +136,8 @@ def survey_drift(
             progress(f"{METHODS[method]}: step {step} of {steps}")
         ends[method] = orbit.end
         curves += [held.curve(method, function.name) for function, held in zip(functions, bins, strict=True)]
-    return DriftSurvey(
-        eps,
-        point,
-        steps,
-        {function.name: function.label for function in functions},
-        {function.name: scale is not _ABSOLUTE for function, (_, scale) in zip(functions, origins, strict=True)},
-        tuple(curves),
-        ends,
-    )
+    labels = {function.name: function.label for function in functions}
+    return DriftSurvey(eps, point, steps, labels, relative, tuple(curves), ends)
 
 
 def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq, ...]:
@@ -141,44 +150,17 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
     (1/2, 2/3)
     """
     rng = random.Random(f"drift {seed}")
-    starts = [
-        tuple(
-            fmpq(rng.choice((-1, 1)) * rng.randint(1, 6), rng.randint(9, 16) << k // _HALVED) for _ in range(system.dim)
-        )
-        for k in range(_TRIED)
-    ]
+    starts = []
+    for k in range(_RANDOM_STARTS):
+        sizes = ((rng.choice((-1, 1)) * rng.randint(1, 6), rng.randint(9, 16)) for _ in range(system.dim))
+        starts.append(tuple(fmpq(p, q << k // _OF_ONE_SIZE) for p, q in sizes))
     for start in starts:
-        orbit = ClassicalOrbit(system, eps, start, _PROBE, "rk4")
+        orbit = ClassicalOrbit(system, eps, start, _PROBE_STEPS, "rk4")
         for _ in orbit.portions():
             pass
         if orbit.end is not None and orbit.end.is_whole:
             return start
     return starts[0]
-
-
-_ABSOLUTE = 1.0
-
-
-def _origin(function: WatchedFunction, start: Sequence[fmpq]) -> tuple[float, float]:
-    """The value at the start in doubles, and what errors are divided by."""
-    exact = function.at(start)
-    value = float(function(to_floats(start)[None])[0])
-    if exact is None or not np.isfinite(value):
-        raise InputError(f"{function.name} has no value in machine numbers at the start: take another start")
-    # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
-    return value, _ABSOLUTE if exact == 0 or value == 0.0 else float(np.abs(value))
-
-
-def _orbit(
-    system: QuadraticSystem, eps: fmpq, start: Sequence[fmpq], steps: int, method: str, form: NormalForm | None
-) -> Any:
-    if method not in METHODS:
-        raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
-    if method not in ("generic", "normal-form"):
-        return ClassicalOrbit(system, eps, start, steps, method)
-    if method == "normal-form" and form is None:
-        raise InputError("the method normal-form needs a normal form, and there is none")
-    return FloatOrbit(system, eps, start, steps, form=form if method == "normal-form" else None)
 
 
 def _edges(steps: int, linear: bool) -> NDArray[np.int64]:

@@ -160,7 +160,7 @@ def _draw_coloured(
     axes: Any,
     shown: FloatArray,
     values: FloatArray,
-    order: Any,
+    order: Iterable[int],
     limits: tuple[float, float],
     lines: bool,
     found: Portrait,
@@ -174,9 +174,10 @@ def _draw_coloured(
     colours = ListedColormap(mpl.colormaps[COLOUR_MAP](np.linspace(0, 0.78, 256)))
     is_image = shown.shape[0] * shown.shape[1] > RASTERISE_ABOVE
     how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colours, "rasterized": is_image, "zorder": 2}
-    in_space, order = shown.shape[2] == 3, list(order)
+    in_space = shown.shape[2] == 3
     if not lines:
-        ordered, heights = shown[:, order].swapaxes(0, 1), values[:, order].swapaxes(0, 1)
+        first = list(order)
+        ordered, heights = shown[:, first].swapaxes(0, 1), values[:, first].swapaxes(0, 1)
         there = ~np.isnan(ordered).any(axis=2)
         how |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
         return axes.scatter(*ordered[there].T, c=heights[there], **how)
