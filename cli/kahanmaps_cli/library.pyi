@@ -184,7 +184,6 @@ from kahanmaps.plots.curves.level_sets import LevelCurves as LevelCurves
 from kahanmaps.plots.curves.level_sets import level_curves as level_curves
 from kahanmaps.plots.curves.level_sets import levels_through as levels_through
 from kahanmaps.plots.curves.plane_views import view_of as view_of
-from kahanmaps.plots.degree_records import degrees_of_record as degrees_of_record
 from kahanmaps.plots.draw_squares import draw_squares as draw_squares
 from kahanmaps.plots.drifts.draw_drift import clipped_from as clipped_from
 from kahanmaps.plots.drifts.draw_drift import draw_drift as draw_drift
@@ -203,8 +202,9 @@ from kahanmaps.plots.figures import require_matplotlib as require_matplotlib
 from kahanmaps.plots.figures import write_title as write_title
 from kahanmaps.plots.growth import draw_degrees as draw_degrees
 from kahanmaps.plots.growth import draw_heights as draw_heights
-from kahanmaps.plots.height_curves import curves_of_record as curves_of_record
-from kahanmaps.plots.height_curves import height_curves as height_curves
+from kahanmaps.plots.growth_records import curves_of_record as curves_of_record
+from kahanmaps.plots.growth_records import degrees_of_record as degrees_of_record
+from kahanmaps.plots.growth_records import height_curves as height_curves
 from kahanmaps.plots.point_functions import PointFunction as PointFunction
 from kahanmaps.plots.portraits.automatic_starts import automatic_starts as automatic_starts
 from kahanmaps.plots.portraits.draw_portrait import draw_portrait as draw_portrait

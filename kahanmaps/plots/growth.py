@@ -22,7 +22,7 @@ from kahanmaps.plots.figures import (
     plain,
     shortened_name,
 )
-from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
+from kahanmaps.plots.growth_records import HeightCurve, fit_of, height_curves
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SCALES = ("linear", "log", "loglog")
-_MOST_SYSTEMS = len(COLOURS)
-_LONGEST_FORMULA = 24
+_MAX_SYSTEMS = len(COLOURS)
+_MAX_FORMULA = 24  # letters
 _MARKS = 30  # of one orbit
 _ASPECT = 0.62  # of the axes
 
@@ -53,21 +53,44 @@ def draw_degrees(
     >>> figure.legends[0].get_texts()[0].get_text()
     'Euler top: $d_n = 2n^{2} + 1$, $\\\\lambda = 1$'
     """
-    if not 1 <= len(growths) <= _MOST_SYSTEMS:
-        raise InputError(f"found {len(growths)} systems, expected 1 to {_MOST_SYSTEMS} in one picture")
+    if not 1 <= len(growths) <= _MAX_SYSTEMS:
+        raise InputError(f"found {len(growths)} systems, expected 1 to {_MAX_SYSTEMS} in one picture")
     style = style or Style()
     is_log = any(one.looks_exponential or one.growth is Growth.EXPONENTIAL for one in growths.values())
     scale = _scale(scale, "log" if is_log else "linear")
     rests = [_degree_label(growth) for growth in growths.values()]
     labels = [plain(shortened_name(name, rest, style)) + rest for name, rest in zip(growths, rests, strict=True)]
+    values = [d for growth in growths.values() for d in growth.degrees]
+    positive = [d for d in values if d]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, most=1))
         axes = figure.subplots()
         _step_axis(axes, scale, max(len(growth.degrees) for growth in growths.values()))
-        values = [d for growth in growths.values() for d in growth.degrees]
-        zero = _degree_axis(axes, values, scale)
+        zero = 0.0
+        if scale == "linear":
+            axes.set_ylim(0, 1.05 * max(values))
+        else:
+            has_zeros = len(positive) < len(values)
+            zero = log_scale_with_zero(axes, min(positive), max(positive), has_zeros) or 1.0
         for k, (label, growth) in enumerate(zip(labels, growths.values(), strict=True)):
-            _draw_degrees_of(axes, growth, label, k, zero, scale == "loglog")
+            look: dict[str, Any] = {"color": COLOURS[k]}
+            line = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
+            steps = np.arange(1 if scale == "loglog" else 0, len(growth.degrees))
+            heights = np.array([float(growth.degrees[n] or zero) for n in steps])
+            # On a logarithmic scale no line leads to a degree 0, which lies in its band.
+            is_gap = np.array([scale != "linear" and not growth.degrees[n] for n in steps])
+            n, d = steps, np.where(is_gap, np.nan, heights)
+            found = growth.recurrence
+            if found is not None and found.closed_form and ";" not in found.closed_form and found.preperiod == 0:
+                # One polynomial: a smooth curve, else straight lines from point to point.
+                few = range(found.power + 1)
+                law = np.polynomial.Polynomial.fit(list(few), [found.predict(n) for n in few], found.power)
+                n = np.linspace(steps[0], steps[-1], 200)
+                d = law(n)
+            axes.plot(n, d, zorder=2, **line, **look)
+            axes.plot(steps, heights, marker=MARKS[k], markersize=4, linestyle="none", clip_on=False, **look)
+            # The legend shows both: a line with a mark.
+            axes.plot([], [], marker=MARKS[k], markersize=4, label=label, **line, **look)
         axes.set_xlabel("iterate $n$")
         axes.set_ylabel("degree $d_n$")
         title = r"$\lambda$: dynamical degree"
@@ -75,6 +98,33 @@ def draw_degrees(
             title += r"; the time step is $2\varepsilon$"
         legend_above(figure, *axes.get_legend_handles_labels(), style, title, most=1)
     return figure
+
+
+def _degree_label(growth: DegreeGrowth) -> str:
+    """A line of the legend behind the name: what d_n is, the dynamical degree and what is estimated."""
+    name = ""
+    if growth.eps is not None:
+        name = rf", $\varepsilon = {label_number(growth.eps)}$"
+    rate = growth.dynamical_degree
+    if growth.growth is Growth.ZERO:
+        return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
+    if growth.recurrence is None and growth.proof is None:
+        if growth.looks_exponential:
+            return rf"{name}: $\lambda \approx {float(growth.estimate or 0):.4g}$ (estimated)"
+        n = len(growth.degrees) - 1
+        quotient = rf", $d_{{{n}}}^{{1/{n}}} = {float(growth.estimate):.4g}$" if growth.estimate else ""
+        return f"{name}: no recurrence found{quotient}"
+    parts = []
+    formula = growth.recurrence.closed_form if growth.recurrence is not None else None
+    if formula and len(formula) <= _MAX_FORMULA and ";" not in formula:
+        parts.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
+    elif growth.growth is not Growth.EXPONENTIAL:
+        parts.append(f"{growth.growth}")
+    if rate is not None:
+        whole = rate.minimal_polynomial.degree() == 1
+        number = rate.digits if whole else rf"{float(rate.digits):.5f}\ldots"
+        parts.append(rf"$\lambda = {number}$")
+    return f"{name}: {', '.join(parts) or str(growth.growth)}"
 
 
 def draw_heights(
@@ -103,8 +153,7 @@ def draw_heights(
         figure = new_figure(style, _ASPECT + legend_height([label_number(eps) for eps in every_eps], style, most=1))
         axes = figure.subplots()
         _step_axis(axes, scale, longest)
-        if scale != "linear":
-            axes.set_yscale("log")
+        axes.set_yscale("linear" if scale == "linear" else "log")
         for k, eps in enumerate(every_eps):
             _draw_heights_of(axes, [curve for curve in curves if curve.eps == eps], k, scale == "loglog")
         if scale == "linear":
@@ -115,124 +164,24 @@ def draw_heights(
     return figure
 
 
-def _scale(asked: str | None, default: str) -> str:
-    if asked is not None and asked not in SCALES:
-        raise InputError(f"found the scale {asked[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
-    return asked or default
-
-
-def _step_axis(axes: Axes, scale: str, longest: int) -> None:
-    """The horizontal axis: whole numbers, or their logarithms from 1 on."""
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
-
-    if longest <= 1:
-        axes.set_xlim(-0.5, 1.5)
-    if scale != "loglog":
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
-        return
-    axes.set_xscale("log")
-    axes.set_xlim(0.9, 1.1 * max(longest, 2))
-    if longest <= 2000:
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if longest <= 200 else (1,)))
-        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
-
-
-def _degree_axis(axes: Axes, values: Sequence[int], scale: str) -> float:
-    """Set the vertical axis; the height at which a degree 0 is drawn."""
-    if scale == "linear":
-        axes.set_ylim(0, 1.05 * max(values))
-        return 0.0
-    positive = [value for value in values if value > 0]
-    zero = log_scale_with_zero(axes, min(positive), max(positive), len(positive) < len(values))
-    return 1.0 if zero is None else zero
-
-
-def _draw_degrees_of(axes: Axes, growth: DegreeGrowth, label: str, k: int, zero: float, from_one: bool) -> None:
-    first = 1 if from_one else 0
-    steps = np.arange(first, len(growth.degrees))
-    heights = np.array([float(d) if d else zero for d in growth.degrees[first:]])
-    line = LINES[0] if growth.recurrence is not None else ":"
-    n, d = _between(growth, first) if zero or 0 not in growth.degrees else (steps, heights)
-    axes.plot(n, d, color=COLOURS[k], linestyle=line, linewidth=0.8, zorder=2)
-    axes.plot(steps, heights, color=COLOURS[k], linestyle="none", marker=MARKS[k], markersize=4, clip_on=False)
-    # The legend shows both: a line with a mark.
-    axes.plot([], [], color=COLOURS[k], linestyle=line, linewidth=0.8, marker=MARKS[k], markersize=4, label=label)
-
-
-def _between(growth: DegreeGrowth, first: int) -> tuple[Any, Any]:
-    """The curve through the degrees: smooth where it is one polynomial, else straight from point to point."""
-    found = growth.recurrence
-    if found is not None and found.closed_form and ";" not in found.closed_form and found.preperiod == 0:
-        few = range(found.power + 1)
-        polynomial = np.polynomial.Polynomial.fit(list(few), [found.predict(n) for n in few], found.power)
-        n = np.linspace(first, len(growth.degrees) - 1, 200)
-        return n, polynomial(n)
-    steps = np.arange(first, len(growth.degrees))
-    return steps, np.array([float(d) if d else np.nan for d in growth.degrees[first:]])
-
-
-def _degree_label(growth: DegreeGrowth) -> str:
-    """A line of the legend behind the name: what d_n is, the dynamical degree and what is estimated."""
-    name = ""
-    if growth.eps is not None:
-        name = rf", $\varepsilon = {label_number(growth.eps)}$"
-    rate = growth.dynamical_degree
-    if growth.growth is Growth.ZERO:
-        return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
-    if growth.recurrence is None and growth.proof is None:
-        if growth.looks_exponential:
-            return rf"{name}: $\lambda \approx {float(growth.estimate or 0):.4g}$ (estimated)"
-        n = len(growth.degrees) - 1
-        quotient = rf", $d_{{{n}}}^{{1/{n}}} = {float(growth.estimate):.4g}$" if growth.estimate else ""
-        return f"{name}: no recurrence found{quotient}"
-    parts = []
-    formula = growth.recurrence.closed_form if growth.recurrence is not None else None
-    if formula and len(formula) <= _LONGEST_FORMULA and ";" not in formula:
-        parts.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
-    elif growth.growth is not Growth.EXPONENTIAL:
-        parts.append(f"{growth.growth}")
-    if rate is not None:
-        whole = rate.minimal_polynomial.degree() == 1
-        number = rate.digits if whole else rf"{float(rate.digits):.5f}\ldots"
-        parts.append(rf"$\lambda = {number}$")
-    return f"{name}: {', '.join(parts) or str(growth.growth)}"
-
-
 def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one: bool) -> None:
-    first = 1 if from_one else 0
     size = 3.2 if len(curves) <= 3 and max(len(curve.steps) for curve in curves) <= 80 else 2
+    line: dict[str, Any] = {"color": COLOURS[k], "linestyle": LINES[k], "linewidth": 0.7}
+    # Hollow marks, through which the line of the fit is seen.
+    mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
     for curve in curves:
-        chosen = _spaced(curve.steps, first, from_one)
-        axes.plot(
-            curve.steps[chosen],
-            curve.bits[chosen],
-            color=COLOURS[k],
-            linestyle="none",
-            marker=MARKS[k],
-            **_hollow(size),
-        )
-        fit = fit_of(curve)
-        if fit is not None:
-            n = np.geomspace(1, max(1, curve.steps[-1]), 200) if from_one else np.linspace(0, curve.steps[-1], 200)
-            axes.plot(n, fit(n), color=COLOURS[k], linestyle=LINES[k], linewidth=0.7, zorder=1.5)
-    key = {"color": COLOURS[k], "marker": MARKS[k], "linestyle": LINES[k], "linewidth": 0.7, **_hollow(3.2)}
-    axes.plot([], [], label=_height_label(curves), **key)
-
-
-def _spaced(steps: Any, first: int, logarithmic: bool) -> Any:
-    """Which of the steps get a mark: as many as stand apart along the axis, the first and the last among them."""
-    rows = np.flatnonzero(steps >= first)
-    if len(rows) <= _MARKS:
-        return rows
-    held = steps[rows].astype(np.float64)
-    wanted = np.geomspace(held[0], held[-1], _MARKS) if logarithmic else np.linspace(held[0], held[-1], _MARKS)
-    return rows[np.unique(np.abs(held[:, None] - wanted).argmin(axis=0))]
-
-
-def _hollow(size: float) -> dict[str, Any]:
-    """Marks through which the line of the fit is seen."""
-    return {"markersize": size, "markerfacecolor": "none", "markeredgewidth": 0.5}
+        rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
+        if len(rows) > _MARKS:  # as many marks as stand apart along the axis, the first and the last among them
+            steps = curve.steps[rows].astype(np.float64)
+            spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
+            rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
+        points = curve.steps[rows], curve.bits[rows]
+        axes.plot(*points, color=COLOURS[k], linestyle="none", markersize=size, **mark)
+        if (fit := fit_of(curve)) is not None:
+            last = curve.steps[-1]
+            n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
+            axes.plot(n, fit(n), zorder=1.5, **line)
+    axes.plot([], [], label=_height_label(curves), markersize=3.2, **line, **mark)
 
 
 def _height_label(curves: Sequence[HeightCurve]) -> str:
@@ -258,3 +207,26 @@ def _height_label(curves: Sequence[HeightCurve]) -> str:
 def _range_of(values: Sequence[float]) -> str:
     low, high = f"{min(values):.3g}", f"{max(values):.3g}"
     return low if low == high else f"{low} to {high}"
+
+
+def _scale(asked: str | None, default: str) -> str:
+    if asked is not None and asked not in SCALES:
+        raise InputError(f"found the scale {asked[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
+    return asked or default
+
+
+def _step_axis(axes: Axes, scale: str, longest: int) -> None:
+    """The horizontal axis: whole numbers, or their logarithms from 1 on."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+
+    if longest <= 1:
+        axes.set_xlim(-0.5, 1.5)
+    if scale != "loglog":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+        return
+    axes.set_xscale("log")
+    axes.set_xlim(0.9, 1.1 * max(longest, 2))
+    if longest <= 2000:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if longest <= 200 else (1,)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())

@@ -26,8 +26,7 @@ from helpers import table
 from small_databases import ok, planned
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.degree_records import degrees_of_record
-from kahanmaps.plots.height_curves import curves_of_record
+from kahanmaps.plots.growth_records import curves_of_record, degrees_of_record
 from kahanmaps_cli.main import main
 from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.runs.ensemble_starts import read_starts

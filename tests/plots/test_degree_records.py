@@ -5,7 +5,7 @@ import pytest
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.plots.degree_records import degrees_of_record
+from kahanmaps.plots.growth_records import degrees_of_record
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.plots.growth import draw_degrees, draw_heights
-from kahanmaps.plots.height_curves import HeightCurve, curves_of_record, fit_of, height_curves
+from kahanmaps.plots.growth_records import HeightCurve, curves_of_record, fit_of, height_curves
 
 SQUARES = tuple(2 * n * n + 1 for n in range(12))  # of the Kahan map of the Euler top
 POWERS = tuple(2**n for n in range(10))
