@@ -6,6 +6,7 @@ a dot where f does. Where the maps commute every ring holds its dot.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -47,13 +48,19 @@ def draw_squares(
     if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
         raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
     with drawing(style):
+        from matplotlib.lines import Line2D
+
         letter = style.font_size * 2.54 / 72
         side = style.width / max(len(found), 1.25) - 4.2 * letter
         figure = new_figure(style, (side + 10 * letter) / style.width)
         for k, panel in enumerate(figure.subplots(1, len(found), squeeze=False).ravel()):
             caption = captions[k] if k < len(captions) else ""
             _draw(panel, found[k], chosen, caption, letter / side, style)
-        _legend(figure)
+        handles = [
+            Line2D([], [], color=_F, marker="o", markersize=3, label=r"$\Phi_f$"),
+            Line2D([], [], color=_G, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 
@@ -86,56 +93,58 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, l
     one, other = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
     every = np.concatenate([one.reshape(-1, 2), other.reshape(-1, 2)])
     every = every[np.isfinite(every).all(axis=1)]
-    window = np.array(window_of(every, one[0, 0][None]))
-    if squares.steps == 1:  # five points, all of which are wanted
+    # Margins on each side, in units of the range of the points: the names of corners need room, more in small panels.
+    if squares.steps > 1:
+        window = np.array(window_of(every, one[0, 0][None]))
+        needed = np.array([[1.3 * letter], [1.7 * letter]])
+        margins = np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed)))
+    else:  # five points, all of which are wanted
         window = np.array([every.min(axis=0), every.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
-    margins = _margins(squares.steps, letter)
+        needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
+        margins = np.maximum([[0.42], [0.36]], needed / (1 - 2 * needed))
     window = window + margins * np.diff(window, axis=1) * np.array([-1, 1])
     axes.set_box_aspect(1)
-    axes.set_xlim(*window[0])
-    axes.set_ylim(*window[1])
-    axes.locator_params(nbins=5)
-    axes.set_xlabel(label_of(squares.pair.f.variables[chosen[0]]))
-    axes.set_ylabel(label_of(squares.pair.f.variables[chosen[1]]))
-    f, g = map(_in_formula, squares.pair.names)
-    beyond = outside(every, tuple(map(tuple, window)))
-    said = f"\n{beyond} of {len(every)} points outside" if beyond else ""
-    equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-    title = (
-        plain(wrapped(equations, style.font_size / letter, style.font_size)) if caption else f"$f = {f}$,  $g = {g}$"
+    variables = squares.pair.f.variables
+    axes.set(
+        xlim=window[0], ylim=window[1], xlabel=label_of(variables[chosen[0]]), ylabel=label_of(variables[chosen[1]])
     )
-    axes.set_title(f"{title}\n{squares.verdict}{said}")
+    axes.locator_params(nbins=5)
+    if caption:
+        equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
+        title = plain(wrapped(equations, style.font_size / letter, style.font_size))
+    else:
+        f, g = (re.sub(r"^f_(.*)", r"f_{\1}", name).replace("grad ", r"\nabla ") for name in squares.pair.names)
+        title = f"$f = {f}$,  $g = {g}$"
+    beyond = outside(every, tuple(map(tuple, window)))
+    note = f"\n{beyond} of {len(every)} points outside" if beyond else ""
+    axes.set_title(f"{title}\n{squares.verdict}{note}")
     _draw_lattices(axes, one, other)
     gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]
-    small = bool(np.hypot(*gap) < _SEEN)
+    is_small = bool(np.hypot(*gap) < _SEEN)
     if squares.steps == 1:
-        _label_corners(axes, one, other, squares.closes, small, letter)
+        _label_corners(axes, one, other, squares.closes, is_small, letter)
     else:
         _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0), letter)
-    if squares.closes is False and small and np.any(gap != 0):
+    if squares.closes is False and is_small and np.any(gap != 0):
         _magnify(axes, one, other, every, window, style)
-
-
-def _margins(steps: int, letter: float) -> Floats:
-    """Of the range of the points, on each side: room for the names of corners, which in small panels are large."""
-    if steps > 1:
-        needed = np.array([[1.3 * letter], [1.7 * letter]])
-        return np.asarray(np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed))))
-    needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
-    return np.asarray(np.maximum([[0.42], [0.36]], needed / (1 - 2 * needed)))
 
 
 def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
     """Arrows, rings where steps of g end, dots where steps of f end, and dotted lines across the gaps."""
+    from matplotlib.patches import FancyArrowPatch
+
     steps = len(one) - 1
     width, size = (1.1, 5.5) if steps == 1 else (0.8, 4.0) if steps <= 4 else (0.5, 2.6)
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": width, "mutation_scale": 4 + 5 * width}
+    arrow |= {"shrinkA": 2, "shrinkB": 2.5, "zorder": 2}
     for i in range(steps + 1):
         for j in range(steps + 1):
-            if j < steps:
-                _arrow(axes, one[i, j], one[i, j + 1], _G, width)
-            if i < steps:
-                _arrow(axes, other[i, j], other[i + 1, j], _F, width)
+            arrows = [(one[i, j], one[i, j + 1], _G)] if j < steps else []
+            arrows += [(other[i, j], other[i + 1, j], _F)] if i < steps else []
+            for start, end, colour in arrows:
+                if np.isfinite([*start, *end]).all() and not np.array_equal(start, end):
+                    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=colour, **arrow))
             if not np.array_equal(one[i, j], other[i, j], equal_nan=True):
                 ends = np.stack([one[i, j], other[i, j]])
                 axes.plot(ends[:, 0], ends[:, 1], color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
@@ -218,25 +227,6 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
     beside(axes, text, (float(x), float(y)), offset, 2, ha=aligned, va=raised, zorder=5)
 
 
-def _arrow(axes: Axes, start: Floats, end: Floats, colour: str, width: float) -> None:
-    if not np.isfinite([*start, *end]).all() or np.array_equal(start, end):
-        return
-    from matplotlib.patches import FancyArrowPatch
-
-    how: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "mutation_scale": 4 + 5 * width}
-    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), shrinkA=2, shrinkB=2.5, zorder=2, **how))
-
-
-def _legend(figure: Figure) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=_F, marker="o", markersize=3, label=r"$\Phi_f$"),
-        Line2D([], [], color=_G, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
-
-
 def _table(lattice: Lattice) -> Floats:
     """The points as machine numbers, nan where there is none or it is too large for them."""
     dim = next(len(point) for row in lattice for point in row if point is not None)
@@ -248,8 +238,3 @@ def _table(lattice: Lattice) -> Floats:
         ]
     )
     return np.where(np.abs(found) < _LARGEST, found, np.nan)
-
-
-def _in_formula(name: str) -> str:
-    name, _, signs = name.partition("_") if name.startswith("f_") else (name, "", "")
-    return f"{name}_{{{signs}}}" if signs else name.replace("grad ", r"\nabla ")

@@ -30,7 +30,7 @@ _ASPECT = 0.8
 _MANY = f"{Growth.EXPONENTIAL} growth"  # drawn thin, and none of it is named
 _LETTERS, _LETTER = 0.8, 0.5  # the size of conditions, of that of other text; the width of a letter, of its size
 _PLACES, _DOTS = 12, 300  # parts of a curve, at whose ends its condition may stand, and to tell what it crosses
-_INNER = (0.85, 0.85)  # of the picture, the axes
+_INNER = 0.85  # of the width and height of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
@@ -63,18 +63,13 @@ def draw_scan(
     if window is None:
         every = [place for some in points.values() for place in some]
         window = window_of(np.array(every)) if len(every) > 1 else _USUAL
-    drawn = [
-        _Kind(
-            kind,
-            points[kind],
-            [piece for one in some if one.dimension == 1 for piece in _curve(one, window)],
-            [(one.text, [_place(one)]) for one in some if one.is_rational_point]
-            + [(one.text, _along(pieces)) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
-            if kind != _MANY
-            else [],
-        )
-        for kind, some in kinds.items()
-    ]
+    drawn = []
+    for kind, some in kinds.items():
+        curves = [(one.text, pieces) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
+        labels = [(one.text, [_place(one)]) for one in some if one.is_rational_point]
+        labels += [(text, _along(pieces)) for text, pieces in curves]
+        every_piece = [piece for _, pieces in curves for piece in pieces]
+        drawn.append(_Kind(kind, points[kind], every_piece, labels if kind != _MANY else []))
     return _draw(found, style, drawn, window, "")
 
 
@@ -138,22 +133,20 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
     the one that the fewest curves cross.
     """
     em = _LETTERS * style.font_size
-    room = [side * part for side, part in zip(style.inches(_ASPECT), _INNER, strict=True)]
-    across, high = (em / (72 * inches) for inches in room)
+    across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))
     wanted = [(*one, COLOURS[k % len(COLOURS)]) for k, kind in enumerate(kinds) for one in kind.labels]
     wanted.sort(key=lambda one: (" = " not in one[0], -COLOURS.index(one[2])))
 
     def inside(place: Sequence[float]) -> tuple[float, ...]:
         return tuple((c - low) / (end - low) for c, (low, end) in zip(place, window, strict=True))
 
-    points = [inside(place) for kind in kinds for place in kind.points]
-    u, v = 0.35 * across, 0.35 * high
-    marks = [(x - u, x + u, y - v, y + v) for x, y in points]
+    marks = []
+    for x, y in (inside(place) for kind in kinds for place in kind.points):
+        marks.append((x - 0.35 * across, x + 0.35 * across, y - 0.35 * high, y + 0.35 * high))
     lines = np.array([inside(x) for kind in kinds for piece in kind.curves for x in _resampled(piece, _DOTS)])
     taken: list[tuple[float, ...]] = []
     for text, places, colour in wanted:
-        wide = _LETTER * len(text) * across
-        is_curve = " = " in text
+        wide, is_curve = _LETTER * len(text) * across, " = " in text
         found: list[Any] = []
         for place, side, up in product(places, (1, -1), (1, -1)):
             x, y = inside(place)

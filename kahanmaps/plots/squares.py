@@ -74,7 +74,8 @@ class Squares:
     @property
     def gap(self) -> float:
         """The largest distance, in all coordinates, between points that should be one."""
-        return max((_distance(one, other) for one, other in self.compared), default=0.0)
+        squares = [sum(((a - b) ** 2 for a, b in zip(*pair, strict=True)), fmpq(0)) for pair in self.compared]
+        return float(arb(max(squares, default=fmpq(0))).sqrt().mid())
 
     @property
     def verdict(self) -> str:
@@ -105,11 +106,20 @@ def squares(
     x = phi_f.point(start)
     missing: list[str] = []
 
-    def orbit(phi: MapOver, first: Point | None, told: str) -> list[Point | None]:
+    def orbit(phi: MapOver, first: Point | None, name: str) -> list[Point | None]:
         found = [first]
         for k in range(steps):
-            progress(f"{told}, step {k + 1} of {steps}")
-            found.append(_image(phi, found[-1], missing, told))
+            progress(f"{name}, step {k + 1} of {steps}")
+            image = None
+            if found[-1] is not None:
+                try:
+                    image = tuple(phi.step(found[-1]))
+                except SingularStep:
+                    missing.append(f"{name}: the map has no value at a point on the way")
+            if image and max(entry.p.bit_length() + entry.q.bit_length() for entry in image) > MAX_BITS:
+                missing.append(f"{name}: the coordinates have more than {MAX_BITS} bits")
+                image = None
+            found.append(image)
         return found
 
     along_f, along_g = orbit(phi_f, x, "Phi_f"), orbit(phi_g, x, "Phi_g")
@@ -158,21 +168,3 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         g = g.scaled(rational(eps2) / rational(eps))
     return Pair(file.map, g, ("f", "g"), note)
-
-
-def _image(phi: MapOver, point: Point | None, missing: list[str], told: str) -> Point | None:
-    if point is None:
-        return None
-    try:
-        image = phi.step(point)
-    except SingularStep:
-        missing.append(f"{told}: the map has no value at a point on the way")
-        return None
-    if max(entry.p.bit_length() + entry.q.bit_length() for entry in image) > MAX_BITS:
-        missing.append(f"{told}: the coordinates have more than {MAX_BITS} bits")
-        return None
-    return tuple(image)
-
-
-def _distance(one: Point, other: Point) -> float:
-    return float(arb(sum(((a - b) ** 2 for a, b in zip(one, other, strict=True)), fmpq(0))).sqrt().mid())
