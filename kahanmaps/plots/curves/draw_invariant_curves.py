@@ -16,7 +16,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves, InvariantPlane
 from kahanmaps.plots.curves.plane_cubics import Floats, PlaneCubic
 from kahanmaps.plots.curves.plane_views import Disc, Rectangle, clouds_of, view_of
-from kahanmaps.plots.figures import RASTERISE_ABOVE, beside, drawing, label_of, new_figure
+from kahanmaps.plots.figures import RASTERISE_ABOVE, beside, drawing, label_of, new_figure, plain
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOUR_MAP, COLOURS, MARKS, Style
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 _CURVE, _FLOW = "#9a9a9a", "#444444"
 _CROWDED = 0.06  # of the width of a panel: a number would cover the one before
-_POINT = CENTIMETRES_PER_INCH / 72  # in centimetres
 _NUMBERED = 4  # steps whose dots have their number beside them
 
 
@@ -49,26 +48,43 @@ def draw_invariant_curves(
     panels = panels_of(found)
     count = len(panels) + (original is not None)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
-    columns = min(columns, max(1, int(style.width / (12 * style.font_size * _POINT))))  # or letters fill the panels
+    letter = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
+    columns = min(columns, max(1, int(style.width / (12 * letter))))  # or letters fill the panels
     rows = ceil(count / columns)
+    # The panels are squares, with room for letters and a colour bar.
+    side = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
+    height = rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter
     with drawing(style):
         from matplotlib.colors import Normalize
+        from matplotlib.lines import Line2D
 
-        figure = new_figure(style, _aspect(style, rows, columns, projective))
+        figure = new_figure(style, height / style.width)
         steps = max(len(x) for x in found.originals) - 1
-        pen = _Pen(Normalize(0, max(1, steps)), len(found.originals) == 1, style)
-        every = list(figure.subplots(rows, columns, squeeze=False).flat)
-        grid = iter(every)
+        # One orbit is coloured by step, several have a colour and a mark each.
+        pen = _Pen(Normalize(0, max(1, steps)) if len(found.originals) == 1 else None, style)
+        grid = iter(figure.subplots(rows, columns, squeeze=False).flat)
         if original is not None:
-            _draw_original(next(grid), found, original, pen)
+            axes = next(grid)
+            clouds = [(x[:, original[0]], x[:, original[1]]) for x in found.originals]
+            x, y = (label_of(found.variables[k]) for k in original)
+            Rectangle.around(clouds).prepare(axes, (x, y))
+            axes.set_title("the orbit itself")
+            for number, cloud in enumerate(clouds):
+                pen.orbit(axes, *cloud, number, None)
         for place, plane, column in panels:
             _draw_plane(next(grid), plane, column, place, projective, flow, pen)
         for axes in grid:
             axes.remove()
-        if pen.by_step and steps:
+        if pen.scale is None:
+            names = [labels[k] if k < len(labels) else f"start {k + 1}" for k in range(len(found.poles))]
+            ends = ["" if pole is None else f" (a pole at step {pole})" for pole in found.poles]
+            handles = [
+                Line2D([], [], linestyle="none", marker=MARKS[k], color=COLOURS[k], label=plain(name) + end)
+                for k, (name, end) in enumerate(zip(names, ends, strict=True))
+            ]
+            figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        elif steps:
             pen.add_bar(figure, found.poles[0])
-        elif not pen.by_step:
-            pen.add_legend(figure, found, labels)
     return figure
 
 
@@ -85,37 +101,33 @@ def panels_of(found: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
     return panels
 
 
-def _aspect(style: Style, rows: int, columns: int, projective: bool) -> float:
-    """Height over width such that the panels are squares, with room for letters and a colour bar."""
-    width, letter = style.width, style.font_size * _POINT
-    side = max(1.0, width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
-    return float((rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter) / width)
-
-
 class _Pen:
-    """How dots are drawn: by step, where there is one orbit, otherwise by orbit."""
+    """How dots are drawn: by step with a `scale` of colours, where there is one orbit, otherwise by orbit."""
 
-    def __init__(self, scale: Any, by_step: bool, style: Style) -> None:
-        self.scale, self.by_step, self.style = scale, by_step, style
+    def __init__(self, scale: Any, style: Style) -> None:
+        self.scale, self.style = scale, style
 
     def orbit(self, axes: Axes, x: Floats, y: Floats, number: int, normals: Floats | None) -> None:
         count = len(x)
         size = 11.0 if count <= 120 else 6.0 if count <= 500 else 2.0 if count <= 5_000 else 0.6
         how: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
-        if self.by_step:
+        if self.scale is not None:
             how = {"c": np.arange(count), "norm": self.scale, "cmap": COLOUR_MAP}
         axes.scatter(x, y, s=size, linewidths=0, zorder=2, rasterized=count > RASTERISE_ABOVE, **how)
-        if not self.by_step:
+        if self.scale is None:
             return
         for k in range(min(_NUMBERED, count)):
-            aside = np.array([0.7, 0.7]) if normals is None else normals[k]
             axes.plot(x[k], y[k], "o", markersize=4.2, fillstyle="none", color="black", markeredgewidth=0.5, zorder=3)
-            across, up = np.abs(x[:k] - x[k]) / np.ptp(axes.get_xlim()), np.abs(y[:k] - y[k]) / np.ptp(axes.get_ylim())
-            if np.any(np.hypot(across, up) < _CROWDED):
+            limits = np.array([axes.get_xlim(), axes.get_ylim()])
+            low, length = limits[:, 0], limits[:, 1] - limits[:, 0]
+            places = (np.stack([x[: k + 1], y[: k + 1]], axis=1) - low) / length
+            if np.any(np.hypot(*(places[:k] - places[k]).T) < _CROWDED):
                 continue
-            offset = tuple(8 * aside * _inwards(axes, x[k], y[k], aside))
+            aside = np.array([0.7, 0.7]) if normals is None else normals[k]
+            if np.any(np.abs(places[k] + 2 * _CROWDED * aside - 0.5) > 0.5):  # there is the edge of the panel
+                aside = -aside
             how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
-            beside(axes, str(k), (x[k], y[k]), offset, 1.5, zorder=4, **how)
+            beside(axes, str(k), (x[k], y[k]), tuple(8 * aside), 1.5, zorder=4, **how)
 
     def add_bar(self, figure: Figure, pole: int | None) -> None:
         from matplotlib.cm import ScalarMappable
@@ -126,16 +138,6 @@ class _Pen:
         bar.set_label("step" if pole is None else f"step (a pole at step {pole} ends the orbit)")
         bar.outline.set_linewidth(0.4)
         bar.locator = MaxNLocator(nbins=6, integer=True)
-
-    def add_legend(self, figure: Figure, found: InvariantCurves, labels: Sequence[str]) -> None:
-        from matplotlib.lines import Line2D
-
-        handles = []
-        for k, pole in enumerate(found.poles):
-            label = (labels[k] if k < len(labels) else f"start {k + 1}").replace("$", r"\$")
-            label += "" if pole is None else f" (a pole at step {pole})"
-            handles.append(Line2D([], [], linestyle="none", marker=MARKS[k], color=COLOURS[k], label=label))
-        figure.legend(handles=handles, loc="outside lower center", ncols=2 if len(handles) > 1 else 1)
 
 
 def _draw_plane(
@@ -162,22 +164,6 @@ def _draw_plane(
     for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
         normals = None if orbit.cubic is None else _normals(orbit.cubic, x[:_NUMBERED], y[:_NUMBERED], view.stretch)
         pen.orbit(axes, *view.place(x, y), number, normals)
-
-
-def _draw_original(axes: Axes, found: InvariantCurves, original: tuple[int, int], pen: _Pen) -> None:
-    clouds = [(x[:, original[0]], x[:, original[1]]) for x in found.originals]
-    names = label_of(found.variables[original[0]]), label_of(found.variables[original[1]])
-    Rectangle.around(clouds).prepare(axes, names)
-    axes.set_title("the orbit itself")
-    for number, (x, y) in enumerate(clouds):
-        pen.orbit(axes, x, y, number, None)
-
-
-def _inwards(axes: Axes, x: float, y: float, aside: Floats) -> int:
-    """1, or -1 where a number on that side of a dot would lie on the edge of its panel."""
-    limits = np.array([axes.get_xlim(), axes.get_ylim()])
-    place = (np.array([x, y]) - limits[:, 0]) / (limits[:, 1] - limits[:, 0])
-    return -1 if np.any(np.abs(place + 2 * _CROWDED * aside - 0.5) > 0.5) else 1
 
 
 def _normals(cubic: PlaneCubic, x: Floats, y: Floats, stretch: float) -> Floats:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import RR, rational
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.errors import HypothesisError, InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
@@ -34,7 +34,7 @@ MAX_POINTS = 1_000_000
 MAX_STARTS = 7  # as many colours as there are
 BITS = 256
 _POLE_BITS = 96
-_SAID_EVERY = 2_000
+_PROGRESS_EVERY = 2_000  # steps
 _LARGEST = 1e60  # of what is drawn: cubes of it are still machine numbers
 
 Numbers = NDArray[Any]
@@ -114,7 +114,13 @@ def find_invariant_curves(
     >>> orbit.cubic.defect(orbit.u, orbit.v) < 1e-13
     True
     """
-    _require_sizes(starts, steps)
+    if not 1 <= len(starts) <= MAX_STARTS:
+        raise InputError(f"found {len(starts)} starts, expected 1 to {MAX_STARTS}")
+    if steps < 0 or (steps + 1) * len(starts) > MAX_POINTS:
+        raise InputError(
+            f"found {steps} steps from {counted(len(starts), 'start')}, expected 0 or more steps and at most "
+            f"{MAX_POINTS} points"
+        )
     normal_form = file.normal_form
     if isinstance(normal_form, NoNormalForm):
         raise HypothesisError(
@@ -131,29 +137,25 @@ def find_invariant_curves(
         runs, originals, poles = [], [], []
         for number, start in enumerate(starts, 1):
             triples = splitting.triples([arb(rational(entry)) for entry in start])
-            firsts = [_turned(frame.matrix, triples[frame.index]) for frame in frames]
-            said = f"start {number} of {len(starts)}" if len(starts) > 1 else "orbit"
-            orbits, pole = _orbits(frames, firsts, epsilon, steps, said, progress)
-            runs.append(
-                [
-                    PlaneOrbit(u, v, _cubic(frame, first, epsilon) if frame.is_real else None)
-                    for frame, first, (u, v) in zip(frames, firsts, orbits, strict=True)
-                ]
-            )
+            orbits: list[tuple[Numbers, Numbers]] = []
+            curves: list[PlaneCubic | None] = []
+            length, pole = steps + 1, None  # up to the first pole in any of the planes
+            for k, frame in enumerate(frames, 1):
+                f, g, m, n = frame.matrix.entries()
+                U, V, W = triples[frame.index]
+                first = f * U + g * V, m * U + n * V, W
+                name = f"start {number} of {len(starts)}" if len(starts) > 1 else "orbit"
+                name = f"{name}: plane {k} of {len(frames)}"
+                orbits.append(_orbit(frame.block, first, epsilon, length, name, progress))
+                if len(orbits[-1][0]) < length:
+                    length = pole = len(orbits[-1][0])
+                curves.append(_cubic(frame, first, epsilon) if frame.is_real else None)
+            orbits = [(u[:length], v[:length]) for u, v in orbits]
+            runs.append([PlaneOrbit(u, v, cubic) for (u, v), cubic in zip(orbits, curves, strict=True)])
             originals.append(_in_variables(frames, orbits, splitting))
             poles.append(pole)
     planes = tuple(replace(frame, orbits=found) for frame, found in zip(frames, zip(*runs, strict=True), strict=True))
     return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), normal_form.text)
-
-
-def _require_sizes(starts: Sequence[Sequence[Any]], steps: int) -> None:
-    if not 1 <= len(starts) <= MAX_STARTS:
-        raise InputError(f"found {len(starts)} starts, expected 1 to {MAX_STARTS}")
-    if steps < 0 or (steps + 1) * len(starts) > MAX_POINTS:
-        raise InputError(
-            f"found {steps} steps from {len(starts)} {'start' if len(starts) == 1 else 'starts'}, expected 0 or more "
-            f"steps and at most {MAX_POINTS} points"
-        )
 
 
 def _frames(splitting: Splitting) -> list[InvariantPlane]:
@@ -181,35 +183,15 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
     return sorted(found, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
 
 
-def _orbits(
-    frames: Sequence[InvariantPlane],
-    firsts: Sequence[Triple],
-    eps: fmpq,
-    steps: int,
-    said: str,
-    progress: Callable[[str], None],
-) -> tuple[list[tuple[Numbers, Numbers]], int | None]:
-    """u and v in every plane, up to the first pole in any of them, and the step of that pole."""
-    orbits, pole = [], None
-    for number, (frame, first) in enumerate(zip(frames, firsts, strict=True), 1):
-        wanted = steps if pole is None else pole - 1
-        orbits.append(_orbit(frame.block, first, eps, wanted, f"{said}: plane {number} of {len(frames)}", progress))
-        if len(orbits[-1][0]) <= wanted:
-            pole = len(orbits[-1][0])
-    length = steps + 1 if pole is None else pole
-    return [(np.array(us[:length]), np.array(vs[:length])) for us, vs in orbits], pole
-
-
 def _orbit(
-    block: PlanarBlock, first: Triple, eps: fmpq, steps: int, said: str, progress: Callable[[str], None]
-) -> tuple[list[Any], list[Any]]:
-    """u and v at the steps 0, 1, ..., fewer of them where the map has a pole."""
+    block: PlanarBlock, first: Triple, eps: fmpq, length: int, name: str, progress: Callable[[str], None]
+) -> tuple[Numbers, Numbers]:
+    """u and v of `length` points, fewer of them where the map has a pole."""
     P = first
     us, vs = [], []
     step = 2 * arb(eps)
-    strength = max(abs(entry) for entry in (block.a, block.b, block.c, block.d))
-    closest = strength * arb(2) ** -_POLE_BITS
-    for k in range(steps + 1):
+    closest = max(abs(entry) for entry in (block.a, block.b, block.c, block.d)) * arb(2) ** -_POLE_BITS
+    for k in range(length):
         U, V, W = P
         if k and abs(W) <= closest * max(abs(U), abs(V)):
             break
@@ -217,28 +199,28 @@ def _orbit(
         vs.append(_machine(V / W / step))
         P = block.image(P)
         size = max(abs(entry) for entry in P)
-        if size == 0:  # no value, even in projective space
-            P = (U, V, W * 0)
-            continue
-        P = tuple((entry / size).mid() for entry in P)
-        if k % _SAID_EVERY == 0:
-            progress(f"{said}, step {k}")
-    return us, vs
+        # Where there is no value, even in projective space, the next step ends the orbit as a pole does.
+        P = (U, V, W * 0) if size == 0 else tuple((entry / size).mid() for entry in P)
+        if k % _PROGRESS_EVERY == 0:
+            progress(f"{name}, step {k}")
+    return np.array(us), np.array(vs)
 
 
 def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
     """The curve through the start, its level given as a fraction of numbers of moderate size."""
     U, V, W = first
     step = 2 * arb(eps)
+    u, v = U / W / step, V / W / step
     p, q, r = frame.block.D
-    above, below = frame.block.h(U / W / step, V / W / step), 1 + (p * U * U + q * U * V + r * V * V) / (W * W)
-    parts = [arb(0) if part.contains(arb(0)) else part for part in (above, below)]
+    level = frame.block.h(u, v), 1 + (p * U * U + q * U * V + r * V * V) / (W * W)
+    parts = [arb(0) if part.contains(arb(0)) else part for part in level]
     size = max(abs(part) for part in parts)
-    above, below = (float(part / size) if size > 0 else 0.0 for part in parts)
+    numerator, denominator = (float(part / size) if size > 0 else 0.0 for part in parts)
     a, b, c, d = (entry.real for entry in frame.h)
-    cubic = PlaneCubic((a, b, c, d), float(arb(eps)), above, below)
-    largest = max(*map(abs, frame.h), float(abs(U / W / step)), float(abs(V / W / step)), cubic.length)
-    smallest = min(cubic.length, max(float(abs(U / W / step)), float(abs(V / W / step))) or cubic.length)
+    cubic = PlaneCubic((a, b, c, d), float(arb(eps)), numerator, denominator)
+    distances = float(abs(u)), float(abs(v))
+    largest = max(*map(abs, frame.h), *distances, cubic.length)
+    smallest = min(cubic.length, max(distances) or cubic.length)
     if not 1 / _LARGEST < smallest <= largest < _LARGEST:
         raise InputError(
             f"found numbers from {smallest:.0e} to {largest:.0e} in the plane of lambda = {frame.root_text}, expected "
@@ -259,12 +241,6 @@ def _in_variables(
         parts = [old[0].real, old[0].imag, old[1].real, old[1].imag] if frame.root.imag else [old[0].real, old[1].real]
         total += np.stack(parts, axis=1) @ columns.T
     return total
-
-
-def _turned(matrix: Matrix, triple: Triple) -> Triple:
-    f, g, k, l = matrix.entries()
-    U, V, W = triple
-    return f * U + g * V, k * U + l * V, W
 
 
 def _machine(value: Any) -> Any:

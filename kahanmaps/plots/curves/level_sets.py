@@ -70,19 +70,21 @@ def level_curves(
     if len(levels) > MAX_LEVELS:
         raise InputError(f"found {len(levels)} levels, expected at most {MAX_LEVELS}: choose some of them")
 
-    def sides(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return function.parts(_in_plane(points, plane, dim))
+    def parts(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        full = np.zeros((*points.shape[:-1], dim))
+        full[..., list(plane)] = points
+        return function.parts(full)
 
-    above, below = sides(_grid(window)[-1])
+    on_grid = parts(_grid(window)[-1])
     found = []
     for level in levels:
 
         def value(points: FloatArray, level: float = level) -> FloatArray:
-            over, under = sides(points)
-            return over - level * under
+            numerator, denominator = parts(points)
+            return numerator - level * denominator
 
         with np.errstate(all="ignore"):
-            found.append(zero_curves(value, window, above - level * below))
+            found.append(zero_curves(value, window, on_grid[0] - level * on_grid[1]))
     return LevelCurves(function.label, tuple(levels), tuple(found))
 
 
@@ -112,12 +114,6 @@ def zero_curves(
 def _grid(window: Window) -> tuple[FloatArray, FloatArray, FloatArray]:
     xs, ys = (np.linspace(low, high, GRID) for low, high in window)
     return xs, ys, np.stack(np.meshgrid(xs, ys), axis=-1)
-
-
-def _in_plane(points: FloatArray, plane: Sequence[int], dim: int) -> FloatArray:
-    full = np.zeros((*points.shape[:-1], dim))
-    full[..., list(plane)] = points
-    return full
 
 
 def _moved_onto(value: Callable[[FloatArray], FloatArray], line: FloatArray, window: Window) -> FloatArray:

@@ -56,11 +56,9 @@ class Rectangle:
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
         """Limits and labels of the axes, which become a square."""
+        (x, y), (a, b) = self.centre, self.half
         axes.set_box_aspect(1)
-        axes.set_xlim(self.centre[0] - self.half[0], self.centre[0] + self.half[0])
-        axes.set_ylim(self.centre[1] - self.half[1], self.centre[1] + self.half[1])
-        axes.set_xlabel(names[0])
-        axes.set_ylabel(names[1])
+        axes.set(xlim=(x - a, x + a), ylim=(y - b, y + b), xlabel=names[0], ylabel=names[1])
         axes.locator_params(nbins=5)
 
     def place(self, x: Floats, y: Floats) -> Cloud:
@@ -94,13 +92,9 @@ class Disc:
         from matplotlib.patches import Circle
 
         axes.set_aspect("equal")
-        axes.set_xlim(-1.03, 1.03)
-        axes.set_ylim(-1.03, 1.03)
+        label = f"({names[0]} : {names[1]} : 1)"
+        axes.set(xlim=(-1.03, 1.03), ylim=(-1.03, 1.03), xticks=[], yticks=[], frame_on=False, xlabel=label)
         axes.add_patch(Circle((0, 0), 1, fill=False, linewidth=0.6, zorder=1))
-        axes.set_frame_on(False)
-        axes.set_xticks([])
-        axes.set_yticks([])
-        axes.set_xlabel(f"({names[0]} : {names[1]} : 1)")
 
     def place(self, x: Floats, y: Floats) -> Cloud:
         """Where points are drawn."""
@@ -135,7 +129,6 @@ def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
     The origin is in the middle, and scales are equal along u and v, where the cubic has its threefold symmetry.
     """
     clouds = clouds_of(plane, column)
-    symmetric = plane.shape == THREE_LINES
     found = Rectangle.around(clouds)
     ranges = []
     for middle, half in zip(found.centre, found.half, strict=True):
@@ -143,8 +136,7 @@ def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
         if abs(middle) <= 3 * half:
             low, high = min(low, -0.1 * half), max(high, 0.1 * half)
         ranges.append((low, high))
-    if symmetric and all(low <= 0 <= high for low, high in ranges):
+    if plane.shape == THREE_LINES and all(low <= 0 <= high for low, high in ranges):
         reach = max(max(abs(low), abs(high)) for low, high in ranges)
         ranges = [(-reach, reach), (-reach, reach)]
-    ranges = [(low - _MARGIN * (high - low), high + _MARGIN * (high - low)) for low, high in ranges]
-    return Rectangle.of(clouds, ranges)
+    return Rectangle.of(clouds, [(low - _MARGIN * (high - low), high + _MARGIN * (high - low)) for low, high in ranges])
