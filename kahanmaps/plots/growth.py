@@ -74,7 +74,7 @@ def draw_degrees(
             zero = log_scale_with_zero(axes, min(positive), max(positive), has_zeros) or 1.0
         for k, (label, growth) in enumerate(zip(labels, growths.values(), strict=True)):
             look: dict[str, Any] = {"color": COLOURS[k]}
-            line = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
+            line: dict[str, Any] = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
             steps = np.arange(1 if scale == "loglog" else 0, len(growth.degrees))
             heights = np.array([float(growth.degrees[n] or zero) for n in steps])
             # On a logarithmic scale no line leads to a degree 0, which lies in its band.

@@ -25,42 +25,41 @@ if TYPE_CHECKING:
 
 
 class Plot:
-    """The pictures; `ax.figure.savefig("degrees.pdf")` writes one."""
+    """The pictures; `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other results."""
 
     def __reduce__(self) -> str:
         return "plot"  # there is one, `km.plot`
 
     def degrees(self, found: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
-        """What `km.degrees` found; `scale` is "linear", "log" or "loglog". Raises InputError for anything else."""
+        """What `km.degrees` found; `scale` is "linear", "log" or "loglog"."""
         from kahanmaps.plots.growth import draw_degrees
 
-        given: Any = found
-        if not isinstance(given, DegreeGrowth):
-            raise InputError(f"found a {type(given).__name__}, expected a result: km.plot.degrees(km.degrees(...))")
-        axes: Axes = draw_degrees({label: given}, scale=scale).axes[0]
+        _require(found, DegreeGrowth, "a result: km.plot.degrees(km.degrees(...))")
+        axes: Axes = draw_degrees({label: found}, scale=scale).axes[0]
         return axes
 
     def heights(self, found: HeightSurvey, *, scale: str | None = None) -> Axes:
-        """What `km.heights` found. Raises InputError for anything else."""
+        """What `km.heights` found."""
         from kahanmaps.plots.growth import draw_heights
 
-        given: Any = found
-        if not isinstance(given, HeightSurvey):
-            raise InputError(f"found a {type(given).__name__}, expected a result: km.plot.heights(km.heights(...))")
-        axes: Axes = draw_heights(given, scale=scale).axes[0]
+        _require(found, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
+        axes: Axes = draw_heights(found, scale=scale).axes[0]
         return axes
 
     def orbit(self, found: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
-        given: Any = found
-        if not isinstance(given, Trajectory):
-            raise InputError(f"found a {type(given).__name__}, expected an orbit: km.plot.orbit(km.orbit(...))")
+        _require(found, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(found)[:, None]
         return _drawn(Trajectories(found.variables, points, np.array([point.step for point in found])), (x, y))
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
         """As `km.portrait`."""
         return draw_orbits(file_of(given), *others, **options)
+
+
+def _require(found: Any, kind: type, expected: str) -> None:
+    if not isinstance(found, kind):
+        raise InputError(f"found a {type(found).__name__}, expected {expected}")
 
 
 def draw_orbits(

@@ -66,6 +66,7 @@ def draw_scan(
     drawn = []
     for kind, some in kinds.items():
         curves = [(one.text, pieces) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
+        labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(one.text, [_place(one)]) for one in some if one.is_rational_point]
         labels += [(text, _along(pieces)) for text, pieces in curves]
         every_piece = [piece for _, pieces in curves for piece in pieces]

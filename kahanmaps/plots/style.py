@@ -18,7 +18,7 @@ COLOURS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#56B4E9", "#D55E00", "#C
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 COLOUR_MAP = "cividis"
-_MOST_PIXELS = 1 << 28  # a gigabyte while it is drawn
+_MAX_PIXELS = 1 << 28  # a gigabyte while it is drawn
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,16 @@ class Style:
     dpi: int = 300
 
     def __post_init__(self) -> None:
-        _require("a width of {} cm", self.width, 2, 200)
-        if self.height is not None:
-            _require("a height of {} cm", self.height, 2, 200)
-        _require("a font size of {} pt", self.font_size, 3, 72)
-        _require("{} dots per inch", self.dpi, 30, 2400)
+        for what, value, low, high in (
+            ("a width of {} cm", self.width, 2, 200),
+            ("a height of {} cm", self.height, 2, 200),
+            ("a font size of {} pt", self.font_size, 3, 72),
+            ("{} dots per inch", self.dpi, 30, 2400),
+        ):
+            if value is not None and not low <= value <= high:
+                # An integer may be beyond the range of machine floats.
+                found = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
+                raise InputError(f"found {what.format(found)}, expected {low} to {high}")
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
@@ -57,10 +62,10 @@ class Style:
     def require_pixels(self, width: float, height: float) -> None:
         """Raise InputError where a picture of so many inches would not fit into memory, at so many dots per inch."""
         found = width * height * self.dpi**2
-        if found > _MOST_PIXELS:
+        if found > _MAX_PIXELS:
             raise InputError(
                 f"found {found:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
-                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MOST_PIXELS:.2g}: take fewer dots per "
+                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: take fewer dots per "
                 f"inch than {self.dpi}"
             )
 
@@ -79,10 +84,3 @@ class Style:
         sizes = {"axes.titlesize": self.font_size, "axes.labelsize": self.font_size, "font.size": self.font_size}
         small = dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), self.small)
         return {**sizes, **small, "image.cmap": COLOUR_MAP, "savefig.dpi": self.dpi}
-
-
-def _require(what: str, value: float, least: float, most: float) -> None:
-    if not least <= value <= most:
-        # An integer may be beyond the range of machine floats.
-        found = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
-        raise InputError(f"found {what.format(found)}, expected {least:g} to {most:g}")

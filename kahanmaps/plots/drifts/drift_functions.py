@@ -52,16 +52,14 @@ class OfTheImage:
         """The values, from one step of the Kahan map for all points together."""
         values = np.full(len(points), np.nan)
         good = np.isfinite(points).all(axis=1)
-        if not good.any():
-            return values
-        x = points[good]
-        ensemble = FloatEnsemble(self._function.hamiltonian.system, self._eps, x, kernel="numpy")
-        ensemble.advance(1)
-        image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
-        with np.errstate(all="ignore"):
-            found = self._values(x, image)
-        found[~np.isfinite(found)] = np.nan
-        values[good] = found
+        if good.any():
+            x = points[good]
+            ensemble = FloatEnsemble(self._function.hamiltonian.system, self._eps, x, kernel="numpy")
+            ensemble.advance(1)
+            image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
+            with np.errstate(all="ignore"):
+                found = self._values(x, image)
+            values[good] = np.where(np.isfinite(found), found, np.nan)
         return values
 
 

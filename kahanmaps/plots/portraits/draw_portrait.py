@@ -83,7 +83,7 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
             low, high = main_range(seen)
             drawn = _draw_coloured(axes, shown, found.values, range(shown.shape[1]), (low, high), lines, found)
             beyond = bool((seen < low).any()), bool((seen > high).any())
-            how = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
+            how: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
             figure.colorbar(drawn, ax=axes, **how).set_label(found.value_label)
         for side, label, limits in zip("xyz", found.labels, found.window, strict=False):
             axes.set(**{f"{side}label": label, f"{side}lim": limits})

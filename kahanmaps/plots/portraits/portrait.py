@@ -57,9 +57,8 @@ class Portrait:
     def pairs(self, orbit: int) -> NDArray[np.int64]:
         """The pairs (count, 2) of records of an orbit that a line joins."""
         found = self.joined[orbit] if self.joined else None
-        return (
-            np.stack([np.arange(len(self.points) - 1), np.arange(1, len(self.points))], 1) if found is None else found
-        )
+        steps = np.arange(len(self.points))
+        return np.stack([steps[:-1], steps[1:]], axis=1) if found is None else found
 
 
 def portrait_of(
