@@ -1,10 +1,12 @@
-"""What a portrait shows of the differential equation, against curves and equilibria that are known."""
+"""What a portrait shows of the differential equation, against curves and equilibria that are known; chosen starts."""
 
 import numpy as np
 import pytest
 
+from kahanmaps.documents.catalog import load
+from kahanmaps.plots.portraits.automatic_starts import COUNT, automatic_starts
 from kahanmaps.plots.portraits.flow import equilibria, plane_flow, solutions
-from kahanmaps.plots.portraits.portrait import neighbours
+from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 BOX = ((-3.0, 3.0), (-3.0, 3.0))
@@ -61,26 +63,31 @@ def test_a_solution_passes_what_is_a_pole_in_time_and_ends_after_its_time():
     assert past[-1, 1] > 0 > short[-1, 1]
 
 
-def test_neighbours_on_two_circles_are_joined_and_the_circles_are_not():
-    turn = 2.4 * np.arange(100)
-    points = np.stack([np.cos(turn) + 5 * (np.arange(100) % 2), np.sin(turn), 0 * turn], axis=1)
-    pairs = neighbours(points)
-    assert len(pairs) == 100
-    assert (pairs[:, 0] % 2 == pairs[:, 1] % 2).all()
-    assert np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).max() < 0.4
+# Starts
 
 
-def test_an_orbit_that_has_not_come_round_has_two_ends():
-    turn = np.linspace(0, 5, 50)
-    assert len(neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))) == 49
+@pytest.mark.parametrize("name", ["lotka_volterra", "henon_heiles", "euler_top"])
+def test_orbits_from_chosen_starts_stay_and_move_and_are_the_same_every_time(name):
+    system = load(name, {}).system
+    starts = automatic_starts(system, "1/20")
+    points = walked(ensemble_for(system, "1/20", starts, 300), 300).points
+    assert starts.shape == (COUNT, system.dim)
+    assert np.abs(points).max() < 20
+    assert (np.ptp(points, axis=0).max(axis=1) > 1e-3).all()
+    np.testing.assert_array_equal(automatic_starts(system, "1/20"), starts)
 
 
-def test_bunches_of_a_nearly_rational_rotation_are_joined_to_one_curve():
-    turn = (2 * np.pi / 20 + 1e-4) * np.arange(200)
-    pairs = neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))
-    assert np.bincount(pairs.ravel()).tolist() == [2] * 200
+def test_starts_of_the_predator_and_its_prey_surround_the_equilibrium_of_the_equations():
+    # a = 2, b = 1, c = 1, d = 3: the equilibrium with positive coordinates is (d/c, a/b) = (3, 2)
+    starts = automatic_starts(load("lotka_volterra", {"a": "2", "d": "3"}).system, "1/40")
+    assert (starts > [3, 2]).all()
 
 
-def test_a_cloud_has_no_curve():
-    assert neighbours(np.random.default_rng(1).uniform(size=(300, 2))) is None
-    assert neighbours(np.full((50, 2), np.nan)) is None
+@pytest.mark.parametrize("rhs", [["0"], ["x^2 + 1"]])
+def test_there_are_starts_without_an_equilibrium_or_motion(rhs):
+    assert automatic_starts(QuadraticSystem.from_text(["x"], rhs), "1/10").shape == (COUNT, 1)
+
+
+def test_starts_lie_along_the_plane_that_is_named():
+    starts = automatic_starts(load("henon_heiles", {}).system, "1/10", plane=(1, 3))
+    assert np.abs(starts[:, 1]).max() == np.abs(starts).max()

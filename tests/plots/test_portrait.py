@@ -12,14 +12,8 @@ from kahanmaps.plots.curves.level_sets import level_curves
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.draw_portrait import draw_portrait
-from kahanmaps.plots.portraits.portrait import portrait_of
-from kahanmaps.plots.portraits.trajectories import (
-    MAX_POINTS,
-    Trajectories,
-    ensemble_for,
-    euler_orbits,
-    walked,
-)
+from kahanmaps.plots.portraits.portrait import neighbours, portrait_of
+from kahanmaps.plots.portraits.trajectories import MAX_POINTS, Trajectories, ensemble_for, euler_orbits, walked
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -33,20 +27,21 @@ def orbits(count, steps=20):
     return walked(ensemble_for(LOTKA_VOLTERRA, "1/20", starts, steps), steps)
 
 
-def test_all_points_of_all_orbits_are_there():
+def trajectories(points):
+    return Trajectories(("x", "y"), np.array(points, dtype=float), np.arange(len(points)))
+
+
+def test_all_points_of_all_orbits_are_there_and_an_axis_may_be_the_step():
     shown = portrait_of(orbits(3), AXES)
     assert shown.points.shape == (21, 3, 2)
     assert (shown.left_out, shown.undefined, shown.labels) == (0, 0, ("$x$", "$y$"))
-
-
-def test_an_axis_may_be_the_step():
     shown = portrait_of(orbits(2), ["step", AXES[0]])
     assert shown.points[:, 1, 0].tolist() == list(range(21))
     assert shown.labels == ("step", "$x$")
 
 
 def test_points_at_a_pole_of_an_axis_or_of_the_colour_are_left_out_and_counted():
-    found = Trajectories(("x", "y"), np.array([[[1.0, 0.0]], [[2.0, 1.0]], [[0.0, 1.0]]]), np.arange(3))
+    found = trajectories([[[1, 0]], [[2, 1]], [[0, 1]]])
     shown = portrait_of(found, [point_function("1/x", "xy"), AXES[1]], colour=point_function("1/y", "xy"))
     assert shown.undefined == 2
     assert np.isnan(shown.points[:, 0, 0]).tolist() == [True, False, True]
@@ -59,61 +54,42 @@ def test_orbits_that_ended_are_not_called_undefined():
     assert portrait_of(found, ["step", point_function("x", "x")]).undefined == 0
 
 
-@pytest.mark.parametrize("count", [1, 4])
-def test_two_or_three_axes_are_wanted(count):
-    with pytest.raises(InputError, match=f"found {count} axes"):
-        portrait_of(orbits(1), AXES[:1] * count)
-
-
-def test_explicit_euler_is_what_its_formula_says_and_spirals_outward():
-    found = euler_orbits(LOTKA_VOLTERRA, "1/20", np.array([[1.0, 2.0]]), 100)
-    x, y = 1.0, 2.0
-    x, y = x + 0.1 * x * (1 - y), y + 0.1 * y * (x - 1)
-    np.testing.assert_allclose(found.points[1, 0], [x, y])
-    energy = found.points.sum(axis=2) - np.log(found.points).sum(axis=2)
-    assert energy[-1, 0] > energy[0, 0] + 0.1
-
-
-def test_kahans_orbit_of_the_same_start_does_not_spiral():
-    points = walked(ensemble_for(LOTKA_VOLTERRA, "1/20", np.array([[1.0, 2.0]]), 2000), 2000).points
-    energy = points.sum(axis=2) - np.log(points).sum(axis=2)
-    assert np.ptp(energy) < 0.005  # O(eps^2), for ever
-
-
-def test_more_points_than_can_be_drawn_are_refused():
+def test_wrong_numbers_of_axes_and_of_points_are_refused():
+    for count in (1, 4):
+        with pytest.raises(InputError, match=f"found {count} axes"):
+            portrait_of(orbits(1), AXES[:1] * count)
     with pytest.raises(InputError, match="take fewer"):
         orbits(1, MAX_POINTS)
+    with pytest.raises(InputError, match="draw dots"):
+        draw_portrait(portrait_of(trajectories(np.zeros((1_000_001, 1, 2))), AXES), STYLE, lines=True)
 
 
-def test_more_orbits_are_one_cloud_with_a_colour_for_each():
+def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahans_orbit_does_not():
+    start, (x, y) = np.array([[1.0, 2.0]]), (1.0, 2.0)
+    euler = euler_orbits(LOTKA_VOLTERRA, "1/20", start, 100).points
+    np.testing.assert_allclose(euler[1, 0], [x + 0.1 * x * (1 - y), y + 0.1 * y * (x - 1)])
+    kahan = walked(ensemble_for(LOTKA_VOLTERRA, "1/20", start, 2000), 2000).points
+    spiral, closed = (points.sum(axis=2) - np.log(points).sum(axis=2) for points in (euler, kahan))
+    assert spiral[-1, 0] > spiral[0, 0] + 0.1
+    assert np.ptp(closed) < 0.005  # O(eps^2), for ever
+
+
+def test_more_orbits_are_one_cloud_with_a_colour_for_each_the_widest_first():
     figure = draw_portrait(portrait_of(orbits(8), AXES), STYLE)
     (cloud,) = (c for c in figure.axes[0].collections if isinstance(c, PathCollection))
-    assert len(cloud.get_offsets()) == 8 * 21
-    assert len(np.unique(cloud.get_array())) == 8
-
-
-def test_the_widest_orbits_are_drawn_first():
-    figure = draw_portrait(portrait_of(orbits(8), AXES), STYLE)
     # the starts are farther and farther from the equilibrium
-    assert figure.axes[0].collections[0].get_array().tolist() == [k for k in range(7, -1, -1) for _ in range(21)]
-
-
-def test_millions_of_points_are_not_joined():
-    found = Trajectories(("x", "y"), np.zeros((1_000_001, 1, 2)), np.arange(1_000_001))
-    with pytest.raises(InputError, match="draw dots"):
-        draw_portrait(portrait_of(found, AXES), STYLE, lines=True)
+    assert cloud.get_array().tolist() == [k for k in range(7, -1, -1) for _ in range(21)]
+    assert len(cloud.get_offsets()) == 8 * 21
 
 
 def test_no_line_goes_through_a_missing_point():
-    points = np.array([[[0.0, 0.0]], [[1.0, 1.0]], [[np.nan, np.nan]], [[3.0, 0.0]]])
-    found = Trajectories(("x", "y"), points, np.arange(4))
-    shown = portrait_of(found, AXES, colour="step")
+    shown = portrait_of(trajectories([[[0, 0]], [[1, 1]], [[np.nan, np.nan]], [[3, 0]]]), AXES, colour="step")
     assert len(draw_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
 
 
 def test_points_outside_the_window_do_not_spoil_the_colours():
     values = np.append(np.linspace(0, 1, 50), [1e6] * 20)
-    found = Trajectories(("x", "y"), np.stack([values, values], axis=1)[:, None], np.arange(70))
+    found = trajectories(np.stack([values, values], axis=1)[:, None])
     shown = portrait_of(found, AXES, colour=AXES[0], window=((0, 2), (0, 2)))
     assert draw_portrait(shown, STYLE).axes[0].collections[0].norm.vmax == 1
 
@@ -146,5 +122,31 @@ def test_points_outside_the_window_are_not_drawn_in_space():
 
 
 def test_no_points_at_all_are_an_empty_picture():
-    found = Trajectories(("x", "y"), np.full((2, 1, 2), np.nan), np.arange(2))
+    found = trajectories(np.full((2, 1, 2), np.nan))
     assert picture_bytes(draw_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
+
+
+# Neighbours on a curve
+
+
+def circle(turn):
+    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
+def test_neighbours_on_two_circles_are_joined_and_the_circles_are_not():
+    points = circle(2.4 * np.arange(100)) + 5 * (np.arange(100) % 2)[:, None]
+    pairs = neighbours(points)
+    assert len(pairs) == 100
+    assert (pairs[:, 0] % 2 == pairs[:, 1] % 2).all()
+    assert np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1).max() < 0.4
+
+
+def test_an_orbit_that_has_not_come_round_has_two_ends_and_one_in_bunches_none():
+    assert len(neighbours(circle(np.linspace(0, 5, 50)))) == 49
+    nearly_rational = neighbours(circle((2 * np.pi / 20 + 1e-4) * np.arange(200)))
+    assert np.bincount(nearly_rational.ravel()).tolist() == [2] * 200
+
+
+def test_a_cloud_has_no_curve():
+    assert neighbours(np.random.default_rng(1).uniform(size=(300, 2))) is None
+    assert neighbours(np.full((50, 2), np.nan)) is None
