@@ -40,30 +40,32 @@ def test_marks_are_the_points_of_each_kind_of_growth(found):
         assert sorted(line.get_xdata()) == sorted(int(one.values["a"].p) / int(one.values["a"].q) for one in points)
 
 
-def test_curves_are_the_zeros_of_the_conditions(found):
-    [axes] = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0))).axes
+def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_them(found):
+    figure = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0)))
+    [axes] = figure.axes
     a, b = np.concatenate(axes.collections[1].get_segments()).T  # those of linear growth
     assert len(a) > 50
     assert np.abs(2 * a * b - a - b).max() < 1e-9
     assert (axes.get_xlim(), axes.get_xlabel()) == ((-2.0, 2.0), "$a$")
-
-
-def test_a_plane_is_drawn_and_nothing_else():
-    with pytest.raises(InputError, match="expected two parameters"):
-        draw_scan(scan(parse_system(PLANE), ["a"], terms=1, primes=[5, 7, 11], seconds=1e-6))
-
-
-def test_a_scan_without_conditions_is_an_empty_plane():
-    none = scan(parse_system(PLANE), ["a", "b"], terms=1, primes=[5, 7, 11], seconds=1e-6)
-    assert draw_scan(none).legends == []
-
-
-def test_conditions_are_written_beside_what_they_describe(found):
-    [axes] = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0))).axes
     at = {text.get_text(): text.xy for text in axes.texts}
     a, b = at["2*a*b - a - b = 0"]
     assert abs(2 * a * b - a - b) < 1e-9
     assert at["(1, 1)"] == (1, 1)
+    # Conditions do not overlap, and none is of exponential growth.
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) > 3
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    assert not set(at) & {one.text for one in of_growth(found, "exponential")}
+
+
+def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimension_refused():
+    none, line = (
+        scan(parse_system(PLANE), over, terms=1, primes=[5, 7, 11], seconds=1e-6) for over in (["a", "b"], ["a"])
+    )
+    assert draw_scan(none).legends == []
+    with pytest.raises(InputError, match="expected two parameters"):
+        draw_scan(line)
 
 
 def test_the_plane_modulo_a_prime_has_every_slow_member(found):
@@ -75,14 +77,3 @@ def test_the_plane_modulo_a_prime_has_every_slow_member(found):
     assert (2 * a * b - a - b) % 13 == 0
     with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
         draw_scan(found, modulo=19)
-
-
-def test_conditions_do_not_overlap_and_none_is_of_exponential_growth(found):
-    figure = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0)))
-    figure.canvas.draw()
-    [axes] = figure.axes
-    boxes = [text.get_window_extent() for text in axes.texts]
-    assert len(boxes) > 3
-    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
-    named = {text.get_text() for text in axes.texts}
-    assert not named & {one.text for one in of_growth(found, "exponential")}

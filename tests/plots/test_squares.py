@@ -32,16 +32,12 @@ def plane_pair(f, g):
     return Pair(QuadraticSystem.from_text(["x", "y"], f), QuadraticSystem.from_text(["x", "y"], g), ("f", "g"))
 
 
-def test_associated_maps_close_exactly(both):
-    assert both[0].closes is True
-    assert both[0].verdict == "closes exactly"
-    assert both[0].g_after_f == both[0].f_after_g
-
-
-def test_the_maps_of_the_control_leave_a_gap(both):
-    assert both[1].closes is False
-    assert both[1].verdict == f"gap {both[1].gap:.3g}"
-    assert both[1].gap > 1e-4
+def test_associated_maps_close_exactly_and_those_of_the_control_leave_a_gap(both):
+    closed, open_ = both
+    assert (closed.closes, closed.verdict) == (True, "closes exactly")
+    assert closed.g_after_f == closed.f_after_g
+    assert (open_.closes, open_.verdict) == (False, f"gap {open_.gap:.3g}")
+    assert open_.gap > 1e-4
 
 
 def test_one_changed_coefficient_opens_the_square(both):
@@ -88,16 +84,13 @@ def test_what_is_there_is_compared_where_points_are_missing():
     assert found.stopped
 
 
-def test_numbers_that_grow_too_long_are_left_out(monkeypatch):
+def test_numbers_that_grow_too_long_are_left_out_and_wrong_numbers_of_steps_refused(monkeypatch):
     monkeypatch.setattr(module, "MAX_BITS", 40)
     found = squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2)
     assert "more than 40 bits" in found.stopped
-
-
-@pytest.mark.parametrize("steps", [0, 13])
-def test_wrong_numbers_of_steps_are_refused(steps):
-    with pytest.raises(InputError, match="expected 1 to 12"):
-        squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [1, 2], "1/10", steps)
+    for steps in (0, 13):
+        with pytest.raises(InputError, match="expected 1 to 12"):
+            squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [1, 2], "1/10", steps)
 
 
 def test_the_chosen_signs_are_drawn_and_their_neighbour():
@@ -116,26 +109,23 @@ def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
 
 
 def test_a_recognised_member_is_found():
-    file = load("paper_m2")
-    pair, _ = pairs_of_member(SystemFile.from_system(file.system))
+    pair, _ = pairs_of_member(SystemFile.from_system(load("paper_m2").system))
     assert squares(pair, START, "1/50").closes is True
 
 
 def test_in_the_plane_the_control_is_twice_the_system():
     file = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["-6*x*y", "3*y^2 - 3*x^2"]))
-    pair, control = pairs_of_member(file)
-    assert squares(pair, [1, "1/2"], "1/10").closes is True
-    assert squares(control, [1, "1/2"], "1/10").closes is False
+    assert [squares(pair, [1, "1/2"], "1/10").closes for pair in pairs_of_member(file)] == [True, False]
 
 
-def test_one_system_that_is_no_member_is_refused():
+def test_systems_that_are_no_pair_are_refused():
+    lorenz = load("lorenz")
     with pytest.raises(InputError, match="give a second system"):
-        pairs_of_member(load("lorenz"))
-
-
-def test_systems_of_different_dimension_are_refused():
+        pairs_of_member(lorenz)
     with pytest.raises(InputError, match="expected the same dimension"):
-        pair_of_systems(load("lorenz"), load("paper_m2"), "1/10")
+        pair_of_systems(lorenz, load("paper_m2"), "1/10")
+    with pytest.raises(InputError, match="eps2 = 0"):
+        pair_of_systems(lorenz, lorenz, "1/100", 0)
 
 
 def test_another_step_is_another_map():
@@ -144,11 +134,6 @@ def test_another_step_is_another_map():
     other = squares(pair_of_systems(file, file, "1/100", "1/50"), [1, 2, 3], "1/100")
     assert (same.closes, other.closes) == (True, False)
     assert other.g_after_f[0][1] == KahanMap(file.system, "1/50").step([1, 2, 3])
-
-
-def test_a_step_of_zero_is_refused():
-    with pytest.raises(InputError, match="eps2 = 0"):
-        pair_of_systems(load("lorenz"), load("lorenz"), "1/100", 0)
 
 
 def test_axes_in_which_nothing_moves_are_not_chosen():
@@ -174,20 +159,12 @@ def test_rings_hold_their_dots_exactly_where_the_maps_commute(both):
         assert rings.shape == (2, 9)
 
 
-def test_a_small_gap_is_shown_magnified(both):
+def test_a_small_gap_is_shown_magnified_by_a_number_without_computer_notation(both):
     closed, open_ = draw_squares(both, STYLE).axes
-    assert len(closed.child_axes) == 0
-    assert len(open_.child_axes) == 1
+    assert (len(closed.child_axes), len(open_.child_axes)) == (0, 1)
     assert open_.child_axes[0].texts[0].get_text().startswith(r"$\times")
-
-
-def test_how_much_a_gap_is_magnified_is_a_number_and_no_computer_notation():
-    assert [_in_two_digits(number) for number in (6.08, 183.0, 0.52, 1.26e6)] == [
-        "6.1",
-        "180",
-        "0.52",
-        r"1.3\cdot10^{6}",
-    ]
+    numbers = {6.08: "6.1", 183.0: "180", 0.52: "0.52", 1.26e6: r"1.3\cdot10^{6}"}
+    assert {number: _in_two_digits(number) for number in numbers} == numbers
 
 
 def test_a_title_does_not_break_an_equation_at_its_sign():
