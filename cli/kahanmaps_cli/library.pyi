@@ -191,7 +191,6 @@ from kahanmaps.plots.drifts.drift import METHODS as METHODS
 from kahanmaps.plots.drifts.drift import DriftSurvey as DriftSurvey
 from kahanmaps.plots.drifts.drift import small_start as small_start
 from kahanmaps.plots.drifts.drift import survey_drift as survey_drift
-from kahanmaps.plots.drifts.drift_functions import WatchedFunction as WatchedFunction
 from kahanmaps.plots.drifts.drift_functions import asked_axis as asked_axis
 from kahanmaps.plots.drifts.drift_functions import asked_function as asked_function
 from kahanmaps.plots.drifts.drift_functions import asked_functions as asked_functions

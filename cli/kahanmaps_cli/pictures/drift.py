@@ -66,7 +66,14 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     if eps == 0:
         raise lib.InputError("found eps = 0, expected another number: nothing moves")
     talk: list[str] = []
-    functions = _functions(rounded, eps, options, talk)
+    if options["integrals"]:
+        functions = lib.asked_functions(rounded, eps, options["integrals"])
+    else:
+        known = lib.known_functions(rounded, eps)
+        own = [function for function in known if function.name != "H"]
+        if len(own) > _SHOWN:
+            talk.append(f"shown: {_SHOWN} of {len(own)} known integrals; --integral NAME shows others")
+        functions = own[:_SHOWN] + [function for function in known if function.name == "H"]
     form, reason = lib.float_normal_form(rounded)
     methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
     if "normal-form" in methods and form is None:
@@ -86,17 +93,6 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     early = not all(end.is_whole for end in survey.ends.values())
     figure = lib.draw_drift(survey, style_from(options), scale=options["scale"])
     return Drawn(figure, file, [*talk, *_told(survey)], 3 if early else 0)
-
-
-def _functions(file: lib.SystemFile, eps: Any, options: dict[str, Any], talk: list[str]) -> list[lib.WatchedFunction]:
-
-    if options["integrals"]:
-        return lib.asked_functions(file, eps, options["integrals"])
-    known = lib.known_functions(file, eps)
-    own = [function for function in known if function.name != "H"]
-    if len(own) > _SHOWN:
-        talk.append(f"shown: {_SHOWN} of {len(own)} known integrals; --integral NAME shows others")
-    return own[:_SHOWN] + [function for function in known if function.name == "H"]
 
 
 def _told(survey: lib.DriftSurvey) -> Iterator[str]:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
-from functools import partial
 from itertools import chain, count
-from pathlib import Path
 from typing import Any
 
 import click
@@ -68,36 +65,36 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
     recurrence was found (the picture is written).
     """
     growths: dict[str, lib.DegreeGrowth] = {}
+
+    def add(name: str, found: lib.DegreeGrowth) -> None:
+        """Two systems may have one name: the second is called name (2)."""
+        names = chain([name], (f"{name} ({k})" for k in count(2)))
+        growths[next(free for free in names if free not in growths)] = found
+
     for path in options["records"]:
-        _add(growths, *lib.degrees_of_record(read_record(path), path))
+        add(*lib.degrees_of_record(read_record(path), path))
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     inline = opt.is_inline(options)
-    asked: list[str | None] = list(options["systems"])
-    if inline or not (asked or growths):
-        asked.append(None)
-    if inline and len(asked) > 1:
+    names: list[str | None] = list(options["systems"])
+    if inline or not (names or growths):
+        names.append(None)
+    if inline and len(names) > 1:
         raise click.UsageError("give SYSTEMs or an inline one, not both")
-    if len(asked) > 1 and options["parameters"]:
+    if len(names) > 1 and options["parameters"]:
         raise click.UsageError("-p is for one system: write several as files, or draw --from records")
-    files = [opt.load_system(name, options) for name in asked]
+    files = [opt.load_system(name, options) for name in names]
     early: list[str] = []
     for file in files:
-        found = measured(file, eps, options, partial(_tell, progress, file.label))
-        _add(growths, file.label, found)
+
+        def told(sentence: str, name: str = file.label) -> None:
+            progress(f"{name}: {sentence}")
+
+        found = measured(file, eps, options, told)
+        add(file.label, found)
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")
     figure = lib.draw_degrees(growths, style_from(options), scale=options["scale"])
     return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early else 0)
-
-
-def _tell(progress: Progress, name: str, sentence: str) -> None:
-    progress(f"{name}: {sentence}")
-
-
-def _add(growths: dict[str, lib.DegreeGrowth], name: str, found: lib.DegreeGrowth) -> None:
-    """Two systems may have one name: the second is called name (2)."""
-    names = chain([name], (f"{name} ({k})" for k in count(2)))
-    growths[next(free for free in names if free not in growths)] = found
 
 
 @picture(
@@ -167,11 +164,8 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
 def read_record(path: str) -> Any:
     """The JSON object in a file, `-` for standard input. Raises InputError where there is none."""
     try:
-        if path == "-":
-            content = sys.stdin.buffer.read(_MAX_BYTES + 1)
-        else:
-            with Path(path).open("rb") as file:
-                content = file.read(_MAX_BYTES + 1)
+        with click.open_file(path, "rb") as file:
+            content = file.read(_MAX_BYTES + 1)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     if len(content) > _MAX_BYTES:

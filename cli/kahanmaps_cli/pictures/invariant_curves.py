@@ -58,16 +58,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
     original = two_variables("--original", options["original"], file.variables)
     found = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
-    labels = [f"start {_short(lib.format_point(start))}" for start in options["starts"]]
+    texts = [lib.format_point(start) for start in options["starts"]]
+    labels = [f"start {text if len(text) <= 30 else text[:30] + '...'}" for text in texts]
     figure = lib.draw_invariant_curves(
         found, style_from(options), options["projective"], options["flow"], original, labels
     )
     is_whole = all(pole is None for pole in found.poles)
     return Drawn(figure, file, list(_told(found, options["projective"])), 0 if is_whole else 3)
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 30 else text[:30] + "..."
 
 
 def _told(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:

@@ -10,13 +10,13 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm
-from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.classical import VectorField
+from kahanmaps.maps.floats.doubles import FloatArray, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
@@ -119,8 +119,14 @@ def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: i
     >>> euler_orbits(QuadraticSystem.from_text(["x"], ["x"]), "1/2", np.array([[1.0]]), 2).points[:, 0, 0].tolist()
     [1.0, 2.0, 4.0]
     """
-    context = ring((*system.variables, "eps"))
-    *x, symbol = context.gens()
-    rhs = (f.compose(*x, ctx=context) for f in system.rhs)
-    image = [RationalFunction(y + 2 * symbol * f, context.constant(1)) for y, f in zip(x, rhs, strict=True)]
-    return walked(FloatEnsemble(explicit_map(system.variables, image), eps, starts, kernel="numpy"), steps)
+    require_steps(steps)
+    f, h = VectorField(system), to_float(2 * rational(eps))
+    points = [np.array(starts, dtype=np.float64)]
+    with np.errstate(all="ignore"):
+        for _ in range(steps):
+            points.append(points[-1] + h * f(points[-1]))
+    orbits = np.array(points)
+    orbits[~np.isfinite(orbits).all(axis=2)] = np.nan
+    gone = int(np.isnan(orbits[-1]).any(axis=1).sum())
+    ended = {"left the range of machine floats": gone} if gone else {}
+    return Trajectories(system.variables, orbits, np.arange(steps + 1), ended)
