@@ -92,12 +92,19 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     colour = options["colour"]
     if colour not in ("orbit", "step"):
         colour = lib.asked_function(file, eps, colour)
+    levels = None if options["levels"] is None else lib.asked_axis(file, eps, options["levels"])
+    axes = _asked_axes(file, eps, options)
     found = lib.walked(
         lib.ensemble_of_file(file, eps, starts, steps, backward=options["backward"]),
         steps,
         lambda step: progress(f"step {step} of {steps}"),
     )
-    axes = _axes(file, eps, options, found, notes)
+    if axes is None:
+        count = 3 if options["space"] else 2
+        chosen = [file.variables[k] for k in lib.fullest_axes(found.points.reshape(-1, file.dim), count)]
+        axes = tuple(lib.asked_axis(file, eps, name) for name in chosen)
+        if file.dim > count:
+            notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
     euler = None
     if options["euler"]:
         # Without a quadratic field `file.system` says why there is none.
@@ -108,16 +115,16 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     shown = replace(
         shown,
         flow=_flow(field, eps, axes, shown.window, found, options),
-        levels=_levels(file, eps, axes, shown.window, starts, options, notes),
+        levels=None if levels is None else _levels(levels, axes, shown.window, starts, options["levels_at"], notes),
     )
     note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
     figure = lib.draw_portrait(shown, style_from(options), lines=options["lines"], equal=options["equal"], note=note)
 
     orbits = counted(found.orbits, "orbit")
-    chosen = "" if any(map(_is_given, (options[name] for name in _STARTS))) else " from chosen starts"
+    origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from chosen starts"
     backward = ", backward" if options["backward"] else ""
     told = "" if eps is None else lib.eps_told(eps, file.map)
-    talk = [f"{file.label}: {orbits}{chosen}, {counted(len(found.points) - 1, 'step')}{backward}{told}"]
+    talk = [f"{file.label}: {orbits}{origin}, {counted(len(found.points) - 1, 'step')}{backward}{told}"]
     talk += [f"{count} of {orbits} ended early: {reason}" for reason, count in found.ended.items()]
     points = found.points.shape[0] * found.points.shape[1]
     if chords := sum(one is None for one in shown.joined):
@@ -179,10 +186,8 @@ def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, o
     return lib.automatic_starts(field, eps, plane, backward=options["backward"])
 
 
-def _axes(
-    file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.Trajectories, notes: list[str]
-) -> tuple[lib.PointFunction | str, ...]:
-    """The axes that are asked for, or those variables in which the points spread most (said in the notes)."""
+def _asked_axes(file: lib.SystemFile, eps: Any, options: dict[str, Any]) -> tuple[lib.PointFunction | str, ...] | None:
+    """The axes that are asked for, or the only ones there are; None where the points have to say."""
     text, count = options["axes"], 3 if options["space"] else 2
     if text is not None:
         pieces = [piece.strip() for piece in text.split(",")]
@@ -198,30 +203,17 @@ def _axes(
         return "step", lib.asked_axis(file, eps, file.variables[0])
     if file.dim < count:
         raise lib.InputError(f"found {file.dim} variables, expected at least {count} for that many axes")
-    chosen = [file.variables[k] for k in lib.fullest_axes(found.points.reshape(-1, file.dim), count)]
-    if file.dim > count:
-        notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
-    return tuple(lib.asked_axis(file, eps, name) for name in chosen)
+    return None
 
 
 def _levels(
-    file: lib.SystemFile,
-    eps: Any,
-    axes: Sequence[Any],
-    window: lib.Window,
-    starts: Any,
-    options: dict[str, Any],
-    notes: list[str],
-) -> lib.LevelCurves | None:
-    if options["levels"] is None:
-        return None
-    function = lib.asked_axis(file, eps, options["levels"])
+    function: lib.PointFunction, axes: Sequence[Any], window: lib.Window, starts: Any, at: Any, notes: list[str]
+) -> lib.LevelCurves:
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if len(plane) != 2 or len(axes) != 2:
         raise lib.InputError("level curves are drawn in the plane of two variables: take --axes X,Y with two of them")
-    at = options["levels_at"]
     values = lib.levels_through(function, starts) if at is None else lib.to_floats(at).tolist()
-    curves = lib.level_curves(function, plane, file.dim, values, window)
+    curves = lib.level_curves(function, plane, starts.shape[1], values, window)
     if curves.missing:
         notes.append(f"{curves.missing} of {len(values)} levels of {function.name} have no curve in the window")
     return curves
