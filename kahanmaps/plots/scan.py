@@ -52,7 +52,10 @@ def draw_scan(
     if len(found.over) != 2:
         raise InputError(f"found a scan over {', '.join(found.over)}, expected two parameters: a plane is drawn")
     style = style or Style()
-    kinds = _kinds(found)
+    kinds: dict[str, list[Component]] = {}  # by the growth of their blocks, the slowest first
+    for _, some in found.classes:
+        growth = growth_on(some)
+        kinds.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(some)
     if modulo is not None:
         known = {one.prime: one for one in found.sweeps if one.complete}
         if modulo not in known:
@@ -184,16 +187,6 @@ def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)
-
-
-def _kinds(found: Scan) -> dict[str, list[Component]]:
-    """The components by the growth of their blocks, the slowest first."""
-    kinds: dict[str, list[Component]] = {}
-    for _, some in found.classes:
-        growth = growth_on(some)
-        kind = Growth.UNKNOWN if growth is None else growth.growth
-        kinds.setdefault(f"{kind} growth", []).extend(some)
-    return kinds
 
 
 def _place(one: Component) -> tuple[float, float]:

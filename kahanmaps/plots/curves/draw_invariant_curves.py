@@ -55,8 +55,10 @@ def draw_invariant_curves(
     side = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
     height = rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter
     with drawing(style):
+        from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
         from matplotlib.lines import Line2D
+        from matplotlib.ticker import MaxNLocator
 
         figure = new_figure(style, height / style.width)
         steps = max(len(x) for x in found.originals) - 1
@@ -84,7 +86,12 @@ def draw_invariant_curves(
             ]
             figure.legend(handles=handles, loc="outside lower center", ncols=2)
         elif steps:
-            pen.add_bar(figure, found.poles[0])
+            how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
+            bar = figure.colorbar(ScalarMappable(pen.scale, COLOUR_MAP), ax=figure.axes, **how)
+            pole = found.poles[0]
+            bar.set_label("step" if pole is None else f"step (a pole at step {pole} ends the orbit)")
+            bar.outline.set_linewidth(0.4)
+            bar.locator = MaxNLocator(nbins=6, integer=True)
     return figure
 
 
@@ -128,16 +135,6 @@ class _Pen:
                 aside = -aside
             how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
             beside(axes, str(k), (x[k], y[k]), tuple(8 * aside), 1.5, zorder=4, **how)
-
-    def add_bar(self, figure: Figure, pole: int | None) -> None:
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.ticker import MaxNLocator
-
-        how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
-        bar = figure.colorbar(ScalarMappable(self.scale, COLOUR_MAP), ax=figure.axes, **how)
-        bar.set_label("step" if pole is None else f"step (a pole at step {pole} ends the orbit)")
-        bar.outline.set_linewidth(0.4)
-        bar.locator = MaxNLocator(nbins=6, integer=True)
 
 
 def _draw_plane(

@@ -61,30 +61,19 @@ def _three_lines(block: PlanarBlock) -> Matrix:
 
 
 def _one_line(block: PlanarBlock) -> Matrix:
-    """D is a product of two real forms L and M, and h a sum of their cubes, which are scaled alike and turned."""
+    """D is a product of two real forms L and M, and h = s L^3 + t M^3, which are scaled alike and turned."""
     p, q, r = block.D
     root = (q * q - 4 * p * r).sqrt()
-    t = -(q + root) / 2 if not q < 0 else -(q - root) / 2
-    L, M = (p, -t), (t, -r)
-    left, right = _cubes(block, L, M)
+    slope = -(q + root) / 2 if not q < 0 else -(q - root) / 2
+    L, M = (p, -slope), (slope, -r)
     det = L[0] * M[1] - L[1] * M[0]
-    ratio = _cube_root(right / left)
+    s, t = block.h(M[1] / det, -M[0] / det), block.h(-L[1] / det, L[0] / det)
+    ratio = abs(t / s).root(3) if t / s > 0 else -abs(t / s).root(3)
     if det * ratio < 0:
-        L, M, left, det, ratio = M, L, right, -det, 1 / ratio
+        L, M, s, det, ratio = M, L, t, -det, 1 / ratio
     scale = 1 / (det * ratio).sqrt()
-    if left < 0:
+    if s < 0:
         scale = -scale
     half = arb(1) / arb(2).sqrt()
     forms = arb_mat([[entry * scale for entry in L], [entry * scale * ratio for entry in M]])
     return arb_mat([[half, half], [-half, half]]) * forms
-
-
-def _cubes(block: PlanarBlock, L: tuple[arb, arb], M: tuple[arb, arb]) -> tuple[arb, arb]:
-    """The s and t with h = s L^3 + t M^3."""
-    det = L[0] * M[1] - L[1] * M[0]
-    return block.h(M[1] / det, -M[0] / det), block.h(-L[1] / det, L[0] / det)
-
-
-def _cube_root(number: arb) -> arb:
-    root = abs(number).root(3)
-    return root if number > 0 else -root

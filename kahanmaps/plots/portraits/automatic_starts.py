@@ -41,42 +41,31 @@ def automatic_starts(
     centres = [one.point for one in order[:_CENTRES]]
     if all(centre.any() for centre in centres):
         centres.append(np.zeros(system.dim))
+    others = [index for index in range(system.dim) if index not in plane]
     found: list[tuple[int, FloatArray]] = []
     for centre in centres:
-        size = 3 * float(np.abs(centre[plane]).max()) or 1.5
         # Around the origin of a homogeneous field a smaller size is only a slower motion.
-        for _ in range(1 if system.is_homogeneous and not centre.any() else _SIZES):
-            starts = _around(system, centre, size, plane)
-            staying = _staying(system, eps, starts, centre, backward)
-            if staying == COUNT:
+        is_scaled = system.is_homogeneous and not centre.any()
+        for k in range(1 if is_scaled else _SIZES):
+            size = (3 * float(np.abs(centre[plane]).max()) or 1.5) * _SHRINK**k
+            starts = np.tile(centre, (COUNT, 1))
+            if is_scaled and len(plane) == 2:
+                angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # so that no symmetry takes one start to another
+                starts[:, plane] += size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+                starts[:, others] += size / 5
+            else:
+                shares = np.arange(1, COUNT + 1) / COUNT * size
+                for index, part in zip(plane, (1.0, 0.25), strict=False):
+                    starts[:, index] += part * shares
+                for place, index in enumerate(others):
+                    starts[:, index] += shares / (4 + place)
+            ensemble = ensemble_for(system, eps, starts, _STEPS, backward=backward)
+            points = np.concatenate(list(ensemble.records(_STEPS, 1)))
+            with np.errstate(all="ignore"):
+                distance = np.abs(points - centre).max(axis=2)
+                moves = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
+            stays = (distance <= _FAR * np.abs(starts - centre).max()).all(axis=0)
+            if (stays & moves).all():
                 return starts
-            found.append((staying, starts))
-            size *= _SHRINK
+            found.append((int((stays & moves).sum()), starts))
     return max(found, key=lambda one: one[0])[1]
-
-
-def _around(system: QuadraticSystem, centre: FloatArray, size: float, plane: Sequence[int]) -> FloatArray:
-    starts = np.tile(centre, (COUNT, 1))
-    others = [index for index in range(system.dim) if index not in plane]
-    if system.is_homogeneous and not centre.any() and len(plane) == 2:
-        angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # so that no symmetry takes one start to another
-        starts[:, plane[0]] += size * np.cos(angles)
-        starts[:, plane[1]] += size * np.sin(angles)
-        starts[:, others] += size / 5
-        return starts
-    shares = np.arange(1, COUNT + 1) / COUNT * size
-    for index, part in zip(plane, (1.0, 0.25), strict=False):
-        starts[:, index] += part * shares
-    for place, index in enumerate(others):
-        starts[:, index] += shares / (4 + place)
-    return starts
-
-
-def _staying(system: QuadraticSystem, eps: Any, starts: FloatArray, centre: FloatArray, backward: bool) -> int:
-    """How many of the orbits stay near the centre, and move at all."""
-    points = np.concatenate(list(ensemble_for(system, eps, starts, _STEPS, backward=backward).records(_STEPS, 1)))
-    with np.errstate(all="ignore"):
-        distance = np.abs(points - centre).max(axis=2)
-        moved = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
-    reach = _FAR * np.abs(starts - centre).max()
-    return int(((distance <= reach).all(axis=0) & moved).sum())
