@@ -42,9 +42,9 @@ class PointFunction:
         variable = self.variable
         if variable is not None:
             return np.array(points[..., variable], dtype=np.float64)
-        above, below = self.parts(points)
+        numerator, denominator = self.parts(points)
         with np.errstate(all="ignore"):
-            values = above / below
+            values = numerator / denominator
         return np.where(np.isfinite(values), values, np.nan)
 
     def at(self, point: Sequence[fmpq]) -> fmpq | None:

@@ -95,7 +95,7 @@ def rounded(point):
 def test_the_curve_is_the_conserved_quantity_of_the_catalogue(curves):
     # paper_m2 claims I1 and I2 = h_i/(1 + eps^2 D_i): at the start they are the levels, up to 1/chi'(root) = -1, 1
     file, found = load("paper_m2"), curves("m = 2")
-    levels = sorted(abs(p.orbits[0].cubic.above / p.orbits[0].cubic.below) for p in found.planes)
+    levels = sorted(abs(p.orbits[0].cubic.numerator / p.orbits[0].cubic.denominator) for p in found.planes)
     point = [QQ.convert(entry) for entry in (*START[4], "1/20")]
     claimed = [f.numerator(*point) / f.denominator(*point) for f in file.integrals.values()]
     assert levels == pytest.approx(sorted(map(abs, rounded(claimed))))

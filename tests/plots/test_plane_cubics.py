@@ -30,7 +30,7 @@ ACROSS = 1e-11  # Newton's method ends in roundings of the largest term: of the 
 
 def vertices(cubic):
     """The vertices that are drawn in a window, as u and v."""
-    size = 3 * max(1, abs(cubic.above)) ** (1 / 3)
+    size = 3 * max(1, abs(cubic.numerator)) ** (1 / 3)
     return np.concatenate(Rectangle((0.1, 0.2), (1.5 * size, size), 0).curves(cubic)).T
 
 
@@ -44,7 +44,7 @@ def distance(cubic, u, v):
     """The largest distance of points from the curve, to first order, relative to how far out they are."""
     (a, b, c, d), (p, q, r) = cubic.h, cubic.D
     D = cubic.eps**2 * (p * u * u + q * u * v + r * v * v)
-    value = cubic.below * (a * u**3 + b * u * u * v + c * u * v * v + d * v**3) - cubic.above * (1 + D)
+    value = cubic.denominator * (a * u**3 + b * u * u * v + c * u * v * v + d * v**3) - cubic.numerator * (1 + D)
     return float(np.max(np.abs(value) / np.hypot(*cubic.gradient(u, v)) / (cubic.length + np.hypot(u, v))))
 
 
@@ -76,7 +76,7 @@ def test_every_line_through_the_origin_meets_the_curve_as_often_as_the_equation_
         a, b, c, d = cubic.h
         p, q, r = cubic.D
         D, h = p * x * x + q * x * y + r * y * y, a * x**3 + b * x * x * y + c * x * y * y + d * y**3
-        roots = np.roots([1, 0, cubic.eps**2 * D, -h / cubic.above])
+        roots = np.roots([1, 0, cubic.eps**2 * D, -h / cubic.numerator])
         expected = sum(abs(root.imag) < 1e-9 for root in roots)
         crossings = 0
         for arc in found:

@@ -1,7 +1,7 @@
 """The level curves of a planar Kahan map, which are plane cubics.
 
 The Kahan map of u' = h_v, v' = -h_u, h = a u^3 + b u^2 v + c u v^2 + d v^3, conserves h/(1 + eps^2 D) with the Hessian
-determinant D = h_uu h_vv - h_uv^2, so an orbit stays on a cubic below * h = above * (1 + eps^2 D).
+determinant D = h_uu h_vv - h_uv^2, so an orbit stays on a cubic denominator * h = numerator * (1 + eps^2 D).
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlaneCubic:
-    """The curve below * h = above * (1 + eps^2 D) in the plane, for the coefficients of h and eps (half the time step).
+    """The curve denominator * h = numerator * (1 + eps^2 D) in the plane.
 
-    `above` = 0 is h = 0, lines through the origin; `below` = 0 is the conic 1 + eps^2 D = 0 of the points that the map
-    sends to infinity; both zero: no level, as for a point where all the curves meet.
+    `h` are the coefficients of the cubic, `eps` is half the time step. `numerator` = 0 is h = 0, lines through the
+    origin; `denominator` = 0 is the conic 1 + eps^2 D = 0 of the points that the map sends to infinity; both zero: no
+    level, as for a point where all the curves meet.
 
     >>> circle = PlaneCubic((1.0, 0.0, -3.0, 0.0), 0.5, 1.0, 0.0)
     >>> round(circle.length, 12), round(circle.defect(0, circle.length), 12)
@@ -29,8 +30,8 @@ class PlaneCubic:
 
     h: tuple[float, float, float, float]
     eps: float
-    above: float
-    below: float
+    numerator: float
+    denominator: float
 
     @property
     def D(self) -> tuple[float, float, float]:
@@ -58,7 +59,7 @@ class PlaneCubic:
     def value(self, points: Floats) -> Floats:
         """What is 0 on the curve, at points (..., 2)."""
         u, v = np.moveaxis(points, -1, 0)
-        return np.asarray(self.below * self.h_at(u, v) - self.above * (1 + self.eps**2 * self.D_at(u, v)))
+        return np.asarray(self.denominator * self.h_at(u, v) - self.numerator * (1 + self.eps**2 * self.D_at(u, v)))
 
     def value_in_space(self, angles: Floats, length: float) -> Floats:
         """The same at points (..., 2) of half a sphere, which stand for lines through the origin of space.
@@ -69,31 +70,31 @@ class PlaneCubic:
         """
         first, second = np.moveaxis(angles, -1, 0)
         x, y, w, r = np.cos(first), np.sin(first), np.cos(second), np.sin(second)
-        if self.above == 0:
-            return np.asarray(self.below * self.h_at(x, y))
+        if self.numerator == 0:
+            return np.asarray(self.denominator * self.h_at(x, y))
         conic = w * w + (self.eps * length * r) ** 2 * self.D_at(x, y)
-        if self.below == 0:
+        if self.denominator == 0:
             return np.asarray(conic)
-        return np.asarray(self.below * (length * r) ** 3 * self.h_at(x, y) - self.above * w * conic)
+        return np.asarray(self.denominator * (length * r) ** 3 * self.h_at(x, y) - self.numerator * w * conic)
 
     def flow_through(self, u: float, v: float) -> PlaneCubic:
         """The level curve of h itself through a point, on which the differential equation moves."""
         return PlaneCubic(self.h, 0.0, self.h_at(u, v), 1.0)
 
     def defect(self, u: Any, v: Any) -> float:
-        """How far points are from the curve: the largest |below h - above (1 + eps^2 D)| over the sum of its terms."""
+        """How far points are from the curve: the largest of its equation there, over the sum of the terms of it."""
         u, v = np.atleast_1d(np.asarray(u, dtype=float)), np.atleast_1d(np.asarray(v, dtype=float))
         a, b, c, d = self.h
         p, q, r = (self.eps * self.eps * entry for entry in self.D)
-        terms = [self.below * term for term in (a * u**3, b * u * u * v, c * u * v * v, d * v**3)]
-        terms += [-self.above * term for term in (1 + 0 * u, p * u * u, q * u * v, r * v * v)]
+        terms = [self.denominator * term for term in (a * u**3, b * u * u * v, c * u * v * v, d * v**3)]
+        terms += [-self.numerator * term for term in (1 + 0 * u, p * u * u, q * u * v, r * v * v)]
         size = sum(np.abs(term) for term in terms)
         return float(np.max(np.abs(sum(terms)) / np.where(size > 0, size, 1.0), initial=0.0))
 
     def gradient(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The derivatives of below h - above (1 + eps^2 D) along u and v."""
+        """The derivatives of denominator h - numerator (1 + eps^2 D) along u and v."""
         a, b, c, d = self.h
-        p, q, r = (self.above * self.eps * self.eps * entry for entry in self.D)
-        along_u = self.below * (3 * a * u * u + 2 * b * u * v + c * v * v) - 2 * p * u - q * v
-        along_v = self.below * (b * u * u + 2 * c * u * v + 3 * d * v * v) - q * u - 2 * r * v
+        p, q, r = (self.numerator * self.eps * self.eps * entry for entry in self.D)
+        along_u = self.denominator * (3 * a * u * u + 2 * b * u * v + c * v * v) - 2 * p * u - q * v
+        along_v = self.denominator * (b * u * u + 2 * c * u * v + 3 * d * v * v) - q * u - 2 * r * v
         return along_u, along_v
