@@ -37,7 +37,7 @@ FORMATS = ("pdf", "svg", "png")
 # More points than this are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
 RASTERISE_ABOVE = 20_000
 _LETTER = 0.5  # the width of a letter on average, in its height
-_LONGEST = 40  # digits of a number
+_MAX_DIGITS = 40  # of a number in a label
 _BAND_COLOUR, _BAND_SHARE = "#e8e8e8", 0.09  # where a logarithmic axis shows zeros; of its height
 _MAX_TICKS = 6
 _HANDLE = 5.0  # of a legend, the line or mark with the space around it, in heights of a letter
@@ -113,7 +113,7 @@ def label_number(value: Any) -> str:
     ('3/10', 26)
     """
     text = format_number(value)
-    return text if len(text) <= _LONGEST else rf"{text[:10]}\ldots{text[-10:]}"
+    return text if len(text) <= _MAX_DIGITS else rf"{text[:10]}\ldots{text[-10:]}"
 
 
 def write_title(figure: Figure, text: str, style: Style) -> None:

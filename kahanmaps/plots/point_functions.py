@@ -26,7 +26,7 @@ _SHORT = 60  # characters of a formula that fits along an axis
 class PointFunction:
     """A rational function of the variables and eps (in this order), in doubles.
 
-    `name` is what the user calls it, `eps` the paper's epsilon, exact (half the time step), that is inserted.
+    `name` is what the user calls it, `eps` half the time step (exact), which is inserted.
 
     >>> radius = point_function("x^2 + y^2", ["x", "y"])
     >>> radius(np.array([[3.0, 4.0], [np.nan, 0.0]]))

@@ -13,8 +13,8 @@ from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, style_from
 from kahanmaps_cli.screen.progress import Progress
 
-_LONGEST = 160  # characters of a start that is told
-_SHOWN = 3  # known integrals, unless more are asked for
+_MAX_START = 160  # characters
+_MAX_INTEGRALS = 3  # known ones, unless more are asked for
 
 
 @picture(
@@ -52,9 +52,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
 
     A panel shows |I(x_n) - I(x_0)|/|I(x_0)| for one function I, absolute where
     I(x_0) = 0; all methods take the time step 2 eps. Kahan maps conserve the
-    integrals with eps in them; H is that of the differential equation. Every
-    step is looked at, the largest error in each of 200 bins is drawn, and an
-    error of exactly 0 lies in the grey band.
+    integrals with eps in them; H is that of the differential equation. The
+    maximum over each of 200 bins of steps is plotted, and an error of exactly 0
+    lies in the grey band.
 
     Exit status: 0 done, 2 usage error, 3 some orbit ended early (the picture is
     written).
@@ -71,9 +71,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     else:
         known = lib.known_functions(rounded, eps)
         own = [function for function in known if function.name != "H"]
-        if len(own) > _SHOWN:
-            talk.append(f"shown: {_SHOWN} of {len(own)} known integrals; --integral NAME shows others")
-        functions = own[:_SHOWN] + [function for function in known if function.name == "H"]
+        if len(own) > _MAX_INTEGRALS:
+            talk.append(f"shown: {_MAX_INTEGRALS} of {len(own)} known integrals; --integral NAME shows others")
+        functions = own[:_MAX_INTEGRALS] + [function for function in known if function.name == "H"]
     form, reason = lib.float_normal_form(rounded)
     methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
     if "normal-form" in methods and form is None:
@@ -98,7 +98,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
 def _told(survey: lib.DriftSurvey) -> Iterator[str]:
 
     point = ",".join(lib.format_number(entry) for entry in survey.start)
-    point = point if len(point) <= _LONGEST else point[:_LONGEST] + "..."
+    point = point if len(point) <= _MAX_START else point[:_MAX_START] + "..."
     yield f"start {point}{lib.eps_told(survey.eps)}"
     for name, is_relative in survey.relative.items():
         if not is_relative:

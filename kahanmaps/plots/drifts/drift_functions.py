@@ -19,7 +19,7 @@ from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.plots.point_functions import PointFunction, point_function
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
-_LONGEST = 30
+_MAX_NAME = 30  # characters
 
 
 class OfTheImage:
@@ -128,7 +128,7 @@ def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, s
             found.append(every[text])
         else:
             function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
-            found.append(PointFunction(name or text[:_LONGEST], function, eps))
+            found.append(PointFunction(name or text[:_MAX_NAME], function, eps))
     names = [function.name for function in found]
     for name in names:
         if names.count(name) > 1:
