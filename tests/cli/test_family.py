@@ -62,7 +62,7 @@ def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
 
 def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
     kahanmaps("family new --eigenvalues 1,1 -q -o", tmp_path / "a.toml")
-    refused = kahanmaps("plot invariant-curves", tmp_path / "a.toml", "--start 1,0,0,1 --eps 1/20")
+    refused = kahanmaps("plot invariant-curves", tmp_path / "a.toml", "--start 1,0,0,1 --eps 1/20 -o x.svg")
     assert (refused.status, "chi has a repeated root" in refused.err) == (2, True)
     outcome = kahanmaps("family show", tmp_path / "a.toml", "--normal-form --json")
     assert (outcome.status, outcome.out) == (2, "")
