@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,15 +16,13 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError
-from kahanmaps.laboratory.analyses.beside import CAN_FORK, Beside, outcome, together
+from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.processes import processors
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
@@ -45,8 +42,7 @@ class Analysis(Findings, Printed):
 
     def interrupt(self) -> None:
         """Leave out the parts that are pending."""
-        named = {part.name for part in self.parts if not part.adds}
-        self.skipped += [f"{part}: interrupted" for part in self.pending if part in named]
+        self.skipped += [f"{part}: interrupted" for part in self.pending]
         self.pending.clear()
         self.interrupted = True
 
@@ -126,7 +122,6 @@ def analyze(
     progress: Callable[[str], None] = lambda _: None,
     reached: Callable[[Analysis], None] = lambda _: None,
     parts: Sequence[Part] = ANALYSES,
-    processes: int = 1,
 ) -> Analysis:
     """What a map preserves and how it grows, within a time budget.
 
@@ -139,9 +134,7 @@ def analyze(
         seed: of everything random.
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
-        parts: the analyses to do, in this order but for those that need later ones; the verdict rests on these.
-        processes: 1, or more: then a forked copy of this process does some of the analyses, where there is a second
-            processor (on Linux only; what runs in other threads should bear a fork).
+        parts: the analyses to do, in this order; the verdict rests on these.
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -164,51 +157,18 @@ def analyze(
     todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
     found.pending = [part.name for part in todo]
     reached(found)
-    can_fork = processes > 1 and processors() > 1 and CAN_FORK
-    skipped: dict[str, str] = {}
-
-    def take(part: Part, result: Any, reason: str) -> None:
-        if reason and not part.adds:
-            skipped[part.name] = f"{part.name}: {reason}"
-            found.skipped = [skipped[one.name] for one in todo if one.name in skipped]
-        elif not reason:
-            found[part.result] = result
+    for part in todo:
+        progress(part.name)
+        try:
+            if run.left <= 0:
+                found.skipped.append(f"{part.name}: the time was over")
+            else:
+                found[part.result] = part.look(run, **run.budget(part))
+        except KahanmapsError as error:
+            found.skipped.append(f"{part.name}: {error}")
         found.pending.remove(part.name)
         reached(found)
-
-    slow = {part.name for part in todo if run.dim > part.slow_above}
-
-    def unmet(part: Part) -> set[str]:
-        return set(part.needs).intersection(found.pending) - slow
-
-    with ExitStack() as stack:
-        left, beside = list(todo), None
-        while found.pending:
-            ready = [part for part in left if not unmet(part)]
-            if can_fork and len(ready) > 1 and not (beside and beside.waiting) and (apart := together(left, unmet)):
-                beside = Beside(run, apart)
-                stack.callback(beside.end)
-                beside.start()
-                for part in beside.waiting:
-                    left.remove(part)
-                ready = [part for part in left if not unmet(part)]
-            chosen: Sequence[Part] = ()
-            if ready:
-                chosen = [min(ready, key=lambda part: can_fork and part.is_apart)]
-                left.remove(chosen[0])
-            elif beside:
-                chosen = beside.claim()
-            for part in chosen:
-                progress(part.name)
-                take(part, *outcome(run, part))
-            if not chosen:
-                if not (beside and beside.waiting):
-                    raise ValueError(f"these parts need each other: {', '.join(part.name for part in left)}")
-                progress(beside.waiting[0].name)
-                take(*beside.next())
-            while beside and beside.waiting and beside.answers.poll():
-                take(*beside.next())
-    if others := ", ".join(part.name for part in parts if not (run.applies(part) or part.adds)):
+    if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")
         else:

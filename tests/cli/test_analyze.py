@@ -6,11 +6,11 @@ import pty
 import signal
 import subprocess
 import time
-from importlib import import_module
 
 import pytest
 from cli_helpers import COMMAND
 
+from kahanmaps.laboratory.analyses import table
 from kahanmaps.version import __version__
 
 TOP = "analyze euler_top"
@@ -134,11 +134,6 @@ def test_undecided_gives_3(kahanmaps, monkeypatch):
 # Time, progress and interrupts
 
 
-@pytest.fixture
-def one_process(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.analysis.processors", lambda: 1)
-
-
 def interrupted(*_, **__):
     raise KeyboardInterrupt
 
@@ -146,16 +141,15 @@ def interrupted(*_, **__):
 @pytest.mark.parametrize(
     ("part", "sections"),
     [
-        ("family.constant_structures", ["not done"]),
+        ("constant_structures", ["not done"]),
         (
-            "symmetries.linear_symmetries",
+            "linear_symmetries",
             ["vector field", "integrals", "measure", "the flow", "growth", "singularities", "structure", "not done"],
         ),
     ],
 )
-@pytest.mark.usefixtures("one_process")
 def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, part, sections):
-    monkeypatch.setattr(f"kahanmaps.laboratory.analyses.{part}", interrupted)
+    monkeypatch.setattr(f"kahanmaps.laboratory.analyses.table.{part}", interrupted)
     outcome = kahanmaps("analyze weierstrass")
     _, lines, verdict = report(outcome.out)
     assert outcome.status == 130
@@ -163,7 +157,7 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
     assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
     skipped = [text for section, _, text in lines if section == "not done"]
     assert skipped[-1] == "commuting systems: interrupted"
-    assert (verdict[0] == "undecided") is (part == "family.constant_structures")
+    assert (verdict[0] == "undecided") is (part == "constant_structures")
     as_json = kahanmaps("analyze weierstrass --json")
     assert (as_json.status, as_json.json["skipped"], as_json.json["interrupted"]) == (130, skipped, True)
 
@@ -174,24 +168,18 @@ def test_an_interrupt_before_anything_was_begun_prints_nothing(kahanmaps, monkey
     assert (outcome.status, outcome.out) == (130, "")
 
 
-@pytest.mark.usefixtures("one_process")
 def test_sections_are_told_as_soon_as_they_are_final(kahanmaps, monkeypatch):
     told = []
     monkeypatch.setattr("kahanmaps_cli.commands.analyze.tell", lambda text, **_: told.append(text.strip()))
     seen = {}
-    for file, part in (
-        ("densities", "find_densities"),
-        ("growth", "height_survey"),
-        ("symmetries", "linear_symmetries"),
-    ):
-        module = import_module(f"kahanmaps.laboratory.analyses.{file}")
-        whole = getattr(module, part)
+    for part in ("find_densities", "height_survey", "linear_symmetries"):
+        whole = getattr(table, part)
 
         def looked_at(*args, part=part, whole=whole, **options):
             seen[part] = list(told)
             return whole(*args, **options)
 
-        monkeypatch.setattr(module, part, looked_at)
+        monkeypatch.setattr(table, part, looked_at)
     kahanmaps("analyze weierstrass")
     assert ("integrals" in seen["find_densities"], "measure" in seen["find_densities"]) == (True, False)
     assert ("the flow" in seen["height_survey"], "growth" in seen["height_survey"]) == (True, False)

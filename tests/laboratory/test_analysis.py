@@ -14,18 +14,18 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.analyses import commuting, growth, integrals, singularities, symmetries
+from kahanmaps.laboratory.analyses import statements, table
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
 # In dimension 3 singularities come last.
-PARTS = tuple(sorted((part.name for part in ANALYSES if not part.adds), key="singularities".__eq__))
+PARTS = tuple(sorted((part.name for part in ANALYSES), key="singularities".__eq__))
 
 PLANE = """variables = ["x", "y"]
 [parameters]
@@ -84,9 +84,6 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     assert generic.integrals.profile.period is None
 
 
-# Integrals and growth are two findings
-
-
 # What was not done
 
 
@@ -107,7 +104,7 @@ def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
     def refuses(*_, **__):
         raise InputError("found 1, expected 2")
 
-    monkeypatch.setattr(symmetries, "linear_symmetries", refuses)
+    monkeypatch.setattr(table, "linear_symmetries", refuses)
     found = analyze(load("nahm_tetrahedral"))
     assert found.skipped == ["symmetries: found 1, expected 2"]
     assert found.symmetries is None
@@ -120,9 +117,34 @@ def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
     def fails(*_, **__):
         raise error
 
-    monkeypatch.setattr(symmetries, "linear_symmetries", fails)
+    monkeypatch.setattr(table, "linear_symmetries", fails)
     with pytest.raises(error):
         analyze(load("nahm_tetrahedral"), parts=[part for part in ANALYSES if part.name == "symmetries"])
+
+
+# The flow beside the map
+
+
+def test_the_flow_of_a_polarised_map_is_part_of_the_report():
+    found = analyze(load("duffing_polarised"))
+    assert dict(found.sections)["the flow"]
+    assert [line for line in found.skipped if "flow" in line] == []
+
+
+def test_without_integrals_there_is_nothing_of_the_flow():
+    parts = [part for part in ANALYSES if part.result in ("flow", "densities")]
+    found = analyze(load("euler_top"), parts=parts)
+    assert (found.flow, found.skipped) == (None, [])
+
+
+def test_integrals_of_members_are_counted_where_the_flow_is_looked_at():
+    def none(run, **_):
+        found = find_integrals(run.bare)
+        return replace(found, integrals=(), profile=replace(found.profile, nullities=()), by_theorems=0)
+
+    parts = [replace(part, look=none) if part.name == "integrals" else part for part in ANALYSES]
+    parts = [part for part in parts if part.result in ("hamiltonian", "normal_form", "integrals", "flow")]
+    assert analyze(load("paper_m2"), parts=parts).flow.without_limit == 2
 
 
 # Degenerate systems
@@ -288,7 +310,7 @@ def test_what_is_said_of_integrals(profile, others, expected):
         theorems="Prop. 1",
         **search,
     )
-    lines = integrals.statements(SimpleNamespace(integrals=found, relations=(), normal_form=None, pencil=None))
+    lines = statements.of_integrals(SimpleNamespace(integrals=found, relations=(), normal_form=None, pencil=None))
     assert [(str(line.status), line.text) for line in lines] == expected
 
 
@@ -315,29 +337,29 @@ def test_what_is_said_of_singularities(runs, expected):
         )
         for eps, verdict, followed, ends in runs
     ]
-    lines = singularities.statements(SimpleNamespace(singularities=found, file=load("euler_top")))
+    lines = statements.of_singularities(SimpleNamespace(singularities=found, file=load("euler_top")))
     assert [(str(line.status), line.text) for line in lines] == expected
 
 
 @pytest.mark.parametrize(("count", "end"), [(12, "11, 12"), (13, "11, 12, ...")])
 def test_twelve_degrees_are_shown_and_dots_for_more(count, end):
     found = DegreeGrowth((1, *range(1, count + 1)), None, "finished", "", 0, (), ())
-    lines = growth.statements(SimpleNamespace(degrees=found, heights=None))
+    lines = statements.of_growth(SimpleNamespace(degrees=found, heights=None))
     assert lines[0].text == f"degrees of the iterates: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, {end}"
 
 
 @pytest.mark.parametrize(("most", "first"), [(2, True), (1, False)])
 def test_singularities_come_before_degrees_and_help_them_up_to_a_dimension(most, first, monkeypatch):
-    given, told, real = [], [], growth.degree_growth
+    given, told, real = [], [], table.degree_growth
 
     def recorded(*arguments, **options):
         given.append(options["patterns"])
         return real(*arguments, **options)
 
-    monkeypatch.setattr(growth, "degree_growth", recorded)
-    monkeypatch.setattr(growth, "WRITTEN_DIMENSION", most)
-    table = [replace(part, slow_above=most) if part.name == "singularities" else part for part in ANALYSES]
-    analyze(load("zander_111"), parts=table, progress=lambda text: told.append(text.partition(":")[0]))
+    monkeypatch.setattr(table, "degree_growth", recorded)
+    monkeypatch.setattr(table, "WRITTEN_DIMENSION", most)
+    parts = [replace(part, slow_above=most) if part.name == "singularities" else part for part in ANALYSES]
+    analyze(load("zander_111"), parts=parts, progress=lambda text: told.append(text.partition(":")[0]))
     parts = [part for part in dict.fromkeys(told) if part in PARTS]
     assert parts.index("singularities") == (5 if first else len(PARTS) - 1)
     assert [patterns is not None for patterns in given] == [first]
@@ -357,7 +379,7 @@ def test_linear_families_of_commuting_systems_are_written_out(monkeypatch):
         f"commutes with the Kahan maps of all g = {moved}",
         f"commutes with the Kahan maps of g and -g, g = (2*S*I, -2*S*I + I, S + R) + {moved}",
     ]
-    monkeypatch.setattr(commuting, "_LONG", 10)
+    monkeypatch.setattr(statements, "_LONG", 10)
     assert told() == ["commutes with a linear family of 3 parameters, which find-commuting writes out"] * 2
 
 

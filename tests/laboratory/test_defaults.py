@@ -9,9 +9,9 @@ from search_helpers import analysis_of, integrals_of
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import analysis, defaults
-from kahanmaps.laboratory.analyses import growth
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
@@ -57,7 +57,7 @@ def test_heights_are_of_as_many_orbits_and_digits() -> None:
     options = {one.name: one.default for one in command("heights").params}
     found = analysis_of("euler_top").heights
     assert found is not None
-    assert len(found.orbits) <= growth.height_survey.__kwdefaults__["starts"] * 2
+    assert len(found.orbits) <= height_survey.__kwdefaults__["starts"] * 2
     assert options["max_digits"] >= 5_000
 
 

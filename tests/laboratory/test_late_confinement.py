@@ -23,7 +23,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights
+from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow

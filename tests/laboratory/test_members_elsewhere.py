@@ -17,7 +17,7 @@ from kahanmaps.family.cubics import belongs, default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.recognise import recognised_member_of
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.consistency import contradictions
+from kahanmaps.laboratory.conclusion import contradictions
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import constant_structures
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

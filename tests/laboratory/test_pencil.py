@@ -12,7 +12,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.consistency import contradictions
+from kahanmaps.laboratory.conclusion import contradictions
 from kahanmaps.laboratory.preserve.poisson import pencil as module
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
 

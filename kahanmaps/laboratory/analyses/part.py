@@ -42,16 +42,11 @@ class Part:
     title: str = ""
     statements: Callable[[Any], Sequence[Statement]] | None = None
     of: Of = Of.FIELDS
-    share: float = 0.1  # of the whole time; 0 for what is quick, and done where the time is over as well
+    share: float = 0.1  # of the whole time
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
-    # The dimension above which it comes last and gets a quarter of its share. Those that need it do not wait for it
-    # then, and are not to look at it.
+    # The dimension above which it comes last and gets a quarter of its share: others cannot make use of it then.
     slow_above: float = inf
-    needs: tuple[str, ...] = ()  # names of the parts that are gone through before it, as far as they are to be done
-    # Another process may do it: it reads, and is read, through `needs` alone, and what it finds can be pickled.
-    is_apart: bool = False
-    adds: bool = False  # to the result of a part that it needs; where it is not done, nothing is said of that
     json: Callable[[Any], dict[str, Any]] | None = None
 
     def __post_init__(self) -> None:
@@ -59,8 +54,6 @@ class Part:
 
     def to_json(self, found: Findings) -> dict[str, Any]:
         """What it says in JSON."""
-        if self.adds:
-            return {}
         return {self.result: plain(found[self.result])} if self.json is None else self.json(found)
 
 
