@@ -57,6 +57,10 @@ REMOVED_OPTIONS = {
     ("ensemble", "--arithmetic"): "ensembles are in floating point; kahanmaps orbit has exact, mod:P and ball:BITS",
     ("plot portrait", "--density"): "kahanmaps ensemble -o FILE.npy and numpy.histogram2d count points in cells",
     ("plot portrait", "--from"): "a portrait is computed from a SYSTEM; matplotlib draws the points of a file",
+    ("scan", "--by"): "scans compare degrees; kahanmaps batch has find-integrals and find-density over ranges",
+    ("plot scan", "--by"): "scans compare degrees; kahanmaps batch has find-integrals and find-density over ranges",
+    ("scan", "--keep"): "kahanmaps batch run with the task scan keeps each result, and goes on where it was",
+    ("scan", "--shard"): "kahanmaps batch run has --shard I/N",
 }
 
 

@@ -133,7 +133,6 @@ from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integ
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map as flow_and_map
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson as find_poisson
 from kahanmaps.laboratory.preserve.results import closing_note as closing_note
-from kahanmaps.laboratory.scan.kept import Kept as Kept
 from kahanmaps.laboratory.scan.result import Scan as Scan
 from kahanmaps.laboratory.scan.scan import scan as scan
 from kahanmaps.laboratory.scan.sweep import TimeOver as TimeOver

@@ -60,7 +60,6 @@ def scan_parameters(
     system: SystemFile,
     over: list[str],
     eps: Any = None,
-    by: str = "degrees",
     terms: int | None = None,
     primes: list[int] | None = None,
     seconds: int = 120,
@@ -70,7 +69,7 @@ def scan_parameters(
     from kahanmaps.laboratory.scan.result import growth_on
     from kahanmaps.laboratory.scan.scan import scan
 
-    found = scan(system, over, eps=eps, by=by, terms=terms, primes=primes, seconds=seconds, seed=seed, jobs=1)
+    found = scan(system, over, eps=eps, terms=terms, primes=primes, seconds=seconds, seed=seed, jobs=1)
     kinds = [(str(growth.growth), some) for _, some in found.classes if (growth := growth_on(some)) is not None]
     return {
         "status": found.ended,

@@ -224,12 +224,14 @@ class _ProjectiveMap:
 
     def normalized(self, X: Any) -> Any:
         """The columns divided by their last coordinate that is not zero; columns of zeros stay."""
-        from kahanmaps.maps.residues.relations import inverses
-
         last = X[0]
         for row in X[1:]:
             last = row + last * (row == 0)
-        return X * inverses(last, self.prime) % self.prime
+        power, exponent = last, self.prime - 2
+        while exponent:  # 1/x = x^(p - 2), and 0 for x = 0
+            X = X * power % self.prime if exponent & 1 else X
+            power, exponent = power * power % self.prime, exponent >> 1
+        return X
 
 
 def default_eps(prime: int) -> list[fmpq]:

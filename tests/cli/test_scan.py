@@ -1,27 +1,15 @@
-"""kahanmaps scan: blocks of components, files of members, what it keeps, and what stops it."""
+"""kahanmaps scan: blocks of components, files of members, and what stops it."""
 
-import shlex
 import signal
-import subprocess
-import time
 import tomllib
 
 import pytest
-from cli_helpers import COMMAND
+
+from kahanmaps.laboratory.scan.sweep import sweep
 
 QUICK = "lotka_volterra --over a --terms 2 --primes 11,13,17"
 FAMILY_OF_PLANES = """--rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --terms 4"""
 PLANE = f"{FAMILY_OF_PLANES} --primes 31,37,41"
-
-
-def begun(command, kept):
-    """A scan in a process of its own that has kept the members modulo its first prime."""
-    line = [*COMMAND, "scan", *shlex.split(command), "--keep", str(kept)]
-    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not kept.exists() or kept.read_bytes().count(b"\n") < 2:  # the head, and the members
-        time.sleep(0.01)
-        assert process.poll() is None
-    return process
 
 
 @pytest.fixture
@@ -102,6 +90,20 @@ def test_a_folder_that_cannot_be_made_is_refused_before_the_scan(kahanmaps, tmp_
     assert not (tmp_path / "a").exists()
 
 
+def test_ctrl_c_ends_it_with_what_was_seen(kahanmaps, monkeypatch):
+    def interrupted(map_, count, prime, *args, **options):
+        if prime == 17:
+            signal.raise_signal(signal.SIGINT)
+        return sweep(map_, count, prime, *args, **options)
+
+    monkeypatch.setattr("kahanmaps.laboratory.scan.scan.sweep", interrupted)
+    outcome = kahanmaps(f"scan {QUICK}")
+    assert outcome.status == 130
+    assert outcome.out.splitlines()[1:3] == ["slow\t2, 3\t1 members modulo 11", "slow\t2, 3\t1 members modulo 13"]
+    assert outcome.out.splitlines()[-1] == "open\tthere was no time for members modulo 17"
+    assert outcome.err == "stopped early: interrupted before members modulo 17\n"
+
+
 def test_the_time_may_be_over(kahanmaps):
     outcome = kahanmaps(f"scan {QUICK} --seconds 1e-6")
     assert outcome.status == 3
@@ -110,66 +112,6 @@ def test_the_time_may_be_over(kahanmaps):
         "open\tthere was no time for members modulo 11, 13, 17",
     ]
     assert outcome.err == "stopped early: the time was over before members modulo 11, 13, 17\n"
-
-
-def test_ctrl_c_ends_it_with_what_was_seen(tmp_path):
-    process = begun(f"{FAMILY_OF_PLANES} --primes 7,8101,8111,8117", tmp_path / "kept.jsonl")
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "no time for members modulo 8101, 8111, 8117" in out
-    assert "slow\t" in out
-    assert "interrupted" in err
-    assert "Traceback" not in err
-
-
-def test_a_scan_that_was_killed_goes_on_where_it_was(kahanmaps, tmp_path):
-    kept = tmp_path / "kept.jsonl"
-    command = "lotka_volterra --over a --terms 3 --primes 31,37,41,83,89"
-    process = begun(command, kept)
-    process.kill()
-    process.communicate()
-    before = kept.read_bytes()
-    kept.write_bytes(before + b'{"prime": 10')  # as if it had been writing
-    again = kahanmaps(f"scan {command} --keep {kept}")
-    assert again.status == 0
-    assert kept.read_bytes().startswith(before)
-    assert again.out == kahanmaps(f"scan {command}").out
-    written = kept.read_bytes()
-    assert kahanmaps(f"scan {command} --keep {kept}").out == again.out
-    assert kept.read_bytes() == written
-
-
-def test_parts_are_put_together(kahanmaps, tmp_path):
-    parts = []
-    for k in (1, 2):
-        outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/{k} --shard {k}/2")
-        assert outcome.status == 0
-        assert "open\tnot asked for were the other parts and conditions" in outcome.out
-        parts.append((tmp_path / str(k)).read_bytes())
-    (tmp_path / "all").write_bytes(b"".join(parts))
-    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/all").out == kahanmaps(f"scan {QUICK}").out
-    assert (tmp_path / "all").read_bytes() == b"".join(parts)  # nothing was measured again
-
-
-def test_what_is_not_kept_of_this_scan_is_refused(kahanmaps, tmp_path):
-    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept").status == 0
-    outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept --seed 1")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert "of a scan with another seed, expected one of this scan" in outcome.err
-    for text in ("name = 1\n", (tmp_path / "kept").read_text().replace('"generic": [2,', '"generic": ["q",')):
-        (tmp_path / "other").write_text(text)
-        assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
-        assert (tmp_path / "other").read_text() == text
-
-
-def test_a_part_is_json_too_in_the_numbers_of_the_whole(kahanmaps, tmp_path):
-    found = kahanmaps(f"scan {QUICK} --keep {tmp_path}/1 --shard 1/2 --json").json
-    assert (found["ended"], found["classes"]) == ("part", [])
-    assert [(one["prime"], one["slow"], one["left"]) for one in found["sweeps"]] == [(11, 1, 1), (17, 1, 1)]
-    dense = """--rhs "x' = x*y; y' = a*x" --over a --primes 11,13,17 --terms 2 --by density"""
-    part = kahanmaps(f"scan {dense} --keep {tmp_path}/2 --shard 1/2 --json").json
-    assert part["generic"] == kahanmaps(f"scan {dense} --json").json["generic"]
 
 
 def test_a_picture_needs_two_parameters_and_something_to_draw(kahanmaps, tmp_path, monkeypatch):

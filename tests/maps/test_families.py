@@ -1,11 +1,10 @@
-"""Many members of a family modulo a small prime: degrees, and the ranks of relations and of densities.
+"""Degrees of many members of a family modulo a small prime.
 
-Specified here: degrees compiled, by FLINT and by the lines of `degrees` are the same; ranks are those that are known.
+Specified here: degrees compiled, by FLINT and by the lines of `degrees` are the same.
 """
 
 import math
 import random
-from math import comb
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.growth.curves import Line
 from kahanmaps.maps.residues.families import NOWHERE, TOO_LARGE, Family
-from kahanmaps.maps.residues.relations import ranks
 
 THREE_LINES = """variables = ["x", "y"]
 parameters = { g1 = 1, g2 = 1 }
@@ -118,31 +116,3 @@ def test_what_is_out_of_range_is_refused():
             Family(map_, prime)
     with pytest.raises(BadPrime):
         Family(map_with_symbols(parse_system(THREE_LINES.replace("+ x)", "+ x/7)")), ["g1"]), 7)
-
-
-# Ranks of relations and densities.
-
-
-def numbers(name, symbols, members, top, by, prime=307):
-    map_ = map_with_symbols(load(name), symbols)
-    family, rng = Family(map_, prime), random.Random(1)
-    found = np.max([ranks(family, np.array(members), None, top, rng, by) for _ in range(4)], axis=0)
-    return [[comb(map_.dim + d, d) - rank for d, rank in enumerate(row, 1)] for row in found.tolist()]
-
-
-@pytest.mark.parametrize(
-    ("name", "symbols", "top", "relations", "densities"),
-    [
-        ("euler_top", ["a1"], 3, [0, 2, 8], [0, 0, 0]),  # orbits on an intersection of two quadrics
-        ("lyness", ["a"], 4, [0, 0, 1, 3], [0, 1, 2, 2]),  # on cubics; x y, and its product with the integral
-        ("henon_heiles", ["c"], 2, [0, 0], [0, 1]),
-    ],
-)
-def test_relations_and_densities_are_those_that_are_known(name, symbols, top, relations, densities):
-    assert numbers(name, symbols, [[3], [7]], top, "integrals") == [relations, relations]
-    assert numbers(name, symbols, [[3], [7]], top, "density") == [densities, densities]
-
-
-def test_members_are_told_apart():
-    # without the term with b1 the gyrostat has a second integral
-    assert numbers("zhukovski_volterra_2", ["b1"], [[0], [5]], 2, "integrals") == [[0, 2], [0, 1]]

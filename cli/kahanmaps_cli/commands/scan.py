@@ -10,7 +10,7 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import output_options
-from kahanmaps_cli.params import Seconds, Shard
+from kahanmaps_cli.params import Seconds
 from kahanmaps_cli.runs.scan_run import ending, scan_options, scanned
 from kahanmaps_cli.screen.outputs import OutputFolder, file_name, will_write
 from kahanmaps_cli.screen.progress import say
@@ -23,13 +23,6 @@ from kahanmaps_cli.screen.terminal import tell
 @click.option(
     "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
 )
-@click.option(
-    "--keep",
-    type=click.Path(dir_okay=False),
-    metavar="FILE",
-    help="Keep there what is measured modulo each prime, and go on from what is there.",
-)
-@click.option("--shard", type=Shard(), metavar="I/N", help="Only the I-th of N parts, into the file of --keep.")
 @click.option("--toml", "as_toml", is_flag=True, help="A member of each component as a system file, one after another.")
 @click.option(
     "--write-to", "folder", type=OutputFolder(), metavar="DIR", help="Write these to DIR, in the place of earlier ones."
@@ -43,16 +36,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
       kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
       kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to out
-      kahanmaps scan zhukovski_volterra_2 --over b1 --by density
-      kahanmaps scan lorenz --over s,b,r --keep lorenz.jsonl --seconds 600
+      kahanmaps scan lorenz --over s,b,r --seconds 600
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
     as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
     tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
-
-    --by integrals counts polynomials that vanish along an orbit instead, degree by degree, and --by density those phi
-    for which the measure dx/phi is invariant.
 
     With two or three parameters members on random lines of parameter space are tried besides, modulo primes at which
     quadratic fields split: so a^2 - 2 = 0 is found as one curve. The time is for everything together; what there was
@@ -62,17 +51,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     more than three parameters members on random lines and planes of parameter space are tried, which finds what has
     codimension 1 and 2, as two linear conditions or a linear one and another. What can have been missed is told.
 
-    --keep FILE writes what is measured modulo each prime as soon as it is known: a scan that was stopped or killed goes
-    on from there, when the same command is given again. Parts (--shard) that several machines have kept are put
-    together by `cat part1 part2 > all`; the scan with `--keep all` does the rest.
-
     Exit status: 0 done, whatever was found; 2 usage error; 3 the time was over: what was left out is told; 130
     interrupted, with what was found up to then.
     """
-    if options["shard"] is not None and options["keep"] is None:
-        raise click.UsageError("--shard goes with --keep FILE, where its part is kept")
-    if options["shard"] is not None and (options["as_toml"] or options["folder"] is not None):
-        raise click.UsageError("found --shard with system files: a part finds no components")
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
     found = scanned(system, quiet, options)

@@ -25,16 +25,7 @@ scan_options: Callable[[F], F] = opt.stack(
         help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
     ),
     opt.eps_options,
-    click.option(
-        "--by",
-        type=click.Choice(["degrees", "integrals", "density"]),
-        default="degrees",
-        show_default=True,
-        help="Look for smaller degrees of iterates, relations along orbits, or densities.",
-    ),
-    click.option(
-        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N, or relations and densities up to degree N."
-    ),
+    click.option("--terms", type=int, metavar="N", help="Measure d_1, ..., d_N."),
     click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
     opt.seconds_option(120.0, "Stop about then, counted from when its loops are loaded, and say what was seen."),
     click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
@@ -78,17 +69,16 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Sca
             file,
             names,
             eps=opt.the_eps(options["eps"], options["time_step"], required=False),
-            **opt.given(options, "by", "terms", "seconds", "seed", "jobs"),
+            **opt.given(options, "terms", "seconds", "seed", "jobs"),
             primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),
-            kept=None if options.get("keep") is None else lib.Kept(options["keep"], *(options["shard"] or ())),
             progress=told,
         )
 
 
 def ending(found: lib.Scan, quiet: bool) -> int:
     """The exit status, and a word where it is not 0."""
-    if found.ended in ("complete", "part"):
+    if found.ended == "complete":
         return 0
     if not quiet:
         why = "the time was over" if found.ended == "time" else "interrupted"

@@ -42,12 +42,12 @@ def with_growth(
         try:
             progress(f"scan: growth on component {k + 1} of {len(components)}")
             check()
-            if family.by == "degrees" and _goes_on(one, enough.get(one.degrees), family):
+            if _goes_on(one, enough.get(one.degrees), family):
                 continue
             left = max(0.1, deadline - time.monotonic())
             known = None if one.values is None else _growth(one.values, family, left)
             # there may be a special member only
-            if known is None or (family.by == "degrees" and not _agree(known.degrees, (1, *one.degrees))):
+            if known is None or not _agree(known.degrees, (1, *one.degrees)):
                 known = _beyond(one, family)
         except TimeOver:
             missed += 1

@@ -11,19 +11,16 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
 from kahanmaps.algebra.fields import GF, QQ, Field, PrimeField
-from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.curves import Line, Stopped
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to
 from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import BirationalMap
 
 _TRIES = 200
 _PRIMES = 40
-_SPARE = 4  # points more than monomials
 _HEIGHTS = (12, 120)  # of values at random, for roots of higher degree and others
 
 
@@ -91,8 +88,7 @@ def _univariate(coefficients: Sequence[Any], field: Field) -> Any:
 class Scanned:
     """What is scanned: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
 
-    `eps` is an exact number, or None for generic eps; `by` says what is measured: "degrees", or "integrals" or
-    "density" for what `kahanmaps.maps.residues.relations.ranks` counts.
+    `eps` is an exact number, or None for generic eps.
     """
 
     file: SystemFile
@@ -100,20 +96,11 @@ class Scanned:
     map: BirationalMap
     eps: fmpq | None
     seed: int
-    by: str = "degrees"
 
     def member(self, values: Mapping[str, fmpq]) -> tuple[SystemFile, fmpq | None]:
         """The system of a member and its eps."""
         parameters = {name: value for name, value in values.items() if name != "eps"}
         return member_of(self.file, parameters), values.get("eps", self.eps)
-
-    def measured_on(
-        self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random
-    ) -> Degrees | None:
-        """What is measured on a random member on a component; None where none is found."""
-        if self.by == "degrees":
-            return self.degrees_on(equations, expected, rng)
-        return self._ranks_on(equations, len(expected), rng)
 
     def degrees_on(
         self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, most: int = 1 << 20
@@ -138,27 +125,6 @@ class Scanned:
         except ZeroDivisionError:
             found += [-1] * (len(expected) - len(found))
         return tuple(found)
-
-    def _ranks_on(self, equations: Sequence[fmpq_mpoly], top: int, rng: random.Random) -> Degrees | None:
-        """The ranks up to a degree on a random member."""
-        found = self._random_member(equations, rng)
-        if found is None:
-            return None
-        field, step, parameters = found
-        p = field.characteristic
-        over = ModularMap(self.map, p, int(step), [int(x) for x in parameters], rng.getrandbits(60))
-        sizes = [len(exponents_up_to(self.map.dim, degree)) for degree in range(1, top + 1)]
-        try:
-            if self.by == "integrals":
-                rows, _, _ = over.along_orbit(top, sizes[-1] + _SPARE)
-            else:
-                rows = []
-                for x, image in over.pairs(sizes[-1] + _SPARE):
-                    here, there = over.moved(x, image, top, over.determinant(x, image))
-                    rows.append([b - a for a, b in zip(here, there, strict=True)])
-        except NoPoint:
-            return None
-        return tuple(rank([row[:size] for row in rows], p) for size in sizes)
 
     def _random_member(
         self, equations: Sequence[fmpq_mpoly], rng: random.Random

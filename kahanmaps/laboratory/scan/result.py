@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import comb
+from dataclasses import dataclass
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
@@ -24,13 +23,7 @@ from kahanmaps.laboratory.scan.lift import height_bound
 from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
-# By what is scanned: a word for the numbers, and where members are found.
 _LISTED = 12  # primes
-WORDS = {
-    "degrees": ("degrees", "where one of the first {} degrees is smaller"),
-    "integrals": ("relations", "where more polynomials of degree up to {} vanish along an orbit"),
-    "density": ("densities", "where dx/phi is invariant for more polynomials phi of degree up to {}"),
-}
 STEPS = 40  # for which singularities are followed where the growth at a member is asked
 
 
@@ -110,10 +103,7 @@ class Scan(Printed):
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
     the number of slow members on no component modulo each of them: points over number fields, of a height above
     `height`, or there by chance. `symmetric` are changes of parameters that permute the slow members, by their
-    images. `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there
-    are that vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
-    `ended` is "complete", "time", "interrupted" or, for a shard, "part"; `omitted` says what was left out. Of a shard
-    (`is_part`) there are sweeps only, and no components were looked for.
+    images. `ended` is "complete", "time" or "interrupted"; `omitted` says what was left out.
     """
 
     file: SystemFile
@@ -127,8 +117,6 @@ class Scan(Printed):
     symmetric: tuple[tuple[str, ...], ...]
     ended: str
     omitted: tuple[str, ...] = ()
-    by: str = "degrees"
-    is_part: bool = False
 
     def rows(self) -> list[dict[str, str]]:
         """A row for each component, for `pandas.DataFrame(found.rows())` and the like."""
@@ -162,12 +150,11 @@ class Scan(Printed):
 
     @property
     def classes(self) -> list[tuple[Degrees, list[Component]]]:
-        """The components by degrees, in their order; where these are no degrees of iterates, also by their growth."""
-        found: dict[Any, list[Component]] = {}
+        """The components by degrees, in their order."""
+        found: dict[Degrees, list[Component]] = {}
         for one in self.components:
-            other = None if self.by == "degrees" or one.growth is None else one.growth.growth
-            found.setdefault((one.degrees, other), []).append(one)
-        return [(degrees, some) for (degrees, _), some in found.items()]
+            found.setdefault(one.degrees, []).append(one)
+        return list(found.items())
 
     @property
     def coverage(self) -> str:
@@ -187,10 +174,8 @@ class Scan(Printed):
         small = "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
         kinds = [small] if whole else []
         if len(self.over) > 1:
-            kinds.append(
-                f"hypersurfaces of a total degree up to {self.degree} for each sequence of {WORDS[self.by][0]}"
-            )
-        where = WORDS[self.by][1].format(len(self.generic))
+            kinds.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
+        where = f"where one of the first {len(self.generic)} degrees is smaller"
         if planes:
             kinds.append("affine spaces of codimension 2 and hypersurfaces of affine spaces with it")
         if not whole:
@@ -212,7 +197,7 @@ class Scan(Printed):
     @property
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
-        if not self.height or self.is_part:
+        if not self.height:
             return "\n".join(f"{word}\t{rest}" for word, rest in [*self._seen, ("tried", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
@@ -220,7 +205,7 @@ class Scan(Printed):
             growth = growth_on(members)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
             known = "" if growth is None or growth.recurrence is None else f", {growth.known}"
-            lines.append((WORDS[self.by][0], told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
+            lines.append(("degrees", told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
             for where, sign, here in (
                 ("where", "; ", [one for one in members if not one.is_rational_point]),
                 (f"at {names} =", ", ", [one for one in members if one.is_rational_point]),
@@ -236,7 +221,12 @@ class Scan(Printed):
                 if one.verdict is not None
             ]
         if not self.components:
-            lines.append(("found", f"no condition on the parameters {WORDS[self.by][1].format(len(self.generic))}"))
+            lines.append(
+                (
+                    "found",
+                    f"no condition on the parameters where one of the first {len(self.generic)} degrees is smaller",
+                )
+            )
         if self.components:
             lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
         for images in self.symmetric:
@@ -265,8 +255,7 @@ class Scan(Printed):
 
     @property
     def _open(self) -> list[tuple[str, str]]:
-        why = "not asked for were" if self.ended == "part" else "there was no time for"
-        return [("open", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
+        return [("open", f"there was no time for {', '.join(self.omitted)}")] if self.omitted else []
 
     @property
     def _seen(self) -> list[tuple[str, str]]:
@@ -280,7 +269,7 @@ class Scan(Printed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            **attributes(self, "over", "seed", "by", "generic"),
+            **attributes(self, "over", "seed", "generic"),
             "classes": [
                 {"degrees": list(degrees), "components": [one.to_json() for one in some]}
                 for degrees, some in self.classes
@@ -296,19 +285,6 @@ class Scan(Printed):
             ],
             **attributes(self, "height", "coverage", "ended", "omitted"),
         }
-
-    def with_dimensions(self, dim: int) -> Scan:
-        """The scan of maps of this dimension with numbers of polynomials in the place of ranks."""
-
-        def numbers(ranks: Degrees) -> Degrees:
-            return tuple(comb(dim + d, d) - rank for d, rank in enumerate(ranks, 1))
-
-        sweeps = (
-            replace(one, generic=numbers(one.generic), classes={numbers(d): x for d, x in one.classes.items()})
-            for one in self.sweeps
-        )
-        components = tuple(replace(one, degrees=numbers(one.degrees)) for one in self.components)
-        return replace(self, generic=numbers(self.generic), components=components, sweeps=tuple(sweeps))
 
     def member(self, component: Component) -> SystemFile:
         """The system of a rational member on a component. Raises InputError where none is known."""

@@ -13,9 +13,7 @@ import random
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import accumulate, islice, product, repeat
-from math import comb, inf
 from typing import Any
 
 from flint import fmpq, fmpz
@@ -24,12 +22,11 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
-from kahanmaps.errors import BadPrime, InputError, counted, quoted
+from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.laboratory.scan.conditions import beside, conditions
 from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
-from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.members import Scanned, point_on
-from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
+from kahanmaps.laboratory.scan.result import Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.implicit import BirationalMap
@@ -63,8 +60,6 @@ _ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
-_MONOMIALS, _FEW_MONOMIALS = {"integrals": 21, "density": 36}, 15  # up to 2 parameters; orbits modulo 19 are short
-_MOST_MONOMIALS, _MOST_TOP = 130, 12
 _MEMBERS = 3  # that confirm a component
 _TRIES = 20  # for a rational member
 
@@ -74,14 +69,12 @@ def scan(
     over: Sequence[str],
     *,
     eps: Any = None,
-    by: str = "degrees",
     terms: int | None = None,
     primes: Sequence[int] | None = None,
     seconds: float = DEFAULT_SECONDS,
     seed: int = 0,
     jobs: int | None = None,
     analysis: float | None = None,
-    kept: Kept | None = None,
     progress: Progress = lambda _: None,
 ) -> Scan:
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
@@ -90,24 +83,20 @@ def scan(
         file: the family; its claims are not looked at.
         over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
-        by: what makes members special: smaller "degrees" of iterates; "integrals", more polynomials of some degree
-            that vanish along an orbit; "density", more polynomials phi for which the measure dx/phi is invariant.
-        terms: how many iterates are measured, by default as many as have small degrees, at most 7; or else the degree
-            of the polynomials, by default such that there are few.
+        terms: how many iterates are measured, by default as many as have small degrees, at most 7.
         primes: at least three primes, by default such that the members are some ten thousand.
         seconds: time for everything, about; what was left out then is said.
         seed: of everything random.
         jobs: threads, by default as many as processors; they need numba.
         analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
-        kept: a file for what is measured modulo each prime, as soon as it is known; that is not done again.
         progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known.
 
     Returns:
         A `Scan`. Found modulo primes and confirmed at members, which is evidence and no proof.
 
     Raises:
-        InputError: for a file of another scan, unknown parameters, wrong primes, a map that exists nowhere.
+        InputError: for unknown parameters, wrong primes, a map that exists nowhere.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lines = parse_system('''variables = ["x", "y"]
@@ -118,27 +107,36 @@ def scan(
     >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
     ['2', '1']
     """
-    family = _family(file, over, eps, seed, by)
-    if by not in WORDS:
-        raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
+    names = tuple(dict.fromkeys(over))
+    if not names:
+        raise InputError("found no parameter to scan over, expected at least one")
+    if len(names) > MAX_PARAMETERS:
+        raise InputError(f"found {len(names)} parameters to scan over, expected at most {MAX_PARAMETERS}")
+    symbols = [name for name in names if name != "eps"]
+    map_ = map_with_symbols(file, symbols)
+    exact = None if eps is None else rational(eps)
+    if exact is not None and "eps" in names:
+        raise InputError("found eps both as a number and as a parameter to scan over, expected one of the two")
+    if "eps" in names and not map_.has_eps:
+        raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
+    if exact == 0:
+        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    names = (*symbols, *(["eps"] if "eps" in names else []))
+    family = Scanned(file, names, map_, exact, seed)
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
-    _require_primes(primes)
-    names, map_, exact = family.names, family.map, family.eps
+    composite = [p for p in primes or () if not fmpz(p).is_prime()]
+    if composite:
+        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
+    if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
+        given = ", ".join(map(str, primes))
+        raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
-    terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
+    terms, room, cost = _terms(map_, len(names), exact, terms, rng)
     jobs = jobs or processors()
-    # the same on every machine, and not all in one go, where it is kept
-    most = inf if kept is not None else _PART * seconds * jobs / cost
-    run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs, "by": by}, seconds, kept, progress)
+    most = _PART * seconds * jobs / cost
+    run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs}, seconds, progress)
     plan = _plan(len(names), primes, most)
-    if kept is not None:
-        document = dict(file.document)
-        kept.open({"document": document, "over": names, "eps": str(exact), "by": by, "terms": terms, "seed": seed})
-        if kept.parts > 1:
-            run.take(plan[kept.part - 1 :: kept.parts])
-            ended = run.ended("part")
-            return run.result((), (), ended, [*run.omitted, "the other parts and conditions"], is_part=True)
     run.take(plan)
     known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
 
@@ -166,35 +164,7 @@ def scan(
     if analysis is not None:
         known, missed = with_verdicts(known, family, analysis, run.began + seconds, run.until(1), run.tell)
         run.omit(missed, f"{missed} verdicts")
-    return run.result(known, tuple(symmetries(run.sweeps, known, names)), run.ended("complete"), run.omitted)
-
-
-def _require_primes(primes: Sequence[int] | None) -> None:
-    composite = [p for p in primes or () if not fmpz(p).is_prime()]
-    if composite:
-        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
-    if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
-        given = ", ".join(map(str, primes))
-        raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
-
-
-def _family(file: SystemFile, over: Sequence[str], eps: Any, seed: int, by: str) -> Scanned:
-    """The family of maps, eps the last of its parameters where it is one."""
-    names = tuple(dict.fromkeys(over))
-    if not names:
-        raise InputError("found no parameter to scan over, expected at least one")
-    if len(names) > MAX_PARAMETERS:
-        raise InputError(f"found {len(names)} parameters to scan over, expected at most {MAX_PARAMETERS}")
-    symbols = [name for name in names if name != "eps"]
-    map_ = map_with_symbols(file, symbols)
-    exact = None if eps is None else rational(eps)
-    if exact is not None and "eps" in names:
-        raise InputError("found eps both as a number and as a parameter to scan over, expected one of the two")
-    if "eps" in names and not map_.has_eps:
-        raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
-    if exact == 0:
-        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-    return Scanned(file, (*symbols, *(["eps"] if "eps" in names else [])), map_, exact, seed, by)
+    return run.result(known, tuple(symmetries(run.sweeps, known, names)))
 
 
 class _Sweeping:
@@ -206,17 +176,10 @@ class _Sweeping:
         start: str,
         measured: dict[str, Any],
         seconds: float,
-        kept: Kept | None,
         progress: Progress,
     ) -> None:
         self.family, self.count, self.sweeps, self.omitted = family, len(family.names), list[Sweep](), list[str]()
-        self._start, self._measured, self._seconds, self._kept, self._progress = (
-            start,
-            measured,
-            seconds,
-            kept,
-            progress,
-        )
+        self._start, self._measured, self._seconds, self._progress = start, measured, seconds, progress
         # Not before: loops are compiled with the first members, once on a machine, and that may take all the time.
         self.began = time.monotonic()
         self._doing, self._interrupted, self._total = "scan", False, 0
@@ -244,10 +207,6 @@ class _Sweeping:
         """Say what was left out, if anything was missed."""
         self.omitted += [what] if missed else []
 
-    def ended(self, otherwise: str) -> str:
-        """Why the scan ended."""
-        return "interrupted" if self._interrupted else "time" if self.omitted else otherwise
-
     def take(self, plan: list[Choice]) -> None:
         """Sweep modulo these primes; what differs in the generic degrees from the largest ones is dropped."""
         self._total += self._size(plan)
@@ -264,10 +223,7 @@ class _Sweeping:
 
     def _sweep(self, choice: Choice) -> Sweep:
         p, lines, width = choice
-        known = None if self._kept is None else self._kept.get(choice)
-        if known is not None:
-            return known
-        one = sweep(
+        return sweep(
             self.family.map,
             self.count,
             p,
@@ -278,9 +234,6 @@ class _Sweeping:
             progress=self._told,
             **self._measured,
         )
-        if self._kept is not None:
-            self._kept.add(one, lines)
-        return one
 
     def _told(self, done: int, _: int) -> None:
         done += sum(one.seen for one in self.sweeps)
@@ -304,20 +257,13 @@ class _Sweeping:
         sizes = accumulate((_size(self.count, *one) for one in further), initial=self._total)
         return [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
 
-    def result(
-        self,
-        known: Sequence[Component],
-        symmetric: tuple[Any, ...],
-        ended: str,
-        omitted: list[str],
-        is_part: bool = False,
-    ) -> Scan:
+    def result(self, known: Sequence[Component], symmetric: tuple[Any, ...]) -> Scan:
         """The scan with these components."""
         family, sweeps = self.family, tuple(self.sweeps)
         left = tuple(_left(one, known) for one in sweeps)
         asked = (family.file, family.names, family.eps, family.seed, sweeps[0].generic if sweeps else ())
-        found = Scan(*asked, tuple(known), sweeps, left, symmetric, ended, tuple(omitted), family.by, is_part)
-        return found if family.by == "degrees" else found.with_dimensions(family.map.dim)
+        ended = "interrupted" if self._interrupted else "time" if self.omitted else "complete"
+        return Scan(*asked, tuple(known), sweeps, left, symmetric, ended, tuple(self.omitted))
 
 
 def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:
@@ -374,28 +320,6 @@ def _terms(
     return measured, room, (time.monotonic() - began) / LONG
 
 
-def _top(
-    by: str, map_: BirationalMap, count: int, eps: fmpq | None, top: int | None, rng: random.Random
-) -> tuple[int, int, float]:
-    """The degree of polynomials, 0, and the seconds for a member, as `_terms` has them for degrees of iterates."""
-    import numpy as np
-
-    from kahanmaps.maps.residues.families import LONG, Family
-    from kahanmaps.maps.residues.relations import ranks
-
-    sizes = [comb(map_.dim + degree, degree) for degree in range(1, _MOST_TOP + 1)]
-    if top is not None and not (1 <= top <= _MOST_TOP and sizes[top - 1] <= _MOST_MONOMIALS):
-        raise InputError(f"found {top} for the degree of polynomials, expected fewer than {_MOST_MONOMIALS} monomials")
-    few = _MONOMIALS[by] if count < 3 or by == "density" else _FEW_MONOMIALS
-    top = top or max(1, sum(size <= few for size in sizes))
-    tried = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(LONG)])
-    began = time.monotonic()
-    found = ranks(Family(map_, _TRIAL_PRIME), tried, eps, top, rng, by)
-    if not found.any():
-        raise InputError("the map has no value anywhere, whatever the parameters are")
-    return top, 0, (time.monotonic() - began) / LONG
-
-
 def _confirmed(
     one: Component,
     family: Scanned,
@@ -407,7 +331,7 @@ def _confirmed(
     measured, names = [], family.names
     for _ in range(_MEMBERS):
         check()
-        measured.append(family.measured_on(one.equations, one.degrees, rng))
+        measured.append(family.degrees_on(one.equations, one.degrees, rng))
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):

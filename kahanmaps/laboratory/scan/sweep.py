@@ -83,11 +83,10 @@ def sweep(
     on: tuple[int, int] | None = None,
     seed: str = "",
     jobs: int = 1,
-    by: str = "degrees",
     check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Sweep:
-    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms, or by ranks up to that degree.
+    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms.
 
     Args:
         map_: a map with symbols, the parameters of the family.
@@ -95,7 +94,6 @@ def sweep(
         prime: below 2^13.
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
-        by: what is measured: "degrees", or "integrals" or "density" for what `ranks` counts.
         on: None for all members, else how many random affine subspaces of parameter space, and their dimension.
         seed: of everything random.
         jobs: threads.
@@ -112,7 +110,6 @@ def sweep(
     import numpy as np
 
     from kahanmaps.maps.residues.families import TOO_LARGE, Family
-    from kahanmaps.maps.residues.relations import ranks
 
     family, rng = Family(map_, prime), random.Random(seed)
 
@@ -121,10 +118,7 @@ def sweep(
         for low in range(0, len(points), _SLICE):
             check()
             some = np.array(points[low : low + _SLICE], dtype=np.int64)
-            if by == "degrees":
-                parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
-            else:
-                parts.append(ranks(family, some, eps, terms, rng, by))
+            parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
             told(low + len(some), len(points))
         return np.concatenate(parts)
 
