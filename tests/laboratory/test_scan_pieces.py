@@ -8,8 +8,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.laboratory.scan.conjugates import lifted_conjugates
-from kahanmaps.laboratory.scan.lift import lifted_flats, lifted_forms
+from kahanmaps.laboratory.scan.lift import lifted_conjugates, lifted_flats, lifted_forms
 from kahanmaps.laboratory.scan.members import point_on
 from kahanmaps.laboratory.scan.pieces import pieces
 

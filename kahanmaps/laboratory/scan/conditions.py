@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
-
-from flint import fmpq_mpoly
 
 from kahanmaps.algebra.modular_matrices import pivots
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.laboratory.scan.conjugates import lifted_conjugates
-from kahanmaps.laboratory.scan.lift import flat_equations, lifted_flats, lifted_forms, residues
-from kahanmaps.laboratory.scan.pieces import Pieces, Rows, pieces
+from kahanmaps.laboratory.scan.lift import flat_equations, lifted_conjugates, lifted_flats, lifted_forms, residues
+from kahanmaps.laboratory.scan.pieces import Pieces, pieces
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep, TimeOver
 
@@ -47,9 +43,13 @@ def _of_class(
                 rest = beside(one.classes[degrees], found, one.prime)
                 smallest = 0 if one.complete else count - one.width
                 parts += [pieces(rest, one.prime, one.seen, smallest, rng, check)] if rest else []
-        if count > 1:
+        if count > 1:  # a hyperplane by its coefficients in the order of those of other hypersurfaces
             forms = {
-                part.prime: [*map(_as_form, part.flats.get(count - 1, [])), *part.forms.get((), [])] for part in parts
+                part.prime: [
+                    *((row[-1], *row[:-1]) for (row,) in part.flats.get(count - 1, [])),
+                    *part.forms.get((), []),
+                ]
+                for part in parts
             }
             found.extend(Component((form,), count - 1, degrees, at) for form, at in lifted_forms(forms, names))
         return parts
@@ -58,8 +58,11 @@ def _of_class(
     parts = parts_of(on_lines=False)
     for dimension in range(max(1, count - 1)):
         flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
-        if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
-            continue
+        if dimension == 0 and len(flats) > 1:
+            low, high = min(flats), max(flats)
+            few, many = len(flats[low]), len(flats[high])
+            if few >= _SHARE * low and many - few >= _SHARE * (high - low):  # as many as a curve has
+                continue
         lifted = lifted_flats(flats)
         found += [Component(flat_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
         if dimension == 0:
@@ -88,34 +91,13 @@ def beside(points: Sequence[Point], components: Iterable[Component], prime: int)
     for one in components:
         on = np.ones(len(rest), dtype=bool)
         for equation in one.equations:
-            on &= _values(equation, rest, prime) == 0
+            total = np.zeros(len(rest), dtype=np.int64)
+            for exponents, coefficient in equation.terms():
+                term = np.full(len(rest), int(coefficient.p) % prime)
+                for k, exponent in enumerate(exponents):
+                    for _ in range(int(exponent)):
+                        term = term * rest[:, k] % prime
+                total += term
+            on &= total % prime == 0
         rest = rest[~on]
     return [tuple(x) for x in rest.tolist()]
-
-
-def _values(equation: fmpq_mpoly, points: Any, prime: int) -> Any:
-    """The values of a polynomial with integer coefficients at points modulo a prime."""
-    import numpy as np
-
-    total = np.zeros(len(points), dtype=np.int64)
-    for exponents, coefficient in equation.terms():
-        term = np.full(len(points), int(coefficient.p) % prime)
-        for k, exponent in enumerate(exponents):
-            for _ in range(int(exponent)):
-                term = term * points[:, k] % prime
-        total += term
-    return total % prime
-
-
-def _as_form(rows: Rows) -> tuple[int, ...]:
-    """The coefficients of the equation of a hyperplane in the order of those of other hypersurfaces."""
-    (row,) = rows
-    return (row[-1], *row[:-1])
-
-
-def _is_a_curve(counts: dict[int, int]) -> bool:
-    """Whether numbers of points modulo primes grow as those of a curve do."""
-    if len(counts) < 2:
-        return False
-    low, high = min(counts), max(counts)
-    return counts[low] >= _SHARE * low and counts[high] - counts[low] >= _SHARE * (high - low)

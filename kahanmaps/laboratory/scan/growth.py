@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from flint import fmpq
-
 from kahanmaps.invariants.growth import OF_DEGREES, Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.curves import Ended
@@ -45,7 +43,14 @@ def with_growth(
             if _goes_on(one, enough.get(one.degrees), family):
                 continue
             left = max(0.1, deadline - time.monotonic())
-            known = None if one.values is None else _growth(one.values, family, left)
+            known = None
+            if one.values is not None:
+                member, step = family.member(one.values)
+                given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
+                for attempt in range(_ATTEMPTS):  # singularities are followed at a random eps, which may be special
+                    known = degree_growth(member.map, step, seed=family.seed + attempt, **given)
+                    if known.growth is not Growth.UNKNOWN:
+                        break
             # there may be a special member only
             if known is None or not _agree(known.degrees, (1, *one.degrees)):
                 known = _beyond(one, family)
@@ -61,17 +66,6 @@ def with_growth(
         return OF_DEGREES.index(kinds.get(one.degrees, Growth.UNKNOWN)), one.degrees[::-1], one.text
 
     return sorted(found, key=order), missed
-
-
-def _growth(values: dict[str, fmpq], family: Scanned, left: float) -> DegreeGrowth:
-    """The growth at a rational member."""
-    member, step = family.member(values)
-    given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
-    for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
-        found = degree_growth(member.map, step, seed=family.seed + attempt, **given)
-        if found.growth is not Growth.UNKNOWN:
-            break
-    return found
 
 
 def _beyond(one: Component, family: Scanned, most: int = _LARGE) -> DegreeGrowth | None:

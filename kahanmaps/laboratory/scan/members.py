@@ -10,7 +10,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
-from kahanmaps.algebra.fields import GF, QQ, Field, PrimeField
+from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
@@ -39,7 +39,9 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
     """
     pivots: list[int] = []
     for equation in equations:
-        pivots.append(_pivot(equation, pivots))
+        # the first of the variables in which the degree is smallest, but not 0, and that is no pivot of another
+        degrees = [int(d) for d in equation.degrees()]
+        pivots.append(min((k for k, d in enumerate(degrees) if d and k not in pivots), key=lambda k: degrees[k]))
     height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
     for _ in range(_TRIES if len(equations) < count else 1):
         found = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
@@ -66,22 +68,12 @@ def solutions(
             if k != pivot:
                 term = term * values[k] ** int(exponent)
         coefficients[int(monomial[pivot])] += term
-    polynomial = _univariate(coefficients, field)
+    polynomial: Any = (
+        fmpq_poly(coefficients) if field is QQ else nmod_poly([*map(int, coefficients)], field.characteristic)
+    )
     for root, _ in [] if polynomial.is_zero() else polynomial.roots():
         x = root if field is QQ else field.convert(int(root))
         yield from solutions(equations[1:], pivots[1:], [*values[:pivot], x, *values[pivot + 1 :]], field)
-
-
-def _pivot(equation: fmpq_mpoly, others: Sequence[int]) -> int:
-    """The first of the variables in which the degree is smallest, but not 0, and that is no pivot of another."""
-    degrees = [int(d) for d in equation.degrees()]
-    return min((k for k, d in enumerate(degrees) if d and k not in others), key=lambda k: degrees[k])
-
-
-def _univariate(coefficients: Sequence[Any], field: Field) -> Any:
-    if field is QQ:
-        return fmpq_poly(list(coefficients))
-    return nmod_poly([int(c) for c in coefficients], field.characteristic)
 
 
 @dataclass(frozen=True)
@@ -110,11 +102,20 @@ class Scanned:
         On one line; -1 where the iterate exists nowhere. `expected` says how many, and about how large; they end before
         one above `most`.
         """
-        member = self._random_member(equations, rng)
-        if member is None:
+        for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
+            field = GF(random_prime(rng))
+            try:
+                values = point_on(equations, len(self.names), field, rng)
+                if values is None:
+                    continue
+                *parameters, step = values if len(self.names) > len(self.map.symbols) else (*values, self.eps)
+                over = self.map.at(field.random(rng) if step is None else field.convert(step), field, parameters)
+            except BadPrime:
+                continue
+            break
+        else:
             return None
-        field, step, parameters = member
-        line = Line(self.map.at(step, field, parameters), rng, math.inf, most)
+        line = Line(over, rng, math.inf, most)
         found: list[int] = []
         try:
             for degree in expected:
@@ -125,21 +126,3 @@ class Scanned:
         except ZeroDivisionError:
             found += [-1] * (len(expected) - len(found))
         return tuple(found)
-
-    def _random_member(
-        self, equations: Sequence[fmpq_mpoly], rng: random.Random
-    ) -> tuple[PrimeField, Any, list[Any]] | None:
-        """A field GF(p), eps and the symbols of a random member on a component."""
-        for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
-            field = GF(random_prime(rng))
-            try:
-                values = point_on(equations, len(self.names), field, rng)
-                if values is None:
-                    continue
-                *parameters, step = values if len(self.names) > len(self.map.symbols) else (*values, self.eps)
-                step = field.random(rng) if step is None else field.convert(step)
-                self.map.at(step, field, parameters)
-            except BadPrime:
-                continue
-            return field, step, parameters
-        return None

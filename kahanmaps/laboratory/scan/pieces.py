@@ -104,7 +104,8 @@ def pieces(
                 places = places[~some]
             rest = rest[kept]
     if not smallest and len(rest) <= _MOST_POINTS:
-        single = [tuple(map(tuple, echelon(_equations(x), prime))) for x in rest.tolist()]
+        equations = ([[*(int(i == j) for j in range(count)), -y] for i, y in enumerate(x)] for x in rest.tolist())
+        single = [tuple(map(tuple, echelon(rows, prime))) for rows in equations]
         found.flats.setdefault(0, []).extend(single)
         rest = rest[:0]
     found.left = len(rest)
@@ -171,8 +172,3 @@ def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[t
         scale = pow(next(c for c in row if c), -1, prime)
         found.append((tuple(c * scale % prime for c in row), power))
     return found
-
-
-def _equations(x: Sequence[int]) -> list[list[int]]:
-    """The point as the solution of equations."""
-    return [[*(int(i == j) for j in range(len(x))), -value] for i, value in enumerate(x)]

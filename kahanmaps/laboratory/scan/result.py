@@ -18,8 +18,7 @@ from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
-from kahanmaps.laboratory.scan.conjugates import MAX_FIELD_DEGREE, SPARE_BITS
-from kahanmaps.laboratory.scan.lift import height_bound
+from kahanmaps.laboratory.scan.lift import MAX_FIELD_DEGREE, SPARE_BITS, height_bound
 from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
@@ -198,7 +197,12 @@ class Scan(Printed):
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
         if not self.height:
-            return "\n".join(f"{word}\t{rest}" for word, rest in [*self._seen, ("tried", self.coverage), *self._open])
+            lines = [  # where nothing was lifted, the numbers of slow members by degrees
+                ("slow", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {one.prime}")
+                for one in self.sweeps
+                for degrees, points in sorted(one.classes.items())
+            ]
+            return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, ("tried", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
         for degrees, members in self.classes:
@@ -236,35 +240,22 @@ class Scan(Printed):
         if any(self.left):
             counts = zip(self.left, self.sweeps, strict=True)
             rest = _listed([f"{n} modulo {one.prime}" for n, one in counts if n or len(self.left) <= _LISTED])
-            lines.append(("left", f"slow members on no component: {rest}{self._left_words}"))
+            most = 0  # the dimension of a variety with so many members
+            for n, one in zip(self.left, self.sweeps, strict=True):
+                dimension = len(self.over) - 1
+                while dimension > most and n < 0.5 * one.seen / one.prime ** (len(self.over) - dimension):
+                    dimension -= 1
+                most = dimension
+            what = "a curve" if most == 1 else f"a variety of dimension {most}"
+            missed = f"; as many as {what} has, so one may have been missed" if most else ""
+            lines.append(("left", f"slow members on no component: {rest}{missed}"))
         elif not self.omitted:
             lines.append(("left", "none: every slow member that was seen is on a component"))
         return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, *self._open])
 
     @property
-    def _left_words(self) -> str:
-        """What so many members may be."""
-        most = 0
-        for n, one in zip(self.left, self.sweeps, strict=True):
-            dimension = len(self.over) - 1
-            while dimension > most and n < 0.5 * one.seen / one.prime ** (len(self.over) - dimension):
-                dimension -= 1
-            most = dimension
-        what = "a curve" if most == 1 else f"a variety of dimension {most}"
-        return f"; as many as {what} has, so one may have been missed" if most else ""
-
-    @property
     def _open(self) -> list[tuple[str, str]]:
         return [("open", f"there was no time for {', '.join(self.omitted)}")] if self.omitted else []
-
-    @property
-    def _seen(self) -> list[tuple[str, str]]:
-        """The numbers of slow members by degrees, where nothing was lifted."""
-        return [
-            ("slow", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {one.prime}")
-            for one in self.sweeps
-            for degrees, points in sorted(one.classes.items())
-        ]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

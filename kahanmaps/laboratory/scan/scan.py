@@ -13,7 +13,7 @@ import random
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import accumulate, islice, product, repeat
+from itertools import accumulate, islice, product
 from typing import Any
 
 from flint import fmpq, fmpz
@@ -140,14 +140,19 @@ def scan(
     run.take(plan)
     known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
 
-    def is_lacking(what: Callable[[Sweep, Sequence[Component]], bool]) -> bool:
-        return not (missed or run.omitted) and any(map(what, run.sweeps, repeat(known)))
-
-    if is_lacking(_lacks_hypersurface) and (lines := run.more_lines(most)):
+    # Are members on random lines left, as many as a hypersurface has?
+    is_whole = not (missed or run.omitted)
+    lacking = (one.on_lines and _left(one, known) >= 0.5 * one.seen / one.prime for one in run.sweeps)
+    if is_whole and any(lacking) and (lines := run.more_lines(most)):
         run.sweeps[:] = [one for one in run.sweeps if not one.on_lines]
         run.take(lines)
         known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
-    if is_lacking(_lacks_points) and (further := run.more_primes(primes, most)):
+    # Are members left, fewer than a curve has, or a hypersurface where they are on random lines?
+    is_whole = not (missed or run.omitted)
+    lacking = (
+        0 < _left(one, known) < 0.5 * (one.prime if one.complete else one.seen / one.prime) for one in run.sweeps
+    )
+    if is_whole and any(lacking) and (further := run.more_primes(primes, most)):
         run.take(further)
         known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
     run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
@@ -209,10 +214,27 @@ class _Sweeping:
 
     def take(self, plan: list[Choice]) -> None:
         """Sweep modulo these primes; what differs in the generic degrees from the largest ones is dropped."""
-        self._total += self._size(plan)
-        for k, choice in enumerate(plan):
+        self._total += _size(self.count, plan)
+
+        def told(done: int, _: int) -> None:
+            done += sum(one.seen for one in self.sweeps)
+            left = (time.monotonic() - self.began) * max(0, self._total - done) / done
+            self.tell(f"scan: {done} of {self._total} members, {left:.0f} s left")
+
+        for k, (p, lines, width) in enumerate(plan):
             try:
-                self.sweeps.append(self._sweep(choice))
+                one = sweep(
+                    self.family.map,
+                    self.count,
+                    p,
+                    self.family.eps,
+                    on=None if lines is None else (lines, width),
+                    seed=f"{self._start} {p} {lines} {width}",
+                    check=self.until(_UNTIL[0]),
+                    progress=told,
+                    **self._measured,
+                )
+                self.sweeps.append(one)
             except BadPrime:
                 continue
             except TimeOver:
@@ -220,25 +242,6 @@ class _Sweeping:
                 break
         generic = max((one.generic for one in self.sweeps), default=())
         self.sweeps[:] = [one for one in self.sweeps if one.generic == generic]
-
-    def _sweep(self, choice: Choice) -> Sweep:
-        p, lines, width = choice
-        return sweep(
-            self.family.map,
-            self.count,
-            p,
-            self.family.eps,
-            on=None if lines is None else (lines, width),
-            seed=f"{self._start} {p} {lines} {width}",
-            check=self.until(_UNTIL[0]),
-            progress=self._told,
-            **self._measured,
-        )
-
-    def _told(self, done: int, _: int) -> None:
-        done += sum(one.seen for one in self.sweeps)
-        left = (time.monotonic() - self.began) * max(0, self._total - done) / done
-        self.tell(f"scan: {done} of {self._total} members, {left:.0f} s left")
 
     def _size(self, plan: Sequence[Choice]) -> int:
         """The number of members."""
@@ -249,12 +252,12 @@ class _Sweeping:
         again: list[Choice] = [
             (one.prime, _MORE * round(one.seen / one.prime), 1) for one in self.sweeps if one.on_lines
         ]
-        return again if self._size(again) <= most else []
+        return again if _size(self.count, again) <= most else []
 
     def more_primes(self, primes: Sequence[int] | None, most: float) -> list[Choice]:
         """Further primes, unless some are given, while there are not more than `most` members in all."""
         further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(self.count, ()) if primes is None]
-        sizes = accumulate((_size(self.count, *one) for one in further), initial=self._total)
+        sizes = accumulate((_size(self.count, [one]) for one in further), initial=self._total)
         return [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
 
     def result(self, known: Sequence[Component], symmetric: tuple[Any, ...]) -> Scan:
@@ -282,12 +285,7 @@ def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]
         planes: list[Choice] = [(p, _PLANES, 2) for p in _OF_PLANES]
         plans = [[*some, *planes] for some in lines] + lines
         plans = plans if primes is None else [[(p, n, 1) for p in primes] for n in _MANY_LINES[:1]]
-    return next((plan for plan in plans if sum(_size(count, *one) for one in plan) <= most), plans[-1])
-
-
-def _size(count: int, prime: int, lines: int | None, width: int) -> int:
-    """The number of members."""
-    return int(prime**count if lines is None else prime**width * lines)
+    return next((plan for plan in plans if _size(count, plan) <= most), plans[-1])
 
 
 def _terms(
@@ -354,11 +352,6 @@ def _left(one: Sweep, components: Sequence[Component]) -> int:
     )
 
 
-def _lacks_hypersurface(one: Sweep, components: Sequence[Component]) -> bool:
-    """Whether members on random lines are left, as many as a hypersurface has."""
-    return one.on_lines and _left(one, components) >= 0.5 * one.seen / one.prime
-
-
-def _lacks_points(one: Sweep, components: Sequence[Component]) -> bool:
-    """Whether members are left, fewer than a curve has, or a hypersurface where they are on random lines."""
-    return 0 < _left(one, components) < 0.5 * (one.prime if one.complete else one.seen / one.prime)
+def _size(count: int, plan: Sequence[Choice]) -> int:
+    """The number of members of a plan."""
+    return sum(int(p**count if lines is None else p**width * lines) for p, lines, width in plan)

@@ -40,14 +40,30 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     if not complete or not components:
         return []
     found: list[Change] = []
-    known = {_identity(len(names))}
+    known = _generated(found, len(names))
     for change in _changes(len(names), components):
         if change in known or not all(_permutes(change, p, slow) for p, slow in complete):
             continue
         if _matters(change, components, names):
             found.append(change)
             known = _generated(found, len(names))
-    return [_texts(change, names) for change in found]
+    texts = []
+    for change in found:  # denominators are constants or one parameter
+        *images, below = map(format_polynomial, _images(change, names))
+        texts.append(
+            tuple(images if below == "1" else [f"{image}/{below}" if image != below else "1" for image in images])
+        )
+    return texts
+
+
+def _permutes(change: Change, p: int, slow: Mapping[Point, Degrees]) -> bool:
+    """Whether all slow members modulo a prime go to such with the same degrees, or to infinity."""
+    rows = residues(change, p)
+    for point, degrees in slow.items() if rows is not None else ():
+        *image, below = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows or ())
+        if below and slow.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
+            return False
+    return True
 
 
 def _changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
@@ -72,10 +88,6 @@ def _changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
         yield from signed
 
 
-def _identity(count: int) -> Change:
-    return tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))
-
-
 def _times(change: Change, vector: Sequence[fmpq]) -> Row:
     return tuple(sum((c * x for c, x in zip(row, vector, strict=True)), fmpq(0)) for row in change)
 
@@ -87,19 +99,24 @@ def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
     return [sum((c * x for c, x in zip(row, vector, strict=True)), context.constant(0)) for row in change]
 
 
-def _texts(change: Change, names: Sequence[str]) -> tuple[str, ...]:
-    """The images; denominators are constants or one parameter, as those of `_changes` are."""
-    *images, below = map(format_polynomial, _images(change, names))
-    return tuple(images if below == "1" else [f"{image}/{below}" if image != below else "1" for image in images])
-
-
 def _matters(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
     """Whether hypersurfaces go to such with the same degrees, and something is moved or not affine."""
     *images, below = _images(change, names)
+
+    def moved_by(equation: fmpq_mpoly) -> fmpq_mpoly:
+        """What holds where the image of a point satisfies an equation; a constant where only points at infinity do."""
+        degree, total = equation.total_degree(), 0 * below
+        for exponents, coefficient in equation.terms():
+            term = coefficient * below ** (degree - sum(map(int, exponents)))
+            for image, exponent in zip(images, exponents, strict=True):
+                term *= image ** int(exponent)
+            total += term
+        return primitive_part(total)[1]
+
     known = {(str(one.equations[0]), one.degrees) for one in components if len(one.equations) == 1}
     matters = False
     for one in components:
-        moved = [_moved(equation, images, below) for equation in one.equations]
+        moved = [moved_by(equation) for equation in one.equations]
         if any(equation.total_degree() == 0 for equation in moved):
             continue
         if len(moved) == 1 and (str(moved[0]), one.degrees) not in known:
@@ -113,41 +130,17 @@ def _matters(change: Change, components: Sequence[Component], names: Sequence[st
     return matters
 
 
-def _moved(equation: fmpq_mpoly, images: Sequence[fmpq_mpoly], below: fmpq_mpoly) -> fmpq_mpoly:
-    """What holds where the image of a point satisfies an equation; a constant where only points at infinity do."""
-    degree, total = equation.total_degree(), 0 * below
-    for exponents, coefficient in equation.terms():
-        term = coefficient * below ** (degree - sum(map(int, exponents)))
-        for image, exponent in zip(images, exponents, strict=True):
-            term *= image ** int(exponent)
-        total += term
-    return primitive_part(total)[1]
-
-
-def _permutes(change: Change, p: int, slow: Mapping[Point, Degrees]) -> bool:
-    """Whether all slow members modulo a prime go to such with the same degrees, or to infinity."""
-    rows = residues(change, p)
-    if rows is None:
-        return True
-    for point, degrees in slow.items():
-        *image, below = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows)
-        if below and slow.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
-            return False
-    return True
-
-
 def _generated(found: Sequence[Change], count: int) -> set[Change]:
     """The group that changes generate; it is finite, for it permutes points."""
-    known = new = {_identity(count)}
+
+    def composed(one: Change, other: Change) -> Change:
+        """First `one`, then `other`."""
+        rows = tuple(zip(*(_times(other, column) for column in zip(*one, strict=True)), strict=True))
+        scale = next(c for c in rows[-1] if c != 0)
+        return tuple(tuple(c / scale for c in row) for row in rows)
+
+    known = new = {tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))}
     while new and len(known) < 2000:
-        new = {_composed(one, other) for one in new for other in found} - known
+        new = {composed(one, other) for one in new for other in found} - known
         known = known | new
     return known
-
-
-def _composed(one: Change, other: Change) -> Change:
-    """First `one`, then `other`."""
-    columns = [_times(other, column) for column in zip(*one, strict=True)]
-    rows = tuple(zip(*columns, strict=True))
-    scale = next(c for c in rows[-1] if c != 0)
-    return tuple(tuple(c / scale for c in row) for row in rows)
