@@ -22,7 +22,7 @@ from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
 
 _POLYNOMIAL = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
-_CURVES = {0: "rational curves", 1: "elliptic curves, of genus 1"}
+_CURVES = {None: "curves", 0: "rational curves", 1: "elliptic curves, of genus 1"}
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,26 @@ class _Facts:
         self.grown = degrees.known if degrees is not None else Known.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
-        self.integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
+        # How many integrals there are; where that is a lower bound, the sentence says so.
+        where = f" in dimension {found.dim}"
+        number = counted(self.count, "independent integral") if self.count else "no integral"
+        self.integrals = number + where if found.count_is_exact else f"at least {number}{where}"
+        if not found.integrals_were_counted:
+            self.integrals = "the integrals were not counted"
+        elif not self.count and found.integrals is not None and not found.count_is_exact:
+            degree = found.integrals.profile.degree
+            self.integrals = f"no integral{where} up to degree {degree} (relations along orbits)"
         period = found.integrals.profile.period if found.integrals is not None else None
         self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
         self.is_linear = found.file.is_quadratic and found.file.system.degree <= 1
-        self.liouville = "" if self.is_linear else _liouville(found)
+        self.liouville = ""  # by what the map is Liouville integrable, proved
+        if found.dim > 2 and not self.is_linear:
+            for one in reversed(found.poisson.tensors if found.poisson is not None else ()):
+                proved = (one.verdict, one.jacobi, one.involution)
+                if one.is_liouville_integrable and all(verdict is Verdict.PROVED for verdict in proved):
+                    self.liouville = f"with the Poisson tensor {one.name}"
+            if isinstance(found.normal_form, SystemNormalForm):
+                self.liouville = "as a member of the commuting family"
 
 
 def conclude(found: Findings) -> Conclusion:
@@ -155,10 +170,16 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
 
 def _on_curves(facts: _Facts) -> _Verdict | None:
     """Where the orbits lie on curves, proved; or not, of maps whose growth is not known."""
-    found = facts.found
-    if _orbits_on_curves_proved(found):
+    found, proved = facts.found, 0
+    if found.integrals is not None:  # independent ones
+        proved = sum(verdict is Verdict.PROVED for _, verdict in found.integrals.formulas)
+        proved = max(proved, 0 if found.integrals.symbols else found.integrals.by_theorems)
+    if found.dim > 1 and proved >= found.dim - 1:
         sense = "superintegrable" if found.dim > 2 else "integrable"
-        where = f"so that orbits lie on {_curves(found, facts.growth)}"
+        genus = found.pencil.genus if found.pencil is not None else None
+        if genus is None and found.dim == 2:  # the growth tells it where it was not computed
+            genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
+        where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
         return _Verdict("integrable", sentence, sense, Known.PROVED)
     on_curves = orbits_lie_on_curves(found)
@@ -205,44 +226,6 @@ def _confining(found: Findings) -> str:
     """In which sense a map is not integrable: confinement is no proof of integrability."""
     confined = {run.verdict for run in found.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
-
-
-def _orbits_on_curves_proved(found: Findings) -> bool:
-    """Whether one integral less than the dimension is proved, independent of each other."""
-    search = found.integrals
-    if search is None or found.dim < 2:
-        return False
-    proved = sum(verdict is Verdict.PROVED for _, verdict in search.formulas)
-    return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
-
-
-def _curves(found: Findings, growth: Growth) -> str:
-    """The curves of integrals: in the plane with their genus, which the growth tells where it was not computed."""
-    genus = found.pencil.genus if found.pencil is not None else None
-    if genus is None and found.dim == 2:
-        genus = next((g for g, kind in GROWTH_ON.items() if kind is growth), None)
-    return "curves" if genus is None else _CURVES.get(genus, f"curves of genus {genus}")
-
-
-def _liouville(found: Findings) -> str:
-    """By what the map is Liouville integrable, proved; empty where that is not known."""
-    if isinstance(found.normal_form, SystemNormalForm) and found.dim > 2:
-        return "as a member of the commuting family"
-    for one in found.poisson.tensors if found.poisson is not None and found.dim > 2 else ():
-        proved = (one.verdict, one.jacobi, one.involution)
-        if one.is_liouville_integrable and all(verdict is Verdict.PROVED for verdict in proved):
-            return f"with the Poisson tensor {one.name}"
-    return ""
-
-
-def _count_text(found: Findings) -> str:
-    """How many integrals there are; where that is a lower bound, the sentence says so."""
-    count, search = found.integral_count, found.integrals
-    where = f" in dimension {found.dim}"
-    if count == 0 and search is not None and not found.count_is_exact:
-        return f"no integral{where} up to degree {search.profile.degree} (relations along orbits)"
-    number = "no integral" if count == 0 else counted(count, "independent integral")
-    return number + where if found.count_is_exact else f"at least {number}{where}"
 
 
 def _capital(sentence: str) -> str:

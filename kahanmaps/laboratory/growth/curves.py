@@ -21,7 +21,6 @@ import time
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import reduce
-from typing import NoReturn
 
 from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
@@ -94,16 +93,30 @@ class Line:
     def step(self, guess: int) -> None:
         """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""
         for equation in self._equations:
-            is_small = equation.dim <= _MINORS or equation.explicit is not None
-            curve = self._by_minors(equation) if is_small else self._by_series(equation, guess)
+            too_large = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
+            curve: list[nmod_poly] | None = None
+            if equation.dim <= _MINORS or equation.explicit is not None:
+                curve = self._by_minors(equation)
+            most = 2 * self._max_degree + _MARGIN + 1
+            length = min(2 * guess + _MARGIN + 1, most)
+            while curve is None:
+                self._require_time()
+                curve = self._curve(self._image(equation, length), length)
+                if curve is None and length == most:
+                    raise too_large
+                length = min(2 * length, most)
             degree = max(0, *(int(entry.degree()) for entry in curve))
             if degree > self._max_degree:
-                self._raise_degree()
+                raise too_large
             self._X, self.degree = curve, degree
         self.steps += 1
 
     def _by_minors(self, equation: Equation) -> list[nmod_poly]:
-        *above, below = equation.image(self._X, nmod_poly([0], self.prime), self._times)
+        def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
+            self._require_time()
+            return left * right
+
+        *above, below = equation.image(self._X, nmod_poly([0], self.prime), times)
         if below.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
         common = below.gcd(self._mixture(above))
@@ -117,28 +130,9 @@ class Line:
             curve.append(quotient)
         return curve
 
-    def _times(self, left: nmod_poly, right: nmod_poly) -> nmod_poly:
-        self._require_time()
-        return left * right
-
     def _mixture(self, entries: list[nmod_poly]) -> nmod_poly:
         zero = nmod_poly([0], self.prime)
         return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
-
-    def _raise_degree(self) -> NoReturn:
-        raise Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
-
-    def _by_series(self, equation: Equation, guess: int) -> list[nmod_poly]:
-        most = 2 * self._max_degree + _MARGIN + 1
-        length = min(2 * guess + _MARGIN + 1, most)
-        while True:
-            self._require_time()
-            curve = self._curve(self._image(equation, length), length)
-            if curve is not None:
-                return curve
-            if length == most:
-                self._raise_degree()
-            length = min(2 * length, most)
 
     def _require_time(self) -> None:
         if time.monotonic() > self._deadline:
@@ -181,7 +175,9 @@ class Line:
     def _curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
         """The polynomials with these quotients, or None where there are not enough terms to be certain."""
         for _ in range(2):
-            above, below = (self._functional(x) for _ in range(2))
+            above, below = (
+                nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._mixture(x) for _ in range(2)
+            )
             if int(below[0]) == 0:
                 continue
             inverse = below.inverse_series_trunc(length)
@@ -199,6 +195,3 @@ class Line:
             if all(entry.degree() <= degree for entry in curve):
                 return curve
         return None
-
-    def _functional(self, x: list[nmod_poly]) -> nmod_poly:
-        return nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._mixture(x)

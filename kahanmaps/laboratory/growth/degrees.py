@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpz_mat
+from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
@@ -343,8 +343,32 @@ class _Search:
         matrix = exponent_matrix(self._map, self._eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             periodic = monomial_period(self._map, self._eps, matrix) if proof.growth is Growth.BOUNDED else None
-            return self._by_matrix(matrix, periodic or proof, max_terms)
-        lines = [self._line() for _ in range(_LINES)]
+            # The degrees of a monomial map are exact, those of powers of the matrix.
+            power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
+            while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
+                known = find_recurrence(self.degrees) if max_terms is None else None
+                if known is not None and known.checked >= max(6, known.order):
+                    break
+                degree = monomial_degree(power)
+                if degree > self._max_degree:
+                    ended = Ended.DEGREE
+                    message = f"the degree of iterate {len(self.degrees)} is above {self._max_degree}"
+                    break
+                self.degrees.append(degree)
+                power = power * matrix
+            iterates = counted(len(self.degrees) - 1, "iterate")
+            message = message or f"degrees of {iterates} by powers of the exponent matrix"
+            return self._result(ended, message, proof=periodic or proof)
+
+        def line() -> Line:
+            while True:
+                try:
+                    over = reduced(self._map, self._eps, self._rng)
+                    return Line(over, self._rng, self._deadline, self._max_degree)
+                except BadPrime:
+                    continue
+
+        lines = [line() for _ in range(_LINES)]
         self._is_explicit = lines[0].is_explicit
         try:
             while True:
@@ -354,7 +378,7 @@ class _Search:
                 if len(self.degrees) > _MOST_TERMS:
                     raise Stopped(Ended.TERMS, f"{_MOST_TERMS} iterates, and no more are worked out")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
-                self._step(lines)
+                self._step(lines, line)
                 if self.degrees[-1] == 0 and max_terms is None:
                     raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as end:
@@ -362,10 +386,11 @@ class _Search:
         if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
             self._follow()
         primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
-        found = replace(
-            self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
-        )
-        found = replace(found, patterns=self._named())
+        found = self._result(ended, message, primes=primes, residues=residues, notes=tuple(self.notes))
+        contracted = self._patterns
+        if contracted is not None and contracted.at and self._eps is None and time.monotonic() <= self._deadline:
+            named = with_eps(self._map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
+            found = replace(found, patterns=replace(contracted, contracted=named))
         period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
         if period is not None:
             found = replace(found, proof=linear_iterate(self._map, self._eps, period))
@@ -374,25 +399,9 @@ class _Search:
         left = max(1.0, self._deadline - time.monotonic())
         return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))
 
-    def _by_matrix(self, matrix: fmpz_mat, proof: GrowthProof, max_terms: int | None) -> DegreeGrowth:
-        """The degrees of a monomial map, exactly."""
-        power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
-        while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
-            known = find_recurrence(self.degrees) if max_terms is None else None
-            if known is not None and known.checked >= max(6, known.order):
-                break
-            degree = monomial_degree(power)
-            if degree > self._max_degree:
-                ended = Ended.DEGREE
-                message = f"the degree of iterate {len(self.degrees)} is above {self._max_degree}"
-                break
-            self.degrees.append(degree)
-            power = power * matrix
-        message = message or f"degrees of {counted(len(self.degrees) - 1, 'iterate')} by powers of the exponent matrix"
-        return replace(self._so_far(), ended=ended, message=message, proof=proof)
-
-    def _so_far(self) -> DegreeGrowth:
-        return DegreeGrowth(tuple(self.degrees), self._eps, Ended.TERMS, "", self._seed, (), (), (), self._patterns)
+    def _result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
+        known: dict[str, Any] = {"primes": (), "residues": (), "patterns": self._patterns, **more}
+        return DegreeGrowth(tuple(self.degrees), self._eps, ended, message, self._seed, **known)
 
     def _look_at_fit(self, may_stop: bool) -> None:
         """Follow the singularities in good time, and stop where a recurrence is certain."""
@@ -408,7 +417,7 @@ class _Search:
             return
         known = self._patterns
         enough = found is not None and found.checked >= max(6, found.order)
-        explained = self._so_far().explained
+        explained = self._result(Ended.TERMS, "").explained
         if explained is not None:
             last = max(known.lengths, default=0) if known is not None else 0
             same = found is not None and found.characteristic == explained.characteristic
@@ -432,26 +441,11 @@ class _Search:
                 self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
             )
 
-    def _named(self) -> Patterns | None:
-        """The patterns with polynomials over Q[eps] where eps is not given."""
-        known = self._patterns
-        if known is None or self._eps is not None or not known.at or time.monotonic() > self._deadline:
-            return known
-        return replace(known, contracted=with_eps(self._map, rational(known.at), known.contracted))
-
-    def _line(self) -> Line:
-        while True:
-            try:
-                over = reduced(self._map, self._eps, self._rng)
-                return Line(over, self._rng, self._deadline, self._max_degree)
-            except BadPrime:
-                continue
-
-    def _step(self, lines: list[Line]) -> None:
+    def _step(self, lines: list[Line], line: Callable[[], Line]) -> None:
         """All lines one step on; those in special position are replaced by others."""
         n = len(self.degrees)
         while True:
-            found = [self._degree(line, n) for line in lines]
+            found = [self._degree(one, n) for one in lines]
             best = max(found)
             if best >= 0 and min(found) == best:
                 self.degrees.append(best)
@@ -467,7 +461,7 @@ class _Search:
                 self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")
             for k, degree in enumerate(found):
                 if degree < best or best < 0:
-                    lines[k] = self._line()
+                    lines[k] = line()
 
     def _degree(self, line: Line, n: int) -> int:
         """The degree of iterate n on a line, which is followed there; -1 where that cannot be done on this line."""

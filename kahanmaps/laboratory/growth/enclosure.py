@@ -39,7 +39,7 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
-from kahanmaps.maps.implicit import BirationalMap, MapOver, StepOver
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import homogeneous_map
 
@@ -122,7 +122,10 @@ def enclose(
         if found is None:
             return None
         lower, steps, below, above = found
-        return Enclosure(lower, _upper(map_, eps, end), steps, below, above, over.field.characteristic, int(over.eps))
+        with flint.ctx.workprec(128):  # the least (deg f^n)^(1/n) of the iterates that are written out, rounded up
+            roots = [arb(degree).root(n) for n, degree in enumerate(_written_degrees(map_, eps, end), 1)]
+            upper = _decimal(min(roots).upper())
+        return Enclosure(lower, upper, steps, below, above, over.field.characteristic, int(over.eps))
     return None
 
 
@@ -132,22 +135,20 @@ def is_birational(map_: MapOver, rng: random.Random) -> bool:
     It is not where the inverse is not known. Of every factor: the equation of its inverse, at the image of a generic
     point, is to annihilate that point, as forms, and nothing else, which one point shows.
     """
-    try:
-        return all(_is_birational(factor, rng) for factor in map_.factors)
-    except InputError:
-        return False
-
-
-def _is_birational(map_: StepOver, rng: random.Random) -> bool:
-    forms = homogeneous_map(map_).forms
-    (inverse,) = map_.inverse.equations
-    X = forms[0].context().gens()
-    zero = forms[0] * 0
-    rows = inverse.rows(inverse.monomials(forms), zero)
-    if any(not sum((entry * x for entry, x in zip(row, X, strict=True)), zero).is_zero() for row in rows):
-        return False
-    image = image_of([map_.equation], [rng.randrange(map_.field.characteristic) for _ in X])
-    return image is not None and image_of([inverse], image) is not None
+    for factor in map_.factors:
+        try:
+            forms = homogeneous_map(factor).forms
+            (inverse,) = factor.inverse.equations
+        except InputError:
+            return False
+        X, zero = forms[0].context().gens(), forms[0] * 0
+        rows = inverse.rows(inverse.monomials(forms), zero)
+        if any(not sum((entry * x for entry, x in zip(row, X, strict=True)), zero).is_zero() for row in rows):
+            return False
+        image = image_of([factor.equation], [rng.randrange(factor.field.characteristic) for _ in X])
+        if image is None or image_of([inverse], image) is None:
+            return False
+    return True
 
 
 def degree_above(largest: int, lines: int) -> int:
@@ -224,17 +225,6 @@ def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
     return lines
 
 
-def _upper(map_: BirationalMap, eps: fmpq | None, end: float) -> str:
-    """The least (deg f^n)^(1/n), rounded up, of the iterates that are written out; over Q(eps) without eps."""
-    best: arb | None = None
-    for n, degree in enumerate(_written_degrees(map_, eps, end), 1):
-        with flint.ctx.workprec(128):
-            root = arb(degree).root(n)
-            best = root if best is None or root < best else best
-    assert best is not None
-    return _decimal(_ceiling(best.upper()))
-
-
 def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Iterator[int]:
     """The degrees of f, f^2, ... from forms without common factor over Q, or Q[eps], while they are short enough."""
     ring = fmpq_mpoly_ctx.get(("x", "y", "z", "eps"), Ordering.degrevlex)
@@ -272,14 +262,11 @@ def _less(bound: arb) -> str:
 
     Less, not at most: that the dynamical degree is more than it holds for all but finitely many eps.
     """
-    return _decimal(_ceiling(bound.lower()) - 1)
+    return _decimal(bound.lower(), -1)
 
 
-def _ceiling(end: arb) -> int:
-    """In units of the last decimal; `end` is exact."""
-    return int((end.fmpq() * 10**_DIGITS).ceil())
-
-
-def _decimal(units: int) -> str:
+def _decimal(end: arb, more: int = 0) -> str:
+    """An exact number rounded up, and so many units of the last decimal more."""
+    units = int((end.fmpq() * 10**_DIGITS).ceil()) + more
     text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"
     return text.rstrip("0").rstrip(".")

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 from flint import fmpq
@@ -92,7 +91,9 @@ class HeightSurvey(Printed):
         total = len(self.orbits)
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
-            which = "the eps" if self._eps_differ else "the starts"
+            # Each eps may have a kind of its own, the same for all its starts.
+            known = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
+            which = "the eps" if len(known) == len({value for value, _ in known}) else "the starts"
             return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)})"
         decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
@@ -109,15 +110,6 @@ class HeightSurvey(Printed):
             {"eps": str(one.eps), "start": format_point(one.start), "growth": str(one.growth.kind)}
             for one in self.orbits
         ]
-
-    @property
-    def _eps_differ(self) -> bool:
-        """Whether each eps has a kind of its own, the same for all its starts."""
-        kinds: dict[fmpq, set[Growth]] = {}
-        for orbit in self.orbits:
-            if orbit.growth.kind is not Growth.UNDECIDED:
-                kinds.setdefault(orbit.eps, set()).add(orbit.growth.kind)
-        return all(len(found) == 1 for found in kinds.values())
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -163,13 +155,19 @@ def height_survey(
     field = "" if map_.root is None else map_.root.number_field.name
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
         over = map_.at(value)
-        draws = _generic_starts(map_.dim, seed_for(seed, map_.subject, value))
+        rng = random.Random(f"heights {seed_for(seed, map_.subject, value)}")
         wanted = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
         for k, start in enumerate(wanted):
             if orbits and time.monotonic() > deadline:
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
             progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
-            for candidate in islice(draws, _DRAWS) if start is None else (start,):
+            for _ in range(_DRAWS if start is None else 1):
+                # Off the invariant curves of small equation that many maps have, such as eps^2 x^2 = 1: numerators are
+                # primes, so that a coordinate is no simple multiple of 1/eps.
+                candidate = start or tuple(
+                    fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS))
+                    for _ in range(map_.dim)
+                )
                 found = height_growth(
                     over, candidate, steps, normal_form=normal_form, max_digits=max_digits, deadline=deadline
                 )
@@ -179,13 +177,3 @@ def height_survey(
             if found.end.status == "interrupted":
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
     return HeightSurvey(tuple(orbits), True, map_.has_eps, field)
-
-
-def _generic_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
-    """Random points off the invariant curves of small equation that many maps have, such as eps^2 x^2 = 1.
-
-    Numerators are primes, so that a coordinate is no simple multiple of 1/eps.
-    """
-    rng = random.Random(f"heights {seed}")
-    while True:
-        yield tuple(fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS)) for _ in range(dim))

@@ -22,7 +22,6 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.recurrences import GrowthRate
-from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
 _BUDGET = 1_000_000  # products of terms, to compose formulas
@@ -75,25 +74,21 @@ def exponent_matrix(map_: BirationalMap, eps: fmpq | None) -> fmpz_mat | None:
         return None
     if len(equations) > _MAX_FACTORS:
         return None
-    matrices = [_exponents(equation) for equation in equations]
-    known = [matrix for matrix in matrices if matrix is not None]
-    if len(known) < len(matrices):
-        return None
-    product = reduce(lambda total, matrix: matrix * total, known)
-    return None if product.det() == 0 else product  # singular at a special eps only
-
-
-def _exponents(equation: Equation) -> fmpz_mat | None:
-    """Those of an equation where each row is m x~_j = r with monomials m and r."""
-    n, rows = equation.dim, {}
-    for *entries, right in equation.terms:
-        columns = [j for j, entry in enumerate(entries) if entry]
-        if len(columns) != 1 or len(entries[columns[0]]) != 1 or len(right) != 1:
+    n = map_.dim
+    product = fmpz_mat([[int(i == j) for j in range(n)] for i in range(n)])
+    for equation in equations:  # each row is to be m x~_j = r with monomials m and r
+        rows = {}
+        for *entries, right in equation.terms:
+            columns = [j for j, entry in enumerate(entries) if entry]
+            if len(columns) != 1 or len(entries[columns[0]]) != 1 or len(right) != 1:
+                return None
+            ((left_monomial, _),), ((right_monomial, _),) = entries[columns[0]], right
+            left, above = equation.exponents[left_monomial], equation.exponents[right_monomial]
+            rows[columns[0]] = [above[k] - left[k] for k in range(n)]
+        if len(rows) < n:
             return None
-        ((left_monomial, _),), ((right_monomial, _),) = entries[columns[0]], right
-        left, above = equation.exponents[left_monomial], equation.exponents[right_monomial]
-        rows[columns[0]] = [above[k] - left[k] for k in range(n)]
-    return fmpz_mat([rows[j] for j in range(n)]) if len(rows) == n else None
+        product = fmpz_mat([rows[j] for j in range(n)]) * product
+    return None if product.det() == 0 else product  # singular at a special eps only
 
 
 def monomial_degree(matrix: fmpz_mat) -> int:
@@ -153,7 +148,9 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
     minimal = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
     # The square of the radius is the product of an eigenvalue and its conjugate, thus the largest real root of this
     # polynomial, the roots of which are all products of two eigenvalues. FLINT isolates roots from each other.
-    products = [factor for factor, _ in _kronecker_square(matrix).charpoly().factor()[1]]
+    rows = matrix.tolist()
+    square_of = fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
+    products = [factor for factor, _ in square_of.charpoly().factor()[1]]
     radical = reduce(fmpz_poly.__mul__, products)
     numbers = [g for factor in products for g, _ in factor(fmpz_poly([0, 0, 1])).factor()[1]]
     bits = _BITS
@@ -164,9 +161,13 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
             square, *others = sorted(reals, key=lambda root: root.mid().fmpq(), reverse=True)
             radius = square.sqrt()
             eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
-            moduli = [(_modulus_square(root), k) for roots, k in eigenvalues for root, _ in roots]
+            moduli = [
+                (root.real * root.real + root.imag * root.imag, k) for roots, k in eigenvalues for root, _ in roots
+            ]
             largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(square)]
-            candidates = [g for g in numbers if _at(g, radius).contains(0)]
+            # by Horner's rule: python-flint has no value of an integer polynomial at a ball
+            values = [reduce(lambda total, c: total * radius + c, reversed(g.coeffs()), arb(0)) for g in numbers]
+            candidates = [g for g, value in zip(numbers, values, strict=True) if value.contains(0)]
             # The square of a modulus is a root of the radical too, so that a ball that meets that of one root only
             # is that root.
             is_decided = all(square > other for other in others) and not any(
@@ -179,23 +180,6 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
                 return GrowthRate(polynomial, integer, integer, size)
             return GrowthRate(polynomial, radius.str(40), radius.str(21, radius=False), size)
         bits *= 2
-
-
-def _kronecker_square(matrix: fmpz_mat) -> fmpz_mat:
-    rows = matrix.tolist()
-    return fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
-
-
-def _modulus_square(root: Any) -> arb:
-    modulus: arb = root.real * root.real + root.imag * root.imag
-    return modulus
-
-
-def _at(polynomial: fmpz_poly, x: arb) -> arb:
-    total = arb(0)
-    for c in reversed(polynomial.coeffs()):
-        total = total * x + c
-    return total
 
 
 def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> GrowthProof | None:

@@ -8,7 +8,6 @@ proves that it goes on.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from kahanmaps.algebra.written.text import format_univariate
 from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
+_MODULO = fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
 _BITS = 256  # of the balls for roots
 _MOST_CLASSES = 12  # residue classes in a closed form
 
@@ -133,7 +133,23 @@ class Recurrence:
             return None
         if self.is_polynomial:
             return GrowthRate(fmpz_poly([-1, 1]), "1", "1", max(k for _, k in self.factors))
-        return _largest_root(self.factors)
+        # The positive root that no other root exceeds in modulus, certified by balls.
+        best: tuple[arb, fmpz_poly, int] | None = None
+        with flint.ctx.workprec(_BITS):
+            moduli = []
+            for factor, multiplicity in self.factors:
+                found: Any = factor.complex_roots()  # pairs, whatever the stubs say
+                for root, _ in found:
+                    moduli.append(abs(root))
+                    # FLINT isolates real roots as such: their imaginary part is the exact 0.
+                    if root.imag == 0 and root.real > 0 and (best is None or root.real > best[0]):
+                        best = (root.real, factor, multiplicity)
+            if best is None or any(modulus > best[0] for modulus in moduli):
+                return None
+            value, factor, multiplicity = best
+            whole = str(-factor[0])
+            digits = (whole, whole) if factor.degree() == 1 else (value.str(40), value.str(21, radius=False))
+            return GrowthRate(factor, *digits, multiplicity)
 
     @cached_property
     def closed_form(self) -> str | None:
@@ -189,7 +205,8 @@ class Recurrence:
     @property
     def equation(self) -> str:
         """The recurrence as an equation."""
-        terms = [f"{_signed(-self.characteristic[k])}*a(n-{self.order - k})" for k in range(self.order - 1, -1, -1)]
+        numbers = [(-self.characteristic[k], self.order - k) for k in range(self.order - 1, -1, -1)]
+        terms = [f"{'+' if number >= 0 else ''}{number}*a(n-{k})" for number, k in numbers]
         terms = [term for term in terms if not term.startswith(("+0*", "-0*"))]
         right = "".join(terms).replace("+1*", "+").replace("-1*", "-").removeprefix("+") or "0"
         after = f" for n >= {self.order}"
@@ -238,7 +255,7 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     values = [integer(value, "an entry") for value in values]
     if len(values) < 2:
         return None
-    polynomial = _context().minpoly(list(values))
+    polynomial = _MODULO.minpoly(list(values))
     order = int(polynomial.degree())
     if len(values) < 2 * order + needed_checks(order):
         return None
@@ -255,35 +272,9 @@ def needed_checks(order: int) -> int:
     return max(2, -(-order // 3))
 
 
-@functools.cache
-def _context() -> fmpz_mod_poly_ctx:
-    return fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
-
-
 def _cyclotomic_index(factor: fmpz_poly) -> int:
     """n where the polynomial is the n-th cyclotomic one, else 0."""
     return int(factor.is_cyclotomic())
-
-
-def _largest_root(factors: Sequence[tuple[fmpz_poly, int]]) -> GrowthRate | None:
-    """The positive root that no other root exceeds in modulus, certified by balls."""
-    best: tuple[arb, fmpz_poly, int] | None = None
-    with flint.ctx.workprec(_BITS):
-        moduli = []
-        for factor, multiplicity in factors:
-            found: Any = factor.complex_roots()  # pairs, whatever the stubs say
-            for root, _ in found:
-                moduli.append(abs(root))
-                # FLINT isolates real roots as such: their imaginary part is the exact 0.
-                if root.imag == 0 and root.real > 0 and (best is None or root.real > best[0]):
-                    best = (root.real, factor, multiplicity)
-        if best is None or any(modulus > best[0] for modulus in moduli):
-            return None
-        value, factor, multiplicity = best
-        if factor.degree() == 1:
-            whole = str(-factor[0])
-            return GrowthRate(factor, whole, whole, multiplicity)
-        return GrowthRate(factor, value.str(40), value.str(21, radius=False), multiplicity)
 
 
 def _interpolated(at: Sequence[int], values: Sequence[int]) -> fmpq_poly:
@@ -291,7 +282,3 @@ def _interpolated(at: Sequence[int], values: Sequence[int]) -> fmpq_poly:
     size = len(at)
     powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
     return fmpq_poly(powers.solve(fmpq_mat(size, 1, [fmpq(value) for value in values])).entries())
-
-
-def _signed(number: Any) -> str:
-    return f"+{number}" if number >= 0 else str(number)

@@ -50,18 +50,42 @@ def degree_series(
     # The unknowns are S_i, i in `which`, then the D of the stages 1, 2, ..., 0, and 1.
     maps, rows = len(degrees), []
     stages = stages or [0] * len(every)
+
+    def add(row: list[Fraction], k: int, term: fmpz_poly) -> None:
+        above, below = row[k]
+        row[k] = above + term * below, below
+
     for i, k in enumerate(which):
         row = [_through_returns(every, j, k + 1) for j in which] + [(zero, one)] * (maps + 1)
-        _add(row, i, one)
-        _add(row, len(which) + (stages[k] - 1) % maps, fmpz_poly([-hypersurfaces[k][0]]))
+        add(row, i, one)
+        add(row, len(which) + (stages[k] - 1) % maps, fmpz_poly([-hypersurfaces[k][0]]))
         rows.append(row)
     for stage, degree in enumerate(degrees, 1):
-        mu = [_every(_through_returns(every, j, 0), maps, (stage - stages[j]) % maps) for j in which]
+        mu = []
+        for j in which:
+            series, first = _through_returns(every, j, 0), (stage - stages[j]) % maps
+            if maps > 1:  # the part with the exponents first, first + maps, ...
+                above, below = (part(z**maps) for part in every_nth(series, maps, first))
+                series = above * z**first, below
+            mu.append(series)
         row = [*mu, *[(zero, one)] * maps, (-one if stage == maps else zero, one)]
-        _add(row, len(which) + stage - 1, one)
-        _add(row, len(which) + (stage - 2) % maps, -degree * z)
+        add(row, len(which) + stage - 1, one)
+        add(row, len(which) + (stage - 2) % maps, -degree * z)
         rows.append(row)
-    below, above = _eliminated([_cleared(row) for row in rows])
+    cleared = []
+    for row in rows:
+        common = one
+        for _, below in row:
+            common = common * (below // common.gcd(below))
+        cleared.append([above * (common // below) for above, below in row])
+    # Without fractions, after Bareiss. At z = 0 the matrix in front of the S_i is diagonal: no pivot is zero.
+    previous = one
+    for k, pivot in enumerate(cleared[:-1]):
+        for entries in cleared[k + 1 :]:
+            factor, pairs = entries[k], zip(entries[k + 1 :], pivot[k + 1 :], strict=True)
+            entries[k + 1 :] = [(pivot[k] * entry - factor * other) // previous for entry, other in pairs]
+        previous = pivot[k]
+    below, above = cleared[-1][-2], -cleared[-1][-1]
     common = above.gcd(below)
     above, below = above // common, below // common
     sign = 1 if below[0] > 0 else -1
@@ -78,7 +102,10 @@ def needed(every: Sequence[Orders]) -> list[int] | None:
     >>> needed([attracted]), needed([Orders(((1, 0),), (), 9, True), Orders(((0, 1),), (), 9, True, beyond=(0,))])
     ([], None)
     """
-    chains = [_chain(every, k) for k in range(len(every))]
+    chains = [[k] for k in range(len(every))]  # each with those that it becomes, in this order
+    for chain in chains:
+        while (returns := every[chain[-1]].returns) is not None and returns[1] not in chain:
+            chain.append(returns[1])
     found = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in every[j].rows)]
     for i in found:
         if any(i in every[j].beyond for chain in chains for j in chain):
@@ -133,14 +160,6 @@ def coefficients(series: Fraction, count: int) -> list[int]:
     return found
 
 
-def _chain(every: Sequence[Orders], start: int) -> list[int]:
-    """A hypersurface and those that it becomes, in this order."""
-    found = [start]
-    while (returns := every[found[-1]].returns) is not None and returns[1] not in found:
-        found.append(returns[1])
-    return found
-
-
 def _through_returns(every: Sequence[Orders], start: int, column: int) -> Fraction:
     """The generating function of a column for one hypersurface, those that it becomes later included."""
     z = fmpz_poly([0, 1])
@@ -157,42 +176,3 @@ def _through_returns(every: Sequence[Orders], start: int, column: int) -> Fracti
     begin, before = seen[k]
     around = 1 - z ** (shift - begin)
     return before * around + above - before, around
-
-
-def _every(series: Fraction, n: int, first: int) -> Fraction:
-    """The part of a fraction with the exponents first, first + n, ..."""
-    if n == 1:
-        return series
-    above, below = (part(fmpz_poly([0] * n + [1])) for part in every_nth(series, n, first))
-    return above * fmpz_poly([0] * first + [1]), below
-
-
-def _add(row: list[Fraction], k: int, term: fmpz_poly) -> None:
-    above, below = row[k]
-    row[k] = above + term * below, below
-
-
-def _cleared(row: Sequence[Fraction]) -> list[fmpz_poly]:
-    common = fmpz_poly([1])
-    for _, below in row:
-        common = common * (below // common.gcd(below))
-    return [above * (common // below) for above, below in row]
-
-
-def _eliminated(rows: list[list[fmpz_poly]]) -> tuple[fmpz_poly, fmpz_poly]:
-    """The last two entries (a, -b) of the last row after elimination: a D = b; without fractions, after Bareiss.
-
-    At z = 0 the matrix in front of the S_i is diagonal, so that no pivot is zero.
-    """
-    previous = fmpz_poly([1])
-    for k in range(len(rows) - 1):
-        pivot = rows[k]
-        for row in rows[k + 1 :]:
-            factor = row[k]
-            row[k + 1 :] = [
-                (pivot[k] * entry - factor * other) // previous
-                for entry, other in zip(row[k + 1 :], pivot[k + 1 :], strict=True)
-            ]
-        previous = pivot[k]
-    a, minus_b = rows[-1][-2:]
-    return a, -minus_b
