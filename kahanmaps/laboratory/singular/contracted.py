@@ -32,7 +32,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.following import Course, Range
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
-from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
+from kahanmaps.laboratory.singular.orders import AlongCurves
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
@@ -366,20 +366,18 @@ def _followed(
     found = []
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
-            by_prime = {curve.prime: (curve, along) for curve, along in pairs}
-            orders = [curve.course(along).orders(_FIRST) for curve, along in list(by_prime.values())[:2]]
+            by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
+            orders = [curve.course(tracked).orders(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
             if len(orders) < 2:
                 raise OrdersUnknown("a hypersurface with points modulo one prime only")
             if orders[0].known != orders[1].known:
                 raise OrdersUnknown(POINTS_DIFFER)
-            found.append(_hypersurface(key, size, tuple(by_prime)[:2], orders[0].of(columns)))
+            along = orders[0].of(columns)
+            status = CONFINED if any(row[0] for row in along.rows) else NOT_CONFINED
+            known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orders=along)
+            settled = along.settled_at if along.is_settled else None
+            found.append(replace(known, primes=tuple(by_prime)[:2], followed=along.followed, settled_at=settled))
     return found
-
-
-def _hypersurface(key: tuple[Any, ...], degree: int, primes: tuple[int, ...], orders: Orders) -> Hypersurface:
-    status = CONFINED if any(row[0] for row in orders.rows) else NOT_CONFINED
-    known = Hypersurface("Z" if key[2] else "?", degree, any(key[1]), 1, status, 1, primes=primes, orders=orders)
-    return replace(known, followed=orders.followed, settled_at=orders.settled_at if orders.is_settled else None)
 
 
 def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
@@ -407,7 +405,12 @@ def _on_line(
     degree = max(int(entry.degree()) for entry in image)
     at_points = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
     at_images = [evaluate(form, map_.field, image) for form in forms.images]
-    excess = [_exponent(value, common) for value in at_points]
+    excess = []  # how often each divides the common factor
+    for value in at_points:
+        rest, exponent = common, 0
+        while value.degree() > 0 and (rest % value).is_zero():
+            rest, exponent = rest // value, exponent + 1
+        excess.append(exponent)
     if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
         raise OrdersUnknown("the minors of the equation have a common factor of another kind")
     product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
@@ -419,11 +422,3 @@ def _on_line(
     (inverse,) = map_.inverse.equations
     curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, limits) for point in points]
     return degree, int(radical.degree()), curves
-
-
-def _exponent(value: nmod_poly, product: nmod_poly) -> int:
-    """How often a polynomial divides another one that is not zero."""
-    count = 0
-    while value.degree() > 0 and (product % value).is_zero():
-        product, count = product // value, count + 1
-    return count

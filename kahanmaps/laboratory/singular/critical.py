@@ -11,7 +11,7 @@ import operator
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from itertools import pairwise
 
 from flint import nmod_poly
@@ -41,76 +41,61 @@ def critical_points(
     inverses; of several factors the product of their E is meant. Returns the points and, for each multiplicity, the
     number of zeros of E over the closure of GF(p): there may be zeros without points in GF(p).
     """
-    a, b, line = _random_line(equations[0], rng)
-    one = line[-1] * 0 + 1
-    value, poles = one, one
-    for equation, inverse in zip(equations, inverses, strict=True):
-        image, common = _image(equation, line)
-        value = value * _denominator(inverse, image)
-        poles = poles * image[-1] * common * line[-1]
-        line = image
 
     def E(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
-        total = one
+        total = X[0] * 0 + 1
         for equation, inverse in zip(equations, inverses, strict=True):
-            X = equation.image(X, one * 0, times)
+            X = equation.image(X, X[0] * 0, times)
             total = times(total, _denominator(inverse, X, times))
         return total
 
-    return _zeros(_without(value, poles), E, a, b, rng)
+    return _zeros(equations, inverses, E, rng)
 
 
 def pole_points(equations: Sequence[Equation], rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
-    a, b, line = _random_line(equations[0], rng)
-    infinity, value = line[-1], line[-1] * 0 + 1
-    for k, equation in enumerate(equations):
-        value = value * _denominator(equation, line)
-        if k + 1 < len(equations):
-            line, _ = _image(equation, line)
 
     def determinants(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
         total = _denominator(equations[0], X, times)
         for before, equation in pairwise(equations):
-            X = before.image(X, infinity * 0, times)
+            X = before.image(X, X[0] * 0, times)
             total = times(total, _denominator(equation, X, times))
         return total
 
-    return _zeros(_without(value, infinity), determinants, a, b, rng)
-
-
-def _random_line(equation: Equation, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:
-    p = equation.over.characteristic
-    a, b = ([rng.randrange(p) for _ in range(equation.dim + 1)] for _ in range(2))
-    return a, b, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
-
-
-def _image(equation: Equation, curve: Sequence[nmod_poly]) -> tuple[list[nmod_poly], nmod_poly]:
-    """The image of a curve without common factor, and the factor that was divided out."""
-    image = equation.image(curve, curve[-1] * 0)
-    common = reduce(nmod_poly.gcd, image)
-    return ([entry // common for entry in image] if common.degree() > 0 else image), common
-
-
-def _without(value: nmod_poly, *others: nmod_poly) -> nmod_poly:
-    """What is left of a polynomial when the zeros of others are divided out."""
-    for other in others:
-        while (shared := value.gcd(other)).degree() > 0:
-            value = value // shared
-    return value
+    return _zeros(equations, None, determinants, rng)
 
 
 def _zeros(
-    value: nmod_poly,
+    equations: Sequence[Equation],
+    inverses: Sequence[Equation] | None,
     function: Callable[[Sequence[nmod_poly], Product], nmod_poly],
-    a: Sequence[int],
-    b: Sequence[int],
     rng: random.Random,
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
-    """The zeros in GF(p) of a function that has the given value on the line, and how many there are in all."""
+    """The zeros in GF(p) of a function on a random line, and how many there are in all.
+
+    The function is E or, without inverses, det M; its value is computed from images without their common factors, and
+    poles and infinity, or infinity alone, are divided out.
+    """
+    p = equations[0].over.characteristic
+    a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
+    line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+    value, excluded = nmod_poly([1], p), line[-1] if inverses is None else nmod_poly([1], p)
+    for k, equation in enumerate(equations):
+        if inverses is None:
+            value = value * _denominator(equation, line)
+            if k + 1 == len(equations):
+                break
+        image = equation.image(line, line[-1] * 0)
+        common = reduce(nmod_poly.gcd, image)
+        image = [entry // common for entry in image] if common.degree() > 0 else image
+        if inverses is not None:
+            value = value * _denominator(inverses[k], image)
+            excluded = excluded * image[-1] * common * line[-1]
+        line = image
+    while (shared := value.gcd(excluded)).degree() > 0:
+        value = value // shared
     if value.degree() < 1:
         return [], {}
-    p = value.modulus()
     found, degrees = [], dict[int, int]()
     t = nmod_poly([0, 1], p)
     for part, exponent in value.factor_squarefree()[1]:
@@ -121,33 +106,18 @@ def _zeros(
         for factor, _ in linear.factor()[1]:
             s = -int(factor[0])
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
-            gradient = _gradient(function, point, power, p, rng)
+            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
+            # (t F_v + d F_w)^power G + ... A power of t above all those that count stands for d.
+            apart = power + 1
+            curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
+            far = nmod_poly([0] * apart + [1], p)
+            moved = [curve, *([x + far if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))]
+            values = [function(X, partial(nmod_poly.mul_low, n=apart + power)) for X in moved]
+            here, *there = (int(on[apart + power - 1]) for on in values)
+            gradient = [(c - here) % p for c in there]
             if any(gradient):
                 found.append(CriticalPoint(tuple(point), tuple(gradient), power))
     return found, degrees
-
-
-def _gradient(
-    function: Callable[[Sequence[nmod_poly], Product], nmod_poly],
-    point: Sequence[int],
-    power: int,
-    p: int,
-    rng: random.Random,
-) -> list[int]:
-    """The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is (t F_v + d F_w)^power G + ...
-
-    A power of t above all those that count stands for d.
-    """
-    apart = power + 1
-    far = nmod_poly([0] * apart + [1], p)
-    curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
-
-    def coefficient(X: Sequence[nmod_poly]) -> int:
-        return int(function(X, lambda left, right: left.mul_low(right, apart + power))[apart + power - 1])
-
-    here = coefficient(curve)
-    moved = ([x + far if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))
-    return [(coefficient(X) - here) % p for X in moved]
 
 
 def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product = operator.mul) -> nmod_poly:

@@ -122,7 +122,9 @@ def images_of_curve(
                 raise PrecisionTooLow
             precision -= common
             curves = [[entry.truncate(apart + precision) for entry in curve] for curve in moved]
-            if not all(slope.truncate(apart).is_zero() for slope in _slopes(curves)):
+            # the differences of coordinates of the neighbours to those of the curve
+            slopes = [there - here for curve in curves[1:] for here, there in zip(curves[0], curve, strict=True)]
+            if not all(slope.truncate(apart).is_zero() for slope in slopes):
                 raise NotGeneric("the valuation differs at neighbouring points")
             last = valuation(curves[0][-1], precision)
             divided = divided * equation.image_degree + common
@@ -131,20 +133,13 @@ def images_of_curve(
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
-        rank = _rank(curves, apart) if tangents else 0
+        rank = 0
+        if tangents:  # at t = 0 in projective space: the limit itself counts for nothing
+            entries = [*limit, *(int(slope[apart]) for slope in slopes)]
+            rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         kept = tuple(order or 0 for order in orders)
-        yield Step(divided, last, _product(denominators), rank, limit, kept, tuple(curves[0]) if functions else ())
-
-
-def _slopes(curves: Sequence[Sequence[nmod_poly]]) -> Iterator[nmod_poly]:
-    """The differences of coordinates of the neighbours to those of the curve."""
-    return (there - here for curve in curves[1:] for here, there in zip(curves[0], curve, strict=True))
-
-
-def _product(valuations: Sequence[int | None]) -> int | None:
-    """The valuation of a product."""
-    known = [valuation for valuation in valuations if valuation is not None]
-    return sum(known) if len(known) == len(valuations) else None
+        denominator = None if None in denominators else sum(order or 0 for order in denominators)
+        yield Step(divided, last, denominator, rank, limit, kept, tuple(curves[0]) if functions else ())
 
 
 def _moved(
@@ -278,9 +273,3 @@ def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] |
             return None
         X = [int(kernel[k, 0]) for k in range(len(X))]
     return X
-
-
-def _rank(curves: Sequence[Sequence[nmod_poly]], apart: int) -> int:
-    """The rank at t = 0 in projective space: the limit itself counts for nothing."""
-    entries = [int(entry[0]) for entry in curves[0]] + [int(slope[apart]) for slope in _slopes(curves)]
-    return int(nmod_mat(len(curves), len(curves[0]), entries, curves[0][0].modulus()).rank()) - 1

@@ -192,10 +192,21 @@ def outcome_of(
         field = GF(random_prime(rng))
         try:
             equations = tracking.equations(map_, eps, field)
-            start = _point_on(one.form, field, rng)
+            # A random point of the hypersurface modulo p, on a line, and its tangent space.
+            p, size = field.prime, one.form.context().nvars()
+            a, b = ([rng.randrange(p) for _ in range(size)] for _ in range(2))
+            line = evaluate(one.form, field, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)])
             tracked = tracking.along(one.form, field)
-            if start is not None and field.prime not in outcomes:
-                outcomes[field.prime] = _outcome_at(equations, *start, rng, limits, tracked=tracked)
+            parts = line.factor()[1] if line.degree() > 0 else []
+            roots = [-int(part[0]) for part, _ in parts if part.degree() == 1]
+            if not roots or p in outcomes:
+                continue
+            point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
+            at = [field.convert(x) for x in point]
+            slopes = [int(evaluate(slope, field, at)) for slope in gradient(one.form)]
+            tangents = _tangents(point, slopes, field) if any(slopes) else None
+            if tangents is not None:
+                outcomes[p] = _outcome_at(equations, point, tangents, rng, limits, tracked=tracked)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
@@ -351,24 +362,6 @@ def _outcome_at(
         settled_at=settled,
         orders=orders,
     )
-
-
-def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:
-    """A random point of the hypersurface modulo p and a basis of its tangent space in projective space, or None."""
-    p = field.prime
-    size = factor.context().nvars()
-    a, b = ([rng.randrange(p) for _ in range(size)] for _ in range(2))
-    line = evaluate(factor, field, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)])
-    if line.degree() < 1:
-        return None
-    roots = [-int(found[0]) for found, _ in line.factor()[1] if found.degree() == 1]
-    if not roots:
-        return None
-    point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
-    at = [field.convert(x) for x in point]
-    slopes = [int(evaluate(slope, field, at)) for slope in gradient(factor)]
-    tangents = _tangents(point, slopes, field) if any(slopes) else None
-    return None if tangents is None else (point, tangents)
 
 
 def _tangents(point: Sequence[int], gradient: Sequence[int], field: PrimeField) -> list[list[int]] | None:

@@ -77,6 +77,8 @@ _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_DEGREE = 20_000  # of a composition
+_STOPPED = "the time was over before all singularities were followed (--seconds)"
+_DIFFERENT = "the singularities at two values of eps differ (--eps)"
 
 
 class TooLong(InputError):
@@ -185,15 +187,43 @@ def singularities(
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
     map_, exact_eps = as_map(system), rational(eps)
-    _require_short(map_, exact_eps, steps, seconds)
+    if map_.refusal:
+        raise InputError(map_.refusal)
+    if map_.dim > MAX_DIMENSION:
+        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+    most = _most_digits(map_.dim, seconds)
+    if (digits := _digits(map_, exact_eps)) > most:
+        raise InputError(
+            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
+            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
+        )
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
-    over = map_.at(exact_eps)
+    over, rng = map_.at(exact_eps), random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
     try:
         if is_long(over):
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(over)
-    except TooLarge:
-        return _without_forms(map_, exact_eps, seed, limits, progress)
+    except TooLarge:  # a composition: map by map, or hypersurfaces are told by random points
+        try:
+            line = Line(reduced(map_, exact_eps, rng), rng, limits.end, _MAX_DEGREE)
+            line.step(1)
+        except Stopped as stopped:
+            raise InputError(f"found a composition that is too long here: {stopped.message}") from stopped
+        if not _is_dominant(map_, exact_eps):
+            return SingularityRun(exact_eps, "?", line.degree, None, (), False, False, False)
+        run = _map_by_map(map_, exact_eps, line.degree, seed, limits, progress)
+        if run is None and not over.is_bilinear:
+            raise TooLong(
+                "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
+                "such with equations that are linear in both points: of these the singularities are known by random "
+                "points"
+            ) from None
+        if run is None:
+            at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
+            run = SingularityRun(exact_eps, "?", line.degree, None, at_random, limits.is_over, False, True)
+        return run
     degree, below = map_form.degree, map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
     denominator = affine(below * (-1) ** (map_.dim * len(over.factors)), map_)
@@ -208,7 +238,6 @@ def singularities(
         if run is not None:
             return run
     tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
-    rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
     found: list[Hypersurface] = []
     for one in every:
         if limits.is_over:
@@ -224,22 +253,6 @@ def singularities(
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 
 
-def _require_short(map_: BirationalMap, eps: fmpq, steps: int | None, seconds: float) -> None:
-    """Raise InputError for what is too large, or cannot be asked."""
-    if map_.refusal:
-        raise InputError(map_.refusal)
-    if map_.dim > MAX_DIMENSION:
-        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
-    most = _most_digits(map_.dim, seconds)
-    if (digits := _digits(map_, eps)) > most:
-        raise InputError(
-            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
-            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
-        )
-    if steps is not None and not 1 <= steps <= MAX_STEPS:
-        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
-
-
 def _map_by_map(
     map_: BirationalMap, eps: fmpq, degree: int, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
@@ -250,30 +263,6 @@ def _map_by_map(
         return None
     word, found = followed
     return SingularityRun(eps, "?", degree, None, tuple(found), limits.is_over, False, True, word)
-
-
-def _without_forms(
-    map_: BirationalMap, eps: fmpq, seed: int, limits: Range, progress: Callable[[str], None]
-) -> SingularityRun:
-    """The same for a composition whose forms are too large: map by map, or hypersurfaces are told by random points."""
-    rng = random.Random(f"singularities {seed_for(seed, map_.subject, eps)}")
-    try:
-        line = Line(reduced(map_, eps, rng), rng, limits.end, _MAX_DEGREE)
-        line.step(1)
-    except Stopped as stopped:
-        raise InputError(f"found a composition that is too long here: {stopped.message}") from stopped
-    if not _is_dominant(map_, eps):
-        return SingularityRun(eps, "?", line.degree, None, (), False, False, False)
-    run = _map_by_map(map_, eps, line.degree, seed, limits, progress)
-    if run is not None:
-        return run
-    if not map_.at(eps).is_bilinear:
-        raise TooLong(
-            "found a composition of maps whose forms on projective space are too large, expected smaller maps, or such "
-            "with equations that are linear in both points: of these the singularities are known by random points"
-        )
-    found = outcomes_at_random(map_, eps, rng, limits)
-    return SingularityRun(eps, "?", line.degree, None, tuple(found), limits.is_over, False, True)
 
 
 @dataclass(frozen=True)
@@ -373,13 +362,16 @@ def _ascending(coefficients: Sequence[int]) -> str:
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     """What runs at one eps, or at two that stand for all, say together; `at`: the map depends on eps."""
-    return _one_of(
-        [
-            _refused(run.eps, run.is_dominant, run.stopped)
-            or _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
-            for run in runs
-        ]
-    )
+    found = set()
+    for run in runs:
+        if not run.is_dominant:
+            known = _not_dominant(run.eps)
+        elif run.stopped:
+            known = _unknown(_STOPPED)
+        else:
+            known = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
+        found.add(known)
+    return found.pop() if len(found) == 1 else _unknown(_DIFFERENT)
 
 
 def patterns(
@@ -412,24 +404,24 @@ def patterns(
                 return _unknown("the composition is too long for its singularities to be followed")
             found = patterns_of(runs, map_.has_eps)
         else:
-            found = _one_of([_at_random(map_, value, steps, seed, part) for value in values])
+            several = set()
+            for value in values:
+                limits, equations = _range(map_.dim, steps, time.monotonic() + part), map_.at(value).equations
+                rng = random.Random(f"patterns {seed_for(seed, map_.subject, value)}")
+                if not _is_dominant(map_, value):
+                    known = _not_dominant(value)
+                elif period_of(equations) > 1:
+                    outcomes = outcomes_at_random(map_, value, rng, limits)
+                    known = _unknown(_STOPPED) if limits.is_over else _patterns(0, outcomes)
+                else:
+                    try:
+                        degree, hypersurfaces = contracted(map_, value, rng, limits)
+                        known = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
+                    except OrdersUnknown as error:
+                        known = _unknown(_STOPPED if limits.is_over else str(error))
+                several.add(known)
+            found = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
     return found
-
-
-def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, seconds: float) -> Patterns:
-    limits = _range(map_.dim, steps, time.monotonic() + seconds)
-    if not _is_dominant(map_, eps):
-        return _refused(eps, False, False) or _unknown("")
-    rng = random.Random(f"patterns {seed_for(seed, map_.subject, eps)}")
-    equations = map_.at(eps).equations
-    if period_of(equations) > 1:
-        found = outcomes_at_random(map_, eps, rng, limits)
-        return _refused(eps, True, limits.is_over) or _patterns(0, found)
-    try:
-        degree, hypersurfaces = contracted(map_, eps, rng, limits)
-        return _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
-    except OrdersUnknown as error:
-        return _refused(eps, True, limits.is_over) or _unknown(str(error))
 
 
 def _digits(map_: BirationalMap, eps: fmpq) -> int:
@@ -447,15 +439,8 @@ def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, seconds: 
     return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, seconds)
 
 
-def _one_of(several: Sequence[Patterns]) -> Patterns:
-    same = len(set(several)) == 1
-    return several[0] if same else _unknown("the singularities at two values of eps differ (--eps)")
-
-
-def _refused(eps: fmpq, is_dominant: bool, stopped: bool) -> Patterns | None:
-    if not is_dominant:
-        return _unknown(f"the map is not dominant at eps = {format_number(eps)}, and no singularity is followed")
-    return _unknown("the time was over before all singularities were followed (--seconds)") if stopped else None
+def _not_dominant(eps: fmpq) -> Patterns:
+    return _unknown(f"the map is not dominant at eps = {format_number(eps)}, and no singularity is followed")
 
 
 def _unknown(reason: str) -> Patterns:

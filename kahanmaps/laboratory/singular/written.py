@@ -8,7 +8,7 @@ step, and begin where the map stands that contracts them. Powers of a word repea
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import comb, prod
@@ -187,17 +187,14 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
             raise TooLarge("the determinant of the affine map is too large")
 
     try:
-        determinant = kernel_minors(sorted(rows, key=_terms), foresee=count_products)[-1]
+        rows.sort(key=lambda row: sum(len(entry) for entry in row if entry is not None))
+        determinant = kernel_minors(rows, foresee=count_products)[-1]
     except TooLarge:
         return None
     if len(determinant) > _MAX_TERMS:
         return None
     multiply(determinant, 1)
     return [(factor, k) for factor, k in multiplicities.values() if k]
-
-
-def _terms(row: Sequence[Any]) -> int:
-    return sum(len(entry) for entry in row if entry is not None)
 
 
 def is_infinity(factor: Any) -> bool:

@@ -208,7 +208,10 @@ class _Search:
         f, found = self.f, self.found
         count = unknowns(f, found.shape)
         if all(p.is_zero() for p in f.rhs):
-            self._add_zero(count)
+            found.dimension = count
+            matrix = fmpq_mat(f.dim, f.dim) if found.shape == "linear" else None
+            found.solutions.append(CommutingField(f, matrix, "0", judge_field(f, f, self.settings)))
+            found.every_g_commutes = found.shape == "quadratic"
             return
         if count > MAX_UNKNOWNS:
             found.undecided.append(f"g has {count} unknown coefficients, and at most {MAX_UNKNOWNS} are tried")
@@ -221,29 +224,36 @@ class _Search:
             self.space = commuting_space(f, found.shape, self.settings.seed, self.C)
             found.basis = list(self.space.fields)
             found.dimension = len(found.basis) if len(found.basis) == self.space.dimension else None
-            self._search()
-        self._add_points()
-
-    def _add_zero(self, count: int) -> None:
-        found = self.found
-        found.dimension = count
-        matrix = fmpq_mat(self.f.dim, self.f.dim) if found.shape == "linear" else None
-        found.solutions.append(CommutingField(self.f, matrix, "0", judge_field(self.f, self.f, self.settings)))
-        found.every_g_commutes = found.shape == "quadratic"
-
-    def _search(self) -> None:
-        size = self.space.dimension
-        whole = Component(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
-        # Where f is affine the space may be large, and often all of it commutes: a proof without equations.
-        if self.found.dimension is not None and self.f.degree <= 1 and affine(self.f, self.space.fields) is not None:
-            self._add_family(whole, judge_family(self.f, self.space, whole, self.settings))
-        elif size > MAX_SPACE:
-            self.found.undecided.append(
-                f"the fields g with [f, g] = 0 have dimension {'up to ' * (self.found.dimension is None)}{size}, "
-                f"and equations are solved up to {MAX_SPACE}"
-            )
-        else:
-            self._solve(whole, 0)
+            size = self.space.dimension
+            whole = Component(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
+            # Where f is affine the space may be large, and often all of it commutes: a proof without equations.
+            if found.dimension is not None and f.degree <= 1 and affine(f, self.space.fields) is not None:
+                self._add_family(whole, judge_family(f, self.space, whole, self.settings))
+            elif size > MAX_SPACE:
+                found.undecided.append(
+                    f"the fields g with [f, g] = 0 have dimension {'up to ' * (found.dimension is None)}{size}, "
+                    f"and equations are solved up to {MAX_SPACE}"
+                )
+            else:
+                self._solve(whole, 0)
+        zeros = [fmpq(0)] * (len(self.space.fields) - 1)
+        trivial = [(fmpq(first), *zeros) for first in (0, 1, -1)]
+        single = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
+        # g and -g stand together, as 1 and -1 times the same integers.
+        signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in single if p not in trivial}
+        others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
+        for k, weights in enumerate([*trivial, *others]):
+            if not self._in_time() and weights not in trivial:
+                found.undecided.append(f"the time is over: {len(others) + 3 - k} solutions were not judged")
+                return
+            self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
+            finding = judge_field(f, field_at(self.space, weights), self.settings)
+            if finding.verdict is Verdict.REFUTED:
+                found.discarded += 1
+            elif finding.verdict is Verdict.UNDECIDED:
+                found.undecided.append(f"one solution: {finding.evidence.summary}")
+            else:
+                found.solutions.append(self._field(weights, finding))
 
     def _solve(self, part: Component, level: int) -> None:
         """Solve the equations of the order that belongs to `level` inside a part of the space."""
@@ -322,37 +332,11 @@ class _Search:
             CommutingFamily(self._field(base, finding), tuple(self._field(d, finding) for d in directions), finding)
         )
 
-    def _add_points(self) -> None:
-        size = len(self.space.fields)
-        trivial = [tuple(fmpq(first if k == 0 else 0) for k in range(size)) for first in (0, 1, -1)]
-        single = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
-        # g and -g stand together, as 1 and -1 times the same integers.
-        others = sorted({p for p in single if p not in trivial}, key=_up_to_sign)
-        for k, weights in enumerate([*trivial, *others]):
-            if not self._in_time() and weights not in trivial:
-                self.found.undecided.append(f"the time is over: {len(others) + 3 - k} solutions were not judged")
-                return
-            self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
-            finding = judge_field(self.f, field_at(self.space, weights), self.settings)
-            if finding.verdict is Verdict.REFUTED:
-                self.found.discarded += 1
-            elif finding.verdict is Verdict.UNDECIDED:
-                self.found.undecided.append(f"one solution: {finding.evidence.summary}")
-            else:
-                self.found.solutions.append(self._field(weights, finding))
-
     def _field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
-        matrix = None
-        if self.space.matrices:
-            matrix = combination_of(weights, self.space.matrices)
+        matrix = combination_of(weights, self.space.matrices) if self.space.matrices else None
         g = field_at(self.space, weights)
         names = [name for name, factor in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(factor)]
         return CommutingField(g, matrix, names[0] if names else "", finding)
 
     def _in_time(self) -> bool:
         return time.monotonic() < self.deadline
-
-
-def _up_to_sign(weights: tuple[fmpq, ...]) -> tuple[Any, ...]:
-    lead = next(w for w in weights if w != 0)
-    return (*(abs(w) for w in weights), *(w * (1 if lead > 0 else -1) for w in weights), lead < 0)

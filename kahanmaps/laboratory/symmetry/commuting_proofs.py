@@ -12,9 +12,10 @@ dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M, M
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations_with_replacement
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly
+from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.matrices import rank
@@ -45,9 +46,9 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
     ('proved', 'refuted')
     """
     claim = "the Kahan maps of f and g commute"
-    trivial = _trivially(f, g)
-    if trivial is not None:
-        return Finding(claim, theorems.PROVED, trivial, formula=_FORMULA)
+    for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
+        if g == f.scaled(factor):
+            return Finding(claim, theorems.PROVED, Evidence(theorems.METHOD, why), formula=_FORMULA)
     identity = commutativity(f, g, None, ("f", "g"))
     proof = theorems.commuting_by_splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
     return judge(claim, identity, settings, proof, formula=_FORMULA)
@@ -69,41 +70,20 @@ def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | 
         name, pairs = "g", [(fields[0], f)]
     else:
         return None
-    count = 2 * f.dim + 1
-    return theorems.evidence(
-        "the lemma of affine maps",
-        [
-            (f"{name} is affine", True),
-            (
-                f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {count} values of eps",
-                all(_symmetric_at(a, h, count) for a, h in pairs),
-            ),
-        ],
-    )
-
-
-def _symmetric_at(a: QuadraticSystem, h: QuadraticSystem, count: int) -> bool:
-    """Whether the affine Kahan map of `a` is a symmetry of h, at so many values of eps."""
-    n, checked, k = a.dim, 0, 0
-    identity = QQ.identity(n)
-    while checked < count:
-        k += 1
-        below = identity - a.B * fmpq(1, k)
-        if below.det() == 0:
-            continue
-        P = below.solve(identity + a.B * fmpq(1, k))
-        q = below.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
-        if h.composed(P, q.entries()) != h.transformed(P):
-            return False
-        checked += 1
-    return True
-
-
-def _trivially(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
-    for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
-        if g == f.scaled(factor):
-            return Evidence(theorems.METHOD, why)
-    return None
+    n, count = f.dim, 2 * f.dim + 1
+    identity, holds = QQ.identity(n), True
+    for a, h in pairs:  # the affine Kahan map of a is a symmetry of h, at so many values of eps
+        checked, k = 0, 0
+        while holds and checked < count:
+            k += 1
+            below = identity - a.B * fmpq(1, k)
+            if below.det() != 0:
+                P = below.solve(identity + a.B * fmpq(1, k))
+                q = below.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
+                holds = h.composed(P, q.entries()) == h.transformed(P)
+                checked += 1
+    equation = f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {count} values of eps"
+    return theorems.evidence("the lemma of affine maps", [(f"{name} is affine", True), (equation, holds)])
 
 
 def _in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
@@ -124,26 +104,19 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Componen
         parameters = [field.zero] * count
         for i, value in zip(free, point[n:], strict=True):
             parameters[i] = value
-        phi_f, phi_g = first.at(eps, field), KahanMapOver(_over(field, table, parameters, n), eps)
+        two, tensor = field.convert(2), [field.zero] * (n**3)
+        linear, constants = [], []
+        for i, row in enumerate(table):  # g, whose coefficients are polynomials in the parameters
+            values = [evaluate(p, field, parameters) for p in row]
+            for value, (j, k) in zip(values, combinations_with_replacement(range(n), 2), strict=False):
+                tensor[(i * n + j) * n + k] = tensor[(i * n + k) * n + j] = value * two if j == k else value
+            linear += values[-n - 1 : -1]
+            constants.append(values[-1])
+        g = SystemOver(field, field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants))
+        phi_f, phi_g = first.at(eps, field), KahanMapOver(g, eps)
         x = point[:n]
         return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
 
     labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
     subject = (f.rhs, table, free)
     return Identity(n + len(free), sides, None, *labels, subject=subject)
-
-
-def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Sequence[Any], n: int) -> SystemOver:
-    """The system whose coefficients are the polynomials of the table at these parameters."""
-    two = field.convert(2)
-    tensor = [field.zero] * (n**3)
-    linear, constants = [], []
-    for i, row in enumerate(table):
-        values = [evaluate(p, field, parameters) for p in row]
-        pairs = ((j, k) for j in range(n) for k in range(j, n))
-        for value, (j, k) in zip(values, pairs, strict=False):
-            tensor[(i * n + j) * n + k] = tensor[(i * n + k) * n + j] = value * two if j == k else value
-        linear += values[-n - 1 : -1]
-        constants.append(values[-1])
-    matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
-    return SystemOver(field, *matrices)

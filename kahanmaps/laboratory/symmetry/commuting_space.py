@@ -66,7 +66,14 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
         while len(rows) < needed + 2 * n:
             point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
             value, jacobian = local.value(point), local.jacobian(point)
-            scalars = _scalars(f, shape, columns, point, value, jacobian)
+            # For each unknown scalar function phi: phi(x) and its derivative along f.
+            if shape == "linear":
+                along = (sum((jacobian[j, k] * value[k] for k in range(n)), fmpq(0)) for j in columns)
+                scalars = [*zip((value[j] for j in columns), along, strict=True)]
+            else:
+                pairs = itertools.combinations_with_replacement(range(n), 2)
+                scalars = [(point[j] * point[k], value[j] * point[k] + point[j] * value[k]) for j, k in pairs]
+                scalars += [*zip(point, value, strict=True), (fmpq(1), fmpq(0))]
             for i in range(n):
                 # the component i of f' (phi e_k) - e_k (grad phi . f), for all k and phi
                 rows.append(
@@ -79,18 +86,37 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
         if len(kernel) > MAX_DIMENSION:
             return CommutingSpace((f,), (QQ.identity(n),) * (shape == "linear"), len(kernel))
         solutions = [[fmpq(e) for e in primitive_integers(v)] for v in kernel]
-        matrices = [_matrix(v, n, columns) for v in solutions] if shape == "linear" else []
+        matrices: list[fmpq_mat] = []
         if shape == "linear":
+            for v in solutions:
+                matrices.append(fmpq_mat(n, n))
+                for (i, j), entry in zip(itertools.product(range(n), columns), v, strict=True):
+                    matrices[-1][i, j] = entry
             fields = [f.transformed(B) for B in matrices]
         else:
             size = len(solutions[0]) // n
             fields = [system_of(f.variables, [v[i * size : (i + 1) * size] for i in range(n)]) for v in solutions]
         if all(bracket_vanishes(f, g) for g in fields):
             if C is not None:
-                combinations = nullspace(QQ, fmpq_mat([_defect(C, g, f.dim) for g in fields]).transpose())
+                defects = []  # all coefficients of C g' - g' C
+                for g in fields:
+                    zero, defect = 0 * g.rhs[0], list[fmpq]()
+                    for i, j in itertools.product(range(n), repeat=2):
+                        terms = (C[i, k] * g.rhs[k].derivative(j) - C[k, j] * g.rhs[i].derivative(k) for k in range(n))
+                        entry = sum(terms, zero)
+                        defect += [fmpq(entry[tuple(int(l == k) for l in range(n))]) for k in range(n + 1)]
+                    defects.append(defect)
+                combinations = nullspace(QQ, fmpq_mat(defects).transpose())
                 fields = [system_of(f.variables, combination(fields, w, fmpq(0))) for w in combinations]
                 matrices = [combination_of(w, matrices) for w in combinations] if matrices else []
-            return _with_f_first(f, fields, matrices)
+            # f in the place of one member of the basis, moved to the front.
+            flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
+            (relation,) = nullspace(QQ, flat)
+            replaced = max(k for k in range(len(fields)) if relation[k] != 0)
+            rest = [k for k in range(len(fields)) if k != replaced]
+            identity = [QQ.identity(n)] if matrices else []
+            found = (f, *(fields[k] for k in rest))
+            return CommutingSpace(found, (*identity, *(matrices[k] for k in rest if matrices)), len(found))
         needed = len(rows) + 2 * n
 
 
@@ -110,56 +136,10 @@ def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
     return True
 
 
-def _defect(C: fmpq_mat, g: QuadraticSystem, n: int) -> list[fmpq]:
-    """All coefficients of C g' - g' C."""
-    names, found = g.rhs[0].context().gens(), list[fmpq]()
-    for i in range(n):
-        for j in range(n):
-            terms = (C[i, k] * g.rhs[k].derivative(j) - C[k, j] * g.rhs[i].derivative(k) for k in range(n))
-            entry = sum(terms, 0 * names[0])
-            found += [fmpq(entry[tuple(int(l == k) for l in range(n))]) for k in range(n + 1)]
-    return found
-
-
-def _scalars(
-    f: QuadraticSystem,
-    shape: str,
-    columns: Sequence[int],
-    point: Sequence[fmpq],
-    value: Sequence[fmpq],
-    jacobian: fmpq_mat,
-) -> list[tuple[fmpq, fmpq]]:
-    """For each unknown scalar function phi: phi(x) and its derivative along f."""
-    n = f.dim
-    if shape == "linear":
-        return [(value[j], sum((jacobian[j, k] * value[k] for k in range(n)), fmpq(0))) for j in columns]
-    pairs = [(j, k) for j in range(n) for k in range(j, n)]
-    quadratic = [(point[j] * point[k], value[j] * point[k] + point[j] * value[k]) for j, k in pairs]
-    return [*quadratic, *zip(point, value, strict=True), (fmpq(1), fmpq(0))]
-
-
 def _independent_components(f: QuadraticSystem) -> list[int]:
     """The first components of f that span all of them."""
     reduced, count = fmpq_mat(coefficients_of(f)).transpose().rref()
     return [next(j for j in range(f.dim) if reduced[i, j] != 0) for i in range(count)]
-
-
-def _matrix(vector: Sequence[fmpq], n: int, columns: Sequence[int]) -> fmpq_mat:
-    matrix = fmpq_mat(n, n)
-    for (i, j), entry in zip(itertools.product(range(n), columns), vector, strict=True):
-        matrix[i, j] = entry
-    return matrix
-
-
-def _with_f_first(f: QuadraticSystem, fields: list[QuadraticSystem], matrices: list[fmpq_mat]) -> CommutingSpace:
-    """The basis with f in the place of one member of it, moved to the front."""
-    flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
-    (relation,) = nullspace(QQ, flat)
-    replaced = max(k for k in range(len(fields)) if relation[k] != 0)
-    rest = [k for k in range(len(fields)) if k != replaced]
-    identity = [QQ.identity(f.dim)] if matrices else []
-    found = (f, *(fields[k] for k in rest))
-    return CommutingSpace(found, (*identity, *(matrices[k] for k in rest if matrices)), len(found))
 
 
 def field_at(space: CommutingSpace, weights: Sequence[fmpq]) -> QuadraticSystem:

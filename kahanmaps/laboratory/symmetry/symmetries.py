@@ -269,9 +269,16 @@ def _add_signed(found: Symmetries, deadline: float) -> None:
 
 def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
     """Elements whose linear parts generate those of all: of high order first, and none that the others make."""
+
+    def order(matrix: fmpq_mat) -> int:
+        power, count = matrix, 1
+        while power != QQ.identity(matrix.nrows()):
+            power, count = power * matrix, count + 1
+        return count
+
     generators: list[Symmetry] = []
     group = _generated([], len(elements[0].r))
-    for element in sorted(elements, key=lambda t: -_order(t.S)):
+    for element in sorted(elements, key=lambda t: -order(t.S)):
         if _key(element.S) not in group:
             generators.append(element)
             group = _generated([t.S for t in generators], len(element.r))
@@ -294,14 +301,6 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
                 group.add(_key(product))
                 waiting.append(product)
     return group
-
-
-def _order(matrix: fmpq_mat) -> int:
-    """The order of a matrix that has one."""
-    power, count = matrix, 1
-    while power != QQ.identity(matrix.nrows()):
-        power, count = power * matrix, count + 1
-    return count
 
 
 def _add_general(found: Symmetries, deadline: float) -> None:

@@ -85,9 +85,20 @@ def equivalent_system(
     equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z
     """
     f = file.system
-    if f.degree < 2 or f.dim > MAX_DIMENSION or f.digits > LONG_COEFFICIENTS or _is_of_the_catalogue(file):
+    if f.degree < 2 or f.dim > MAX_DIMENSION or f.digits > LONG_COEFFICIENTS:
         return None
-    tried = list(_tried(f, fixed_points(f, seconds) if fixed is None else fixed))
+    if file.name in names():  # it may be one of the catalogue itself
+        values = file.parameters if load(file.name).parameters.keys() == file.parameters.keys() else {}
+        if load(file.name, values).system.rhs == file.system.rhs:
+            return None
+    # Systems of the catalogue, frames, and the order of the variables, None where P may be any matrix.
+    known, tried = _catalogue(f.dim), list[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]()
+    for frame in _frames(f, fixed_points(f, seconds) if fixed is None else fixed):
+        monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
+        for g in known:
+            tried += ((g, frame, order) for order in itertools.islice(_fitting(monomials, g.monomials), MAX_ORDERS))
+    if f.dim == 2:
+        tried += ((g, QQ.identity(2), None) for g in known)
     deadline = time.monotonic() + seconds
     for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # all that is quick comes first
         for g, frame, order in tried:
@@ -131,40 +142,20 @@ def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
     return tuple(frozenset(tuple(m[:n]) for m in p.monoms() if sum(m[:n]) == 2) for p in f.rhs)
 
 
-def _is_of_the_catalogue(file: SystemFile) -> bool:
-    if file.name not in names():
-        return False
-    values = file.parameters if load(file.name).parameters.keys() == file.parameters.keys() else {}
-    return bool(load(file.name, values).system.rhs == file.system.rhs)
-
-
-def _tried(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]:
-    """Systems of the catalogue, frames, and the order of the variables, None where P may be any matrix."""
-    known = _catalogue(f.dim)
-    for frame in _frames(f, fixed):
-        monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
-        for g in known:
-            for order in itertools.islice(_fitting(monomials, g.monomials), MAX_ORDERS):
-                yield g, frame, order
-    if f.dim == 2:
-        yield from ((g, QQ.identity(2), None) for g in known)
-
-
 def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
     """Matrices F: in the coordinates F x the f may look like a system of the catalogue; the first one is I."""
     n = f.dim
+
+    def slopes(p: fmpq_mpoly) -> list[fmpq]:
+        """The coefficients of the variables in a polynomial of degree 1."""
+        return [p.derivative(j)[(0,) * p.context().nvars()] for j in range(p.context().nvars())]
+
     yield QQ.identity(n)
-    planes = [_slopes(one.function) for one in affine_darboux(f).functions]
+    planes = [slopes(one.function) for one in affine_darboux(f).functions]
     yield from itertools.islice(_invertible(planes, n), MAX_FRAMES)
     lines = [one for one in fixed.found if one.dimension == 1 and not one.equations]
-    directions = [[sum(_slopes(value), fmpq(0)) for value in line.coordinates] for line in lines]
+    directions = [[sum(slopes(value), fmpq(0)) for value in line.coordinates] for line in lines]
     yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))
-
-
-def _slopes(p: fmpq_mpoly) -> list[fmpq]:
-    """The coefficients of the variables in a polynomial of degree 1."""
-    n = p.context().nvars()
-    return [p.derivative(j)[(0,) * n] for j in range(n)]
 
 
 def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
@@ -207,9 +198,16 @@ def _matched(
         for component in (*solved.components, *solved.unsolved):
             equations = [p.compose(*component.values, ctx=unknowns) for p in lower]
             for point in _points([*equations, *component.equations], component.values, defaults, deadline):
-                found = _verified(f, g, entries, frame, point)
-                if found is not None:
-                    return found
+                c, q, values = point[0], point[1 : n + 1], point[n + 1 + len(entries) :]
+                T = fmpq_mat(n, n)
+                for (i, j), t in zip(entries, point[n + 1 :], strict=False):
+                    T[i, j] = t
+                P = T * frame * c
+                if c != 0 and P.det() != 0:
+                    there = (g.system.at(values) if values else g.system).renamed(f.variables)
+                    if there.composed(P, q).rhs == f.transformed(P).scaled(c).rhs:
+                        parameters = dict(zip(g.defaults, values, strict=True))
+                        return Equivalence(g.name, parameters, f.variables, P, tuple(q), c)
     return None
 
 
@@ -236,19 +234,15 @@ def _equations(
     highest: list[fmpq_mpoly] = []
     lower: list[fmpq_mpoly] = []
     for k, part in enumerate(parts):
-        for size, coefficient in _coefficients(part, n, unknowns):
-            # c^size divides it
-            (highest if size == (2 if k < n else 1) else lower).append(coefficient / unknowns.gen(0) ** size)
+        by_monomial: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}  # in x
+        for monomial, value in part.terms():
+            exponents = tuple(int(e) for e in monomial)
+            by_monomial.setdefault(exponents[:n], {})[exponents[n:]] = value
+        for in_x, terms in by_monomial.items():  # c^size divides the coefficient
+            size = sum(in_x)
+            equation = unknowns.from_dict(terms) / unknowns.gen(0) ** size
+            (highest if size == (2 if k < n else 1) else lower).append(equation)
     return highest, lower
-
-
-def _coefficients(p: fmpq_mpoly, count: int, unknowns: fmpq_mpoly_ctx) -> list[tuple[int, fmpq_mpoly]]:
-    """The degree in the first variables, and the coefficient in the others, of each monomial in the first ones."""
-    found: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
-    for monomial, value in p.terms():
-        exponents = tuple(int(e) for e in monomial)
-        found.setdefault(exponents[:count], {})[exponents[count:]] = value
-    return [(sum(monomial), unknowns.from_dict(terms)) for monomial, terms in found.items()]
 
 
 def _points(
@@ -268,21 +262,3 @@ def _points(
         for value in (defaults[i], defaults[i] + 1):
             fixed = [*part.equations, context.gen(i) - value]
             yield from _points(fixed, part.values, defaults, deadline, depth + 1)
-
-
-def _verified(
-    f: QuadraticSystem, g: _Known, entries: Sequence[tuple[int, int]], frame: fmpq_mat, point: Sequence[fmpq]
-) -> Equivalence | None:
-    """The equivalence that a solution stands for, where it is invertible and holds."""
-    n, c = f.dim, point[0]
-    T = fmpq_mat(n, n)
-    for (i, j), t in zip(entries, point[n + 1 :], strict=False):
-        T[i, j] = t
-    P, q, values = T * frame * c, point[1 : n + 1], point[n + 1 + len(entries) :]
-    if c == 0 or P.det() == 0:
-        return None
-    there = g.system.at(values) if values else g.system
-    if there.renamed(f.variables).composed(P, q).rhs != f.transformed(P).scaled(c).rhs:
-        return None
-    parameters = dict(zip(g.defaults, values, strict=True))
-    return Equivalence(g.name, parameters, f.variables, P, tuple(q), c)
