@@ -94,7 +94,7 @@ from kahanmaps.laboratory.singular.singularities import SingularityRun as Singul
 from kahanmaps.laboratory.singular.singularities import singularities as _singularities
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems as CommutingSystems
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems as _commuting_systems
-from kahanmaps.laboratory.symmetry.commuting_over import find_commuting as _find_commuting
+from kahanmaps.laboratory.symmetry.commuting import find_commuting as _find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries as Symmetries
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as _linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import Equivalence as Equivalence

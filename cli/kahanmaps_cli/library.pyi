@@ -142,7 +142,7 @@ from kahanmaps.laboratory.singular.singularities import SingularityRun as Singul
 from kahanmaps.laboratory.singular.singularities import singularities as singularities
 from kahanmaps.laboratory.singular.singularities import steps_by_default as steps_by_default
 from kahanmaps.laboratory.singular.singularities import symbolic_denominator as symbolic_denominator
-from kahanmaps.laboratory.symmetry.commuting_over import find_commuting as find_commuting
+from kahanmaps.laboratory.symmetry.commuting import find_commuting as find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as linear_symmetries
 from kahanmaps.languages.convert import convert as convert
 from kahanmaps.maps.algebraic import over_number_field as over_number_field

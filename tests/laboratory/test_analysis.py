@@ -21,7 +21,7 @@ from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.singular.singularities import Patterns
-from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
+from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
 # In dimension 3 singularities come last.

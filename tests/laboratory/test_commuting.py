@@ -19,12 +19,14 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.symmetry import commuting as module
 from kahanmaps.laboratory.symmetry.commuting import _Search, commuting_systems
-from kahanmaps.laboratory.symmetry.commuting_equations import (
+from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, affine, judge_family, judge_field
+from kahanmaps.laboratory.symmetry.commuting_space import (
+    bracket_vanishes,
     combination,
+    commuting_space,
+    field_at,
     system_of,
 )
-from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, affine, judge_family, judge_field
-from kahanmaps.laboratory.symmetry.commuting_space import bracket_vanishes, commuting_space, field_at
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TRIVIAL = ["0", "f", "-f"]

@@ -14,7 +14,7 @@ from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
+from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps_cli.main import cli
 

@@ -7,9 +7,9 @@ from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import written
-from kahanmaps.laboratory.singular.generic import with_eps
 from kahanmaps.laboratory.singular.outcomes import NO_TIME, POINTS_DIFFER, Hypersurface, _agreed
 from kahanmaps.laboratory.singular.singularities import patterns, singularities
+from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.projective import homogeneous_map
 

@@ -7,8 +7,8 @@ from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.singular.generic import with_eps
 from kahanmaps.laboratory.singular.singularities import singularities
+from kahanmaps.laboratory.singular.written import with_eps
 
 
 def conics(*signs):

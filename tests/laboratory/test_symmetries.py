@@ -15,8 +15,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
-from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
-from kahanmaps.laboratory.symmetry.symmetry_equations import is_singular, is_symmetry
+from kahanmaps.laboratory.symmetry.symmetries import is_singular, is_symmetry, linear_symmetries
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

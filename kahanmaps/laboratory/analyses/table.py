@@ -30,7 +30,7 @@ from kahanmaps.laboratory.singular.singularities import (
     patterns_of,
 )
 from kahanmaps.laboratory.singular.singularities import singularities as follow
-from kahanmaps.laboratory.symmetry.commuting_over import find_commuting
+from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import fixed_points

@@ -48,9 +48,9 @@ from kahanmaps.laboratory.growth.proofs import (
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
 from kahanmaps.laboratory.known import Known
-from kahanmaps.laboratory.singular.generic import with_eps
 from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMENSION, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
+from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -243,10 +243,6 @@ class _Sweeping:
         generic = max((one.generic for one in self.sweeps), default=())
         self.sweeps[:] = [one for one in self.sweeps if one.generic == generic]
 
-    def _size(self, plan: Sequence[Choice]) -> int:
-        """The number of members."""
-        return sum(_size(self.count, *one) for one in plan)
-
     def more_lines(self, most: float) -> list[Choice]:
         """More random lines instead of those there were, where they are not more than `most` members."""
         again: list[Choice] = [

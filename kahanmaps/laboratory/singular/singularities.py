@@ -209,8 +209,8 @@ def singularities(
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.end, _MAX_DEGREE)
             line.step(1)
-        except Stopped as stopped:
-            raise InputError(f"found a composition that is too long here: {stopped.message}") from stopped
+        except Stopped as end:
+            raise InputError(f"found a composition that is too long here: {end.message}") from end
         if not _is_dominant(map_, exact_eps):
             return SingularityRun(exact_eps, "?", line.degree, None, (), False, False, False)
         run = _map_by_map(map_, exact_eps, line.degree, seed, limits, progress)

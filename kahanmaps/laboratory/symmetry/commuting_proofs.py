@@ -27,8 +27,7 @@ from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings
-from kahanmaps.laboratory.symmetry.commuting_equations import coefficients_of, combination
-from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, field_at
+from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, coefficients_of, combination, field_at
 from kahanmaps.maps.kahan import Kahan, KahanMapOver
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
