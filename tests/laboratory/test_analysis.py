@@ -3,7 +3,6 @@
 import json
 import time
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,18 +10,16 @@ from flint import fmpq
 from search_helpers import analysis_of, system
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile, parse_system, read_system
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analyses import statements, table
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.laboratory.symmetry.commuting import find_commuting
-from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
 # In dimension 3 singularities come last.
 PARTS = tuple(sorted((part.name for part in ANALYSES), key="singularities".__eq__))
@@ -243,14 +240,6 @@ def test_a_linear_system_has_a_linear_map_where_it_has_one(eps, kind):
     assert found.conclusion.kind == kind
 
 
-def test_degrees_of_a_map_that_is_not_birational_mean_nothing():
-    parts = [part for part in ANALYSES if part.name == "degrees"]
-    found = analyze(system("x y", "x^2 - 1/4", "x*y + y^2"), eps=1, parts=parts)
-    assert found.conclusion.kind == "undecided"
-    assert found.conclusion.sentence.startswith("At eps = 1 the map is not invertible")
-    assert analyze(system("x y", "x^2 - 1/4", "x*y + y^2"), eps=2, parts=parts).conclusion.kind != "undecided"
-
-
 def test_where_an_iterate_is_constant():
     found = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
     assert found.conclusion.sentence == (
@@ -267,49 +256,29 @@ def test_where_an_iterate_is_constant():
 # Form
 
 
-LIE = "generic orbits lie on varieties of codimension "
+LIE = "generic orbits lie on varieties of codimension at least 1, which means at least 1 independent integral; "
 ALONG = "relations along an orbit: none of degree 1, a 2-dimensional space up to degree 2"
+OPEN = "how many integrals there are was not measured: no time"
+DIFFER = "the orbits that were compared do not agree"
 
 
 @pytest.mark.parametrize(
-    ("profile", "others", "expected"),
+    ("profile", "reason", "expected"),
     [
-        (
-            {"codimensions": (0, 1)},
-            {"reason": "no closed form"},
-            [
-                ("measured", f"{LIE}at least 1, which means at least 1 independent integral; {ALONG}"),
-                ("note", "no closed form"),
-            ],
-        ),
+        ({"codimensions": (0, 1)}, "no closed form", [("measured", LIE + ALONG), ("note", "no closed form")]),
         (
             {"codimensions": (0, 0), "agree": False},
-            {},
-            [
-                ("measured", f"orbits show no integral; {ALONG}"),
-                ("note", "the orbits that were compared do not agree"),
-            ],
+            "",
+            [("measured", f"orbits show no integral; {ALONG}"), ("note", DIFFER)],
         ),
-        (
-            {"nullities": (), "codimensions": ()},
-            {"reason": "no time"},
-            [("undecided", "how many integrals there are was not measured: no time")],
-        ),
+        ({"nullities": (), "codimensions": ()}, "no time", [("undecided", OPEN)]),
     ],
 )
-def test_what_is_said_of_integrals(profile, others, expected):
+def test_what_is_said_of_integrals(profile, reason, expected):
     measured = {"nullities": (0, 2), "codimensions": (0, 2), "period": None, "agree": True, **profile}
-    search = {"symbols": (), "reason": "", "by_theorems": 0, **others}
-    found = IntegralSearch(
-        file=None,
-        eps=None,
-        integrals=(),
-        profile=Profile(3, complete=True, **measured),
-        primes=(),
-        seed=0,
-        theorems="Prop. 1",
-        **search,
-    )
+    given = {"symbols": (), "reason": reason, "by_theorems": 0, "theorems": "Prop. 1", "primes": (), "seed": 0}
+    orbits = Profile(3, complete=True, **measured)
+    found = IntegralSearch(file=None, eps=None, integrals=(), profile=orbits, **given)
     lines = statements.of_integrals(SimpleNamespace(integrals=found, relations=(), normal_form=None, pencil=None))
     assert [(str(line.status), line.text) for line in lines] == expected
 
@@ -326,26 +295,13 @@ def test_what_is_said_of_integrals(profile, others, expected):
     ],
 )
 def test_what_is_said_of_singularities(runs, expected):
-    found = [
-        SimpleNamespace(
-            eps=fmpq(*map(int, eps.split("/"))),
-            verdict=verdict,
-            followed=followed,
-            unit="step",
-            text=f"{verdict} within {followed}",
-            hypersurfaces=[SimpleNamespace(confined_at=at) for at in ends],
-        )
-        for eps, verdict, followed, ends in runs
-    ]
+    found = []
+    for eps, verdict, followed, ends in runs:
+        known = {"verdict": verdict, "followed": followed, "unit": "step", "text": f"{verdict} within {followed}"}
+        hypersurfaces = [SimpleNamespace(confined_at=at) for at in ends]
+        found.append(SimpleNamespace(eps=fmpq(*map(int, eps.split("/"))), hypersurfaces=hypersurfaces, **known))
     lines = statements.of_singularities(SimpleNamespace(singularities=found, file=load("euler_top")))
     assert [(str(line.status), line.text) for line in lines] == expected
-
-
-@pytest.mark.parametrize(("count", "end"), [(12, "11, 12"), (13, "11, 12, ...")])
-def test_twelve_degrees_are_shown_and_dots_for_more(count, end):
-    found = DegreeGrowth((1, *range(1, count + 1)), None, "finished", "", 0, (), ())
-    lines = statements.of_growth(SimpleNamespace(degrees=found, heights=None))
-    assert lines[0].text == f"degrees of the iterates: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, {end}"
 
 
 @pytest.mark.parametrize(("most", "first"), [(2, True), (1, False)])
@@ -383,16 +339,6 @@ def test_linear_families_of_commuting_systems_are_written_out(monkeypatch):
     assert told() == ["commutes with a linear family of 3 parameters, which find-commuting writes out"] * 2
 
 
-@pytest.mark.parametrize(("points", "more"), [(8, []), (9, ["and 1 more set of fixed points: --json lists them"])])
-def test_as_many_fixed_points_are_told_as_three_quadratic_equations_have(points, more):
-    found = Analysis(System("x' = x^2 - 1; y' = y^2 - 1; z' = z^2 - 1"), None, 1.0, 0, ())
-    search = fixed_points(found.file.system)
-    found.fixed_points = replace(search, found=(*search.found, search.found[0])[:points])
-    lines = [line.text for line in dict(found.sections)["vector field"]]
-    assert sum(line.startswith("fixed point ") for line in lines) == 8
-    assert [line for line in lines if "more" in line] == more
-
-
 @pytest.mark.parametrize(
     ("name", "sense", "ground"),
     [
@@ -424,38 +370,6 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence
 
 
-def test_poisson_tensors_are_told_in_dimensions_three_and_four():
-    found = analysis_of("euler_top")
-    lines = dict(found.sections)["Poisson tensors"]
-    assert [line.status for line in lines] == ["proved"] * 3 + ["note"]
-    assert lines[0].text.startswith("P1: {x1,x3} = 2*x1^2*x2*eps^2 + x2")
-    assert found.to_json()["poisson"]["pencil"] == "proved"
-    planar = analysis_of("nahm_tetrahedral")
-    assert planar.poisson is None
-    assert "Poisson tensors" not in dict(planar.sections)
-
-
-def test_quadratic_growth_without_integrals():
-    parts = [part for part in ANALYSES if part.name in ("integrals", "degrees", "singularities")]
-    found = analyze(read_system(Path(__file__).parent / "further_systems" / "painleve_1.toml"), parts=parts)
-    assert (found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth) == (
-        "integrable",
-        0,
-        "quadratic",
-    )
-    assert found.conclusion.sentence.endswith(
-        "(explained); no integral in dimension 3 up to degree 10 (relations along orbits)."
-    )
-
-
-def test_a_system_of_the_commuting_family_is_recognised():
-    found = analysis_of("nahm_tetrahedral")
-    assert any("belongs to the commuting family" in line.text for _, lines in found.sections for line in lines)
-    assert ("proved", "1 independent integral, as a member of the commuting family") in [
-        (line.status, line.text) for line in dict(found.sections)["integrals"]
-    ]
-
-
 def test_a_hamiltonian_and_a_member_of_the_family_are_not_read_either():
     for name in ("weierstrass", "harmonic"):
         file = load(name)
@@ -463,10 +377,3 @@ def test_a_hamiltonian_and_a_member_of_the_family_are_not_read_either():
         assert one.pop("parameters") == {key: str(value) for key, value in file.parameters.items()}
         assert other.pop("parameters") == {}
         assert one == other
-
-
-def test_symbols_enter_formulas_and_the_json_says_which():
-    found = analyze(parse_system(PLANE), symbols=("a", "eps", "b"))
-    assert found.symbols == ("a", "b")
-    assert found.to_json()["symbols"] == ["a", "b"]
-    assert {"a", "b", "eps"} <= set(found.integrals.integrals[0].function.names)

@@ -49,8 +49,3 @@ def test_roots_are_points_of_the_component():
                 x1, x2, x3, _ = ((a + b * t + u * w) % p for (a, b), w in zip(curve, DIRECTION, strict=True))
                 assert (x1**2 + x2**2) * x3 % p == 0
     assert not any(one.roots(t) for one in found(X1**2 + X2**2, 1000003, curve) for t in range(5))
-
-
-def test_a_direction_in_special_position_gives_smaller_degrees():
-    curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
-    assert found(X1**2 + X2**2, 1000033, curve, direction=(0, 0, 1, 0)) == []

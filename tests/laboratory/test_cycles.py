@@ -9,7 +9,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.cycles import cycle_census, default_eps
+from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import as_map
@@ -119,10 +119,6 @@ def test_a_translation_has_one_cycle_of_p_points_and_a_multiplication_one_of_p_m
     assert dict(cycle_census(map_of("2*x"), 1, 101).lengths) == {1: 2, 100: 1}  # 2 is a primitive root modulo 101
 
 
-def test_lyness_map_has_period_five():
-    assert set(cycle_census(map_of("y", "(1 + y)/x"), 1, 31).lengths) <= {1, 5}
-
-
 EXCHANGES_LEVELS = (
     "(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)",
     "(x^2-y)/(x^2*y+1)",
@@ -159,39 +155,12 @@ def test_a_map_that_is_singular_everywhere_has_no_cycle():
     assert (found.indeterminate, found.cycles, found.longest) == (57, 0, 0)
 
 
-@pytest.mark.parametrize(("dim", "is_reduced"), [(6, True), (7, False)])
-def test_above_dimension_six_the_common_factor_is_not_divided_out(dim, is_reduced):
-    """x' = y, y' = x: the minors have a power of Z in common. (1 + eps)/(1 - eps) = 2, of order 4 modulo 5."""
-    names = [f"x{k}" for k in range(dim)]
-    exchanged = [names[min(k ^ 1, dim - 1)] for k in range(dim)]
-    found = cycle_census(QuadraticSystem.from_text(names, exchanged), "1/3", 5, samples=300, seed=1)
-    assert set(found.lengths) <= {1, 2, 4}
-    assert (found.indeterminate == 0) == is_reduced
-
-
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
 def test_where_the_clock_stops_the_images_nothing_is_said_of_points():
     found = cycle_census(load("lotka_volterra").system, "1/7", 997, seconds=0)
     assert (found.stopped, found.complete, found.looked_at, found.cycles, found.lengths) == (True, False, 0, None, {})
-
-
-def test_where_the_clock_stops_samples_the_steps_are_those_that_all_took():
-    found = cycle_census(load("lotka_volterra").system, "1/7", 100_003, samples=50, seconds=0.05)
-    assert (found.stopped, found.complete) == (True, False)
-    again = cycle_census(load("lotka_volterra").system, "1/7", 100_003, samples=50, steps=max(1, found.steps))
-    assert found.steps == 0 or (counts_of(again), again.open) == (counts_of(found), found.open)
-
-
-def test_without_seconds_the_clock_is_not_read(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.cycles.time", None)
-    assert cycle_census(load("weierstrass").system, "1/7", 31).complete
-
-
-def test_samples_go_on_for_so_many_steps():
-    found = cycle_census(map_of("x + 1"), 1, 100_003, samples=10, steps=7)
-    assert (found.steps, found.open, found.lengths, found.stopped) == (7, 10, {}, False)
 
 
 def test_spaces_of_high_dimension_are_sampled_earlier():
@@ -209,11 +178,9 @@ def test_spaces_of_high_dimension_are_sampled_earlier():
 @pytest.mark.parametrize(
     ("eps", "prime", "kind", "words"),
     [
-        ("1/7", 2, InputError, "expected an odd prime"),
         ("1/7", 9, InputError, "9 is composite"),
         ("1/7", 7, BadPrime, "the prime 7 divides the denominator of 1/7"),
         ("7/3", 7, BadPrime, "the prime 7 divides the numerator of eps = 7/3"),
-        ("0", 7, InputError, "eps = 0"),
         ("1/7", 3, BadPrime, "the prime 3 divides the denominator of -8/3"),
         ("1/7", 2**61 - 1, InputError, "expected an odd prime below 2147483648"),
     ],
@@ -221,15 +188,3 @@ def test_spaces_of_high_dimension_are_sampled_earlier():
 def test_wrong_primes_and_eps_are_refused(eps, prime, kind, words):
     with pytest.raises(kind, match=words):
         cycle_census(load("lorenz").system, eps, prime)
-
-
-@pytest.mark.parametrize("limits", [{"samples": 0}, {"samples": 100_001}, {"steps": 0}])
-def test_wrong_numbers_of_samples_and_steps_are_refused(limits):
-    with pytest.raises(InputError, match="expected 1 to 100000, and at least 1"):
-        cycle_census(load("lorenz").system, "1/7", 101, **limits)
-
-
-def test_default_eps_differ_up_to_sign():
-    for prime in (3, 5, 7, 11, 13, 101, 10007):
-        residues = [int(GF(prime).convert(eps)) for eps in default_eps(prime)]
-        assert len({min(r, prime - r) for r in residues}) == len(residues) == (1 if prime == 3 else 2)

@@ -11,7 +11,6 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import analysis, defaults
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.symmetry.commuting import find_commuting
@@ -51,14 +50,6 @@ def test_degrees_have_time_for_the_singularities_too(dim: int) -> None:
     assert shares * analysis._SECONDS[dim] <= defaults.SECONDS["degrees"]
     [option] = [one for one in command("degrees").params if one.name == "max_degree"]
     assert option.default == defaults.ITERATE_DEGREE
-
-
-def test_heights_are_of_as_many_orbits_and_digits() -> None:
-    options = {one.name: one.default for one in command("heights").params}
-    found = analysis_of("euler_top").heights
-    assert found is not None
-    assert len(found.orbits) <= height_survey.__kwdefaults__["starts"] * 2
-    assert options["max_digits"] >= 5_000
 
 
 SEARCHES: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [

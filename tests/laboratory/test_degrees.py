@@ -6,7 +6,6 @@ The sequences were computed by others, modulo two primes each, or are in the lit
 
 import random
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 from degree_helpers import polynomial_degrees
@@ -15,7 +14,7 @@ from helpers import DIMENSION, quick
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth, _Search, degree_growth
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -116,11 +115,6 @@ def test_a_single_eps_may_be_special():
     assert degree_growth(system).growth is Growth.QUADRATIC
 
 
-def test_eps_as_a_rational_number():
-    found = degree_growth(load("lorenz").system, "1/7", max_terms=3)
-    assert (found.degrees, found.to_json()["eps"]) == ((1, 3, 9, 27), "1/7")
-
-
 @pytest.mark.parametrize(
     ("rhs", "eps", "degrees", "ended"),
     [
@@ -160,34 +154,3 @@ def test_lines_in_special_position_are_replaced(monkeypatch):
     found = degree_growth(system, max_terms=7, seed=1)
     assert found.degrees == (1, 3, 9, 19, 33, 51, 73, 99)
     assert any("was replaced by another" in note for note in found.notes)
-
-
-@pytest.mark.parametrize(
-    ("degrees", "n", "steps", "expected"),
-    [
-        ((1, 2, 4), 3, 3, 7),  # three steps, of the degrees 2, 4 and 7
-        ((1, 2, 3), 3, 2, -1),  # not the degree that is known of iterate 2
-        ((1, 2, 4, 7), 4, 4, -1),  # no value at the fourth step
-    ],
-)
-def test_a_line_of_other_degrees_than_are_known_tells_nothing(degrees, n, steps, expected):
-    line = SimpleNamespace(steps=0, degree=1)
-
-    def step(guess):
-        line.steps += 1
-        if line.steps > 3:
-            raise ZeroDivisionError
-        line.degree = (1, 2, 4, 7)[line.steps]
-
-    line.step = step
-    search = SimpleNamespace(_guess=lambda k: 0, degrees=list(degrees))
-    assert (_Search._degree(search, line, n), line.steps) == (expected, steps)
-
-
-@pytest.mark.parametrize(
-    ("degrees", "guesses"),
-    [((1, 2, 4), {0: 1, 2: 4, 3: 8}), ((1, 3, 5), {3: 12}), ((1, 2, 0), {3: 0}), ((1, 0, 0), {3: 0}), ((1,), {1: 5})],
-)
-def test_the_degree_that_is_guessed_is_bounded_by_the_last_ratio(degrees, guesses):
-    search = SimpleNamespace(degrees=list(degrees), _map=SimpleNamespace(dim=5))
-    assert {n: _Search._guess(search, n) for n in guesses} == guesses

@@ -65,12 +65,6 @@ def test_exceptional_hypersurfaces_are_named_over_eps_by_the_affine_jacobian():
     assert names["b*c*d*e - 5"] == ""
 
 
-def test_too_many_products_are_reported_as_too_large(monkeypatch):
-    monkeypatch.setattr(written, "_MAX_PRODUCTS", 0)
-    run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1, seconds=200)
-    assert "too large to be written down" in run.hypersurfaces[-1].note
-
-
 @pytest.mark.parametrize(
     ("variables", "image"),
     [("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"), ("a,b,c,d,e", DIMENSION_5)],

@@ -7,7 +7,6 @@ import pytest
 from flint import fmpq, fmpz_mat, fmpz_poly
 
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import degrees, proofs
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -135,24 +134,8 @@ def test_a_linear_iterate_need_not_be_the_identity():
     assert (projective.is_identity, projective.reason) == (False, "the map is linear on projective space")
 
 
-def test_a_kahan_map_that_is_periodic_at_one_eps_only():
-    henon_heiles = load("henon_heiles").map
-    proof = linear_iterate(henon_heiles, fmpq(1), 4)
-    assert (proof.reason, proof.growth) == ("Phi^4 is the identity", Growth.BOUNDED)
-    assert linear_iterate(henon_heiles, fmpq(1, 2), 4) is None
-
-
 def test_a_recurrence_that_does_not_fit_the_proof_is_not_given():
     found = degree_growth(by_formulas("x,y", "y; y^3/x"))
     assert found.recurrence.text.startswith("a(n) = 3*a(n-1)-a(n-2)")
     other = replace(found.proof, rate=replace(found.proof.rate, minimal_polynomial=fmpz_poly([-2, 1])))
     assert replace(found, proof=other).recurrence is None
-
-
-def test_without_a_recurrence_the_estimate_is_a_root():
-    found = replace(degree_growth(by_formulas("x,y,z", "y; z; z/(x*y^2)")), proof=None)
-    assert found.recurrence is None
-    n, last = len(found.degrees) - 1, found.degrees[-1]
-    assert found.growth_text == (
-        f"no recurrence found in {n + 1} terms; d_n^(1/n) is {last ** (1 / n):.6g} for n = {n}, an estimate only"
-    )

@@ -14,7 +14,7 @@ from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed
-from kahanmaps.laboratory.singular.orders import Orders
+from kahanmaps.laboratory.singular.following import Orders
 from kahanmaps.laboratory.singular.singularities import default_eps, patterns
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.systems.quadratic import QuadraticSystem

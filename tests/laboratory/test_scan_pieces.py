@@ -55,11 +55,6 @@ def test_three_hyperplanes_of_a_space_of_dimension_6_are_told_apart():
     assert sorted(found.flats[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
 
 
-def test_single_points_are_not_looked_for_where_not_all_members_were_tried():
-    found = pieces([(1, 2, 3, 4)], 31, 31 * 40, 3, random.Random(0))
-    assert (found.flats, found.left) == ({}, 1)
-
-
 def test_what_is_not_there_modulo_the_third_prime_is_not_lifted():
     point = {p: [((1, p - 2),)] for p in PRIMES}
     assert list(lifted_flats(point)) == [((fmpq(1), fmpq(-2)),)]
@@ -88,16 +83,6 @@ def zeros(condition, *others):
 def test_points_over_number_fields_have_an_equation_for_each_parameter(condition, others, names, expected):
     found = lifted_conjugates(zeros(condition, *others), names, random.Random(1))
     assert [[*map(str, equations)] for equations, _ in found] == [expected]
-
-
-def test_a_coordinate_may_need_a_field_of_its_own():
-    primes = (71, 73, 97, 101, 103, 167, 191)  # both fields split modulo all of these but two
-    points = {
-        p: [(a, b) for a in range(p) if (a * a - 2) % p == 0 for b in range(p) if (b * b - 3) % p == 0] for p in primes
-    }
-    [(equations, at)] = lifted_conjugates(points, "ab", random.Random(1))
-    assert [*map(str, equations)] == ["a^2 - 2", "b^2 - 3"]
-    assert at == (71, 73, 97, 167, 191)
 
 
 def test_points_that_are_not_conjugate_are_told_apart_also_among_others():
@@ -134,8 +119,3 @@ def test_members_on_a_component_are_on_it(field):
     assert x[1] * x[2] + field.one == field.zero
     assert x[0] - x[1] - x[1] + field.one == field.zero
     assert len({point_on([a * b * c + one], 3, field, random.Random(k)) for k in range(5)}) == 5
-
-
-def test_a_curve_without_rational_points_has_no_rational_member():
-    a, b = ring(["a", "b"]).gens()
-    assert point_on([a**2 + b**2 - 3], 2, QQ, random.Random(1)) is None

@@ -1,7 +1,6 @@
 """Confinement: the integrable systems of the catalogue against those of maximal degree, and series against points."""
 
 import random
-from dataclasses import replace
 from itertools import islice
 
 import pytest
@@ -11,19 +10,14 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.singular import contracted, jets, outcomes
-from kahanmaps.laboratory.singular.critical import critical_points, pole_points
-from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular import jets, outcomes
 from kahanmaps.laboratory.singular.jets import (
-    NotGeneric,
-    form_order,
     image_of,
     images_of_curve,
 )
-from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED
-from kahanmaps.laboratory.singular.singularities import _range, default_eps, singularities, symbolic_denominator
+from kahanmaps.laboratory.singular.outcomes import NOT_CONFINED, critical_points, pole_points
+from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -55,14 +49,6 @@ def test_singularities_of_integrable_maps_are_confined(name):
     assert found[0].shape == found[1].shape
 
 
-def test_runs_that_differ_in_a_multiplicity_have_different_shapes():
-    run = runs("weierstrass")[0]
-    first, *others = run.hypersurfaces
-    for multiplicity in (None, first.multiplicity + 1):
-        changed = replace(run, hypersurfaces=(replace(first, multiplicity=multiplicity), *others))
-        assert changed.shape != run.shape
-
-
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz"])
 def test_nothing_is_confined_where_degrees_are_the_largest_possible(name):
     """The degrees 2^n and 3^n say that no contracted hypersurface ever meets a point without a value."""
@@ -81,13 +67,6 @@ def test_the_degrees_of_the_critical_locus_add_up():
             assert sum(h.degree * (h.multiplicity or 0) for h in run.hypersurfaces) == run.critical_degree
 
 
-def test_the_pole_of_the_weierstrass_map():
-    assert symbolic_denominator(load("weierstrass").system) == [("12*x*eps^2 - 1", 1)]
-    (pole,) = [h for h in singularities(load("weierstrass").system, "1/2").hypersurfaces if h.is_pole]
-    assert pole.polynomial == "3*x - 1"
-    assert pole.status == CONFINED
-
-
 @pytest.mark.parametrize(
     ("rhs", "verdict", "degrees"),
     [
@@ -99,15 +78,6 @@ def test_simple_systems(rhs, verdict, degrees):
     run = singularities(QuadraticSystem.from_text(["x", "y"], rhs), "1/7", steps=6)
     assert (run.verdict, (run.map_degree, run.critical_degree)) == (verdict, degrees)
     assert {h.polynomial for h in run.hypersurfaces} == ({"Z"} if degrees[1] else set())
-
-
-def test_one_dimension_has_nothing_to_contract():
-    assert singularities(load("riccati").system, "1/7").verdict == "nothing contracted"
-
-
-def test_singular_everywhere_is_a_value():
-    run = singularities(QuadraticSystem.from_text(["x", "y"], ["x", "y"]), 1)
-    assert run.verdict == "singular everywhere"
 
 
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass", "lotka_volterra"])
@@ -131,15 +101,6 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     }
     degrees = sum(h.degree for h in unwritten.hypersurfaces if h.polynomial == "?")
     assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
-
-
-def test_zeros_without_points_are_undecided(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.singular.written._MAX_TERMS", 0)
-    monkeypatch.setattr(
-        "kahanmaps.laboratory.singular.outcomes._outcome_at", lambda *_, **__: (_ for _ in ()).throw(NotGeneric())
-    )
-    run = singularities(load("weierstrass").system, "4/13")
-    assert run.verdict == "undecided"
 
 
 def test_the_clock_stops_it():
@@ -231,31 +192,3 @@ def test_the_denominator_is_that_determinant_in_every_dimension(name):
     point = [fmpq(2 * k + 1, k + 2) for k in range(system.dim)]
     denominator = parse_polynomial(singularities(system, "1/7", steps=1).denominator, system.variables)
     assert evaluate(denominator, QQ, point) == KahanMap(system, "1/7").determinant(point)
-
-
-@pytest.mark.parametrize(
-    ("dim", "steps", "expected"),
-    [
-        (1, None, (12, 1000, 400)),
-        (3, None, (12, 500, 150)),
-        (4, None, (12, 250, 60)),
-        (5, None, (12, 100, 40)),
-        (2, 1, (1, 1, 1)),
-        (2, 300, (200, 300, 300)),
-    ],
-)
-def test_how_far_hypersurfaces_are_followed(dim, steps, expected):
-    found = _range(dim, steps, 0.0)
-    assert (found.shown, found.reach, found.along, found.end) == (*expected, 0.0)
-
-
-def test_a_curve_whose_first_step_is_not_seen_before_the_time_is_over_is_told():
-    text = 'variables = ["x", "y"]\n[map]\nimage = ["x", "y*x^9 + 1"]\ninverse = ["x", "(y - 1)/x^9"]'
-    map_, field = parse_system(text).map, GF(2**31 - 1)
-    here, over = map_.at(fmpq(1)), map_.at(fmpq(1), field)
-    forms = contracted._forms(here.equations[0], here.inverse.equations[0], 1)
-    functions = tuple(form_order(form, field) for form in forms.all)
-    _, _, curves = contracted._on_line(over.factors[0], forms, functions, Range(1, 1, 1, 0.0, 1), random.Random(1))
-    assert len(curves) == 2
-    with pytest.raises(contracted.OrdersUnknown, match="the time was over"):
-        [curve.key for curve in curves]

@@ -183,11 +183,8 @@ def test_no_time():
     ],
 )
 def test_a_family_of_three_by_three_matrices_is_singular_where_its_determinant_is_zero(entries, singular):
-    assert is_singular(family(entries), 3) is singular
-
-
-def family(entries):
-    return Component(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))
+    part = Component(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))
+    assert is_singular(part, 3) is singular
 
 
 def test_equations_with_long_coefficients_are_not_set_up_and_nothing_is_called_complete():
@@ -198,19 +195,3 @@ def test_equations_with_long_coefficients_are_not_set_up_and_nothing_is_called_c
     assert commuting.undecided == ["other g are searched for coefficients of up to 2000 digits only"]
     assert (symmetries.complete, commuting.complete, darboux.complete) == (False, False, False)
     assert [one.trivial for one in commuting.solutions] == ["0", "f", "-f"]
-
-
-def test_signed_permutations_that_were_not_judged_in_time_are_told(monkeypatch):
-    found = [fmpq_mat([[1, 0], [0, 1]])]
-    monkeypatch.setattr("kahanmaps.laboratory.symmetry.symmetries.signed_permutations", lambda *_: (found, True))
-    late = linear_symmetries(QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"]), seconds=1e-9)
-    assert (late.signed, late.order) == ([], None)
-    assert "the time is over: not all were tried" in "; ".join(late.undecided)
-
-
-@pytest.mark.parametrize(("rhs", "shift"), [(("2*x - 1", "2*y - 1"), 1), (("2*x + 1", "2*y + 1"), -1)])
-def test_symmetries_without_a_translation_come_first(rhs, shift):
-    found = [t for t in linear_symmetries(system("x y", *rhs)).signed if not t.reversing]
-    assert [bool(any(t.r)) for t in found] == [False] * 2 + [True] * 6
-    (both,) = [t.r for t in found if t.S == fmpq_mat([[-1, 0], [0, -1]])]
-    assert both == (shift, shift)

@@ -80,11 +80,6 @@ def test_where_an_equilibrium_is_a_fixed_point_of_the_map(f, eps, expected):
                 KahanMap(f, eps).step(x)
 
 
-def test_too_many_equations_are_told():
-    names = [f"x{k}" for k in range(7)]
-    assert fixed_points(QuadraticSystem.from_text(names, [f"{name}^2" for name in names])).undecided
-
-
 def elsewhere(name, P, q, c):
     """A system of the catalogue in other coordinates and another time, without its name."""
     return SystemFile.from_system(load(name).system.composed(P, q).transformed(P.inv()).scaled(c), "elsewhere")

@@ -443,9 +443,27 @@ class _Search:
 
     def _step(self, lines: list[Line], line: Callable[[], Line]) -> None:
         """All lines one step on; those in special position are replaced by others."""
-        n = len(self.degrees)
+        n, known = len(self.degrees), self.degrees
+
+        def degree_on(one: Line) -> int:
+            """The degree of iterate n; -1 where that cannot be done on this line."""
+            try:
+                while one.steps < n:
+                    k = one.steps + 1
+                    guess = known[k] if k < n else self._map.dim if k == 1 else known[1] * known[-1]
+                    if k == n > 1 and known[-2]:
+                        # Degrees are as good as log-concave, so that the last ratio bounds the next one. A guess too
+                        # low costs a second attempt.
+                        guess = min(guess, known[-1] * known[-1] // known[-2] + 4)
+                    one.step(guess)
+                    if k < n and one.degree != known[k]:
+                        return -1
+            except ZeroDivisionError:
+                return -1
+            return one.degree
+
         while True:
-            found = [self._degree(one, n) for one in lines]
+            found = [degree_on(one) for one in lines]
             best = max(found)
             if best >= 0 and min(found) == best:
                 self.degrees.append(best)
@@ -462,25 +480,3 @@ class _Search:
             for k, degree in enumerate(found):
                 if degree < best or best < 0:
                     lines[k] = line()
-
-    def _degree(self, line: Line, n: int) -> int:
-        """The degree of iterate n on a line, which is followed there; -1 where that cannot be done on this line."""
-        try:
-            while line.steps < n:
-                line.step(self._guess(line.steps + 1))
-                if line.steps < n and line.degree != self.degrees[line.steps]:
-                    return -1
-        except ZeroDivisionError:
-            return -1
-        return line.degree
-
-    def _guess(self, n: int) -> int:
-        """What the degree of iterate n hardly exceeds; a guess too low costs a second attempt."""
-        known = self.degrees
-        if n < len(known):
-            return known[n]
-        if n == 1:
-            return self._map.dim
-        most = known[1] * known[-1]
-        # Degrees are as good as log-concave, so that the last ratio bounds the next one.
-        return min(most, known[-1] * known[-1] // known[-2] + 4) if known[-2] else most

@@ -105,7 +105,7 @@ class Recurrence:
     @cached_property
     def is_polynomial(self) -> bool:
         """Whether all roots other than 0 are roots of unity: decided exactly."""
-        return all(_cyclotomic_index(factor) for factor, _ in self.factors)
+        return all(int(factor.is_cyclotomic()) for factor, _ in self.factors)
 
     @property
     def power(self) -> int:
@@ -159,7 +159,7 @@ class Recurrence:
         """
         if not self.is_polynomial or not self.factors:
             return "0" if not self.factors else None
-        period = math.lcm(*(_cyclotomic_index(factor) for factor, _ in self.factors))
+        period = math.lcm(*(int(factor.is_cyclotomic()) for factor, _ in self.factors))
         size = max(k for _, k in self.factors)
         if period > _MOST_CLASSES:
             return None
@@ -167,8 +167,10 @@ class Recurrence:
         values = self._extended(self.preperiod + period * (size + 1))
         for residue in range(period):
             first = next(n for n in count(self.preperiod) if n % period == residue)
-            at = [first + period * k for k in range(size)]
-            forms.append(format_univariate(_interpolated(at, [values[n] for n in at]), "n"))
+            at = [first + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
+            powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
+            column = fmpq_mat(size, 1, [fmpq(values[n]) for n in at])
+            forms.append(format_univariate(fmpq_poly(powers.solve(column).entries()), "n"))
         if len(set(forms)) == 1:
             return forms[0]
         return "; ".join(f"{form} for n = {residue} mod {period}" for residue, form in enumerate(forms))
@@ -270,15 +272,3 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
 def needed_checks(order: int) -> int:
     """The number of held-out terms without which a recurrence of this order is not accepted."""
     return max(2, -(-order // 3))
-
-
-def _cyclotomic_index(factor: fmpz_poly) -> int:
-    """n where the polynomial is the n-th cyclotomic one, else 0."""
-    return int(factor.is_cyclotomic())
-
-
-def _interpolated(at: Sequence[int], values: Sequence[int]) -> fmpq_poly:
-    """The polynomial of degree below len(at) with these values."""
-    size = len(at)
-    powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
-    return fmpq_poly(powers.solve(fmpq_mat(size, 1, [fmpq(value) for value in values])).entries())

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from flint import fmpz_poly
 
 from kahanmaps.laboratory.growth.recurrences import Recurrence, find_recurrence, needed_checks
-from kahanmaps.laboratory.singular.orders import Fraction, Orders
+from kahanmaps.laboratory.singular.following import Fraction, Orders
 
 
 def degree_series(

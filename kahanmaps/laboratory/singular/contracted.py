@@ -30,9 +30,8 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import Course, Range
+from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
-from kahanmaps.laboratory.singular.orders import AlongCurves
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
@@ -300,7 +299,14 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     apart, their degrees are 0 and their orders those of the forms. Raises OrdersUnknown.
     """
     here = map_.at(eps)
-    forms = _forms(here.equations[0], here.inverse.equations[0], map_.digits)
+
+    def factors(one: Equation) -> tuple[Any, ...]:
+        form = kernel_minors([[*row[:-1], None] for row in one.polynomials()])[-1]
+        return (form,) if map_.digits > _MOST_DIGITS else tuple(factor for factor, _ in form.factor()[1])
+
+    infinity = here.equations[0].polynomials()[0][0].context().gens()[-1]
+    poles = tuple(form for form in factors(here.equations[0]) if form != infinity)
+    forms = _Forms(poles, factors(here.inverse.equations[0]), infinity)
     kinds: dict[Key, list[_Curve]] = {}
     for line in range(_MOST_LINES):
         if limits.is_over:
@@ -378,17 +384,6 @@ def _followed(
             settled = along.settled_at if along.is_settled else None
             found.append(replace(known, primes=tuple(by_prime)[:2], followed=along.followed, settled_at=settled))
     return found
-
-
-def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
-
-    def factors(one: Equation) -> tuple[Any, ...]:
-        form = kernel_minors([[*row[:-1], None] for row in one.polynomials()])[-1]
-        return (form,) if digits > _MOST_DIGITS else tuple(factor for factor, _ in form.factor()[1])
-
-    infinity = equation.polynomials()[0][0].context().gens()[-1]
-    poles = tuple(form for form in factors(equation) if form != infinity)
-    return _Forms(poles, factors(inverse), infinity)
 
 
 def _on_line(

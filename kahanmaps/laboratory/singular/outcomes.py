@@ -1,26 +1,34 @@
 """What becomes of a hypersurface under the Kahan map: points on it modulo large primes, followed along series.
 
 Source: grammaticos-ramani-papageorgiou-1991.
+
+Where the polynomials of hypersurfaces are too large to be written down, points on them are zeros on a random line. For
+an equation M(x) x~ = r(x) that is linear in both points det dPhi(x) is det M'(x~)/det M(x) up to its sign, with the M'
+of the inverse map. So away from poles and infinity contracted hypersurfaces are the zeros of E(X) = det M'(X~), where
+(X~ : Z~) is the image of X. On a line E is a polynomial of one variable. Source: petrera-suris-2016, eq. (Jac).
 """
 
 from __future__ import annotations
 
+import operator
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial, reduce
+from itertools import pairwise
 from typing import Any
 
 from flint import fmpq, nmod_poly
 
 from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, counted
-from kahanmaps.laboratory.singular.critical import critical_points, pole_points
-from kahanmaps.laboratory.singular.following import Course, Range
+from kahanmaps.laboratory.singular.following import NO_ORDERS, NOTHING, AlongCurves, Course, Orders, Range, Tracked
 from kahanmaps.laboratory.singular.jets import (
     Letters,
     NotGeneric,
@@ -28,7 +36,6 @@ from kahanmaps.laboratory.singular.jets import (
     Step,
     form_order,
 )
-from kahanmaps.laboratory.singular.orders import NO_ORDERS, NOTHING, AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
@@ -40,6 +47,114 @@ _POINTS = 2  # each modulo a prime of its own
 _LONGEST = 60  # characters of a polynomial in a sentence
 
 FIRST_STEPS = 12  # that are shown
+
+
+@dataclass(frozen=True)
+class CriticalPoint:
+    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there.
+
+    Or a pole: then E stands for det(I - eps f').
+    """
+
+    point: tuple[int, ...]
+    gradient: tuple[int, ...]
+    multiplicity: int
+
+
+def critical_points(
+    equations: Sequence[Equation], inverses: Sequence[Equation], rng: random.Random
+) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
+
+    `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
+    inverses; of several factors the product of their E is meant. Returns the points and, for each multiplicity, the
+    number of zeros of E over the closure of GF(p): there may be zeros without points in GF(p).
+    """
+
+    def E(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
+        total = X[0] * 0 + 1
+        for equation, inverse in zip(equations, inverses, strict=True):
+            X = equation.image(X, X[0] * 0, times)
+            total = times(total, _denominator(inverse, X, times))
+        return total
+
+    return _zeros(equations, inverses, E, rng)
+
+
+def pole_points(equations: Sequence[Equation], rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
+
+    def determinants(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
+        total = _denominator(equations[0], X, times)
+        for before, equation in pairwise(equations):
+            X = before.image(X, X[0] * 0, times)
+            total = times(total, _denominator(equation, X, times))
+        return total
+
+    return _zeros(equations, None, determinants, rng)
+
+
+def _zeros(
+    equations: Sequence[Equation],
+    inverses: Sequence[Equation] | None,
+    function: Callable[[Sequence[nmod_poly], Product], nmod_poly],
+    rng: random.Random,
+) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The zeros in GF(p) of a function on a random line, and how many there are in all.
+
+    The function is E or, without inverses, det M; its value is computed from images without their common factors, and
+    poles and infinity, or infinity alone, are divided out.
+    """
+    p = equations[0].over.characteristic
+    a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
+    line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+    value, excluded = nmod_poly([1], p), line[-1] if inverses is None else nmod_poly([1], p)
+    for k, equation in enumerate(equations):
+        if inverses is None:
+            value = value * _denominator(equation, line)
+            if k + 1 == len(equations):
+                break
+        image = equation.image(line, line[-1] * 0)
+        common = reduce(nmod_poly.gcd, image)
+        image = [entry // common for entry in image] if common.degree() > 0 else image
+        if inverses is not None:
+            value = value * _denominator(inverses[k], image)
+            excluded = excluded * image[-1] * common * line[-1]
+        line = image
+    while (shared := value.gcd(excluded)).degree() > 0:
+        value = value // shared
+    if value.degree() < 1:
+        return [], {}
+    found, degrees = [], dict[int, int]()
+    t = nmod_poly([0, 1], p)
+    for part, exponent in value.factor_squarefree()[1]:
+        power = int(exponent)
+        degrees[power] = degrees.get(power, 0) + int(part.degree())
+        # Only zeros in GF(p) are of use: a whole factorization would take a hundred times as long at high degrees.
+        linear = part.gcd(t.pow_mod(p, part) - t) if part.degree() > 1 else part
+        for factor, _ in linear.factor()[1]:
+            s = -int(factor[0])
+            point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
+            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
+            # (t F_v + d F_w)^power G + ... A power of t above all those that count stands for d.
+            apart = power + 1
+            curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
+            far = nmod_poly([0] * apart + [1], p)
+            moved = [curve, *([x + far if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))]
+            values = [function(X, partial(nmod_poly.mul_low, n=apart + power)) for X in moved]
+            here, *there = (int(on[apart + power - 1]) for on in values)
+            gradient = [(c - here) % p for c in there]
+            if any(gradient):
+                found.append(CriticalPoint(tuple(point), tuple(gradient), power))
+    return found, degrees
+
+
+def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product = operator.mul) -> nmod_poly:
+    """The last minor of L at X, whose coordinates are polynomials: up to its sign det M."""
+    zero = X[0] * 0
+    rows = equation.rows(equation.monomials(X, times), zero)
+    minor: nmod_poly = kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
+    return minor
 
 
 class Outcome(StrEnum):
@@ -290,21 +405,20 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             known.append(key)
             one = replace(outcome, degree=seen[key[0]], is_pole=poles, multiplicity=key[0], primes=(field.prime,))
-            found[key] = _joined(found[key], one) if key in found else one
+            if key in found:  # of two points with the same outcome the one that was followed less counts
+                before = found[key]
+                settled = [k for k in (before.settled_at, one.settled_at) if k is not None]
+                found[key] = replace(
+                    before,
+                    primes=tuple(dict.fromkeys((*before.primes, *one.primes))),
+                    followed=min(before.followed, one.followed),
+                    settled_at=max(settled) if len(settled) == 2 else None,
+                )
+            else:
+                found[key] = one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
         found[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
-
-
-def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
-    """Two points of the same multiplicity with the same outcome as one."""
-    settled = None if None in (before.settled_at, new.settled_at) else max(before.settled_at or 0, new.settled_at or 0)
-    return replace(
-        before,
-        primes=tuple(dict.fromkeys((*before.primes, *new.primes))),
-        followed=min(before.followed, new.followed),
-        settled_at=settled,
-    )
 
 
 def _by_ranks(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:

@@ -31,8 +31,7 @@ from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
 from kahanmaps.laboratory.singular.contracted import OrdersUnknown, contracted
-from kahanmaps.laboratory.singular.following import Range
-from kahanmaps.laboratory.singular.orders import Fraction
+from kahanmaps.laboratory.singular.following import Fraction, Range
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
     FIRST_STEPS,
