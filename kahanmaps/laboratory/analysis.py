@@ -8,8 +8,14 @@ The number of integrals and the growth are two separate findings: a map may have
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
 from typing import Any
 
 from kahanmaps.algebra.written.plain import attributes
@@ -23,6 +29,7 @@ from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.processes import end_with_parent, processors
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
@@ -122,6 +129,7 @@ def analyze(
     progress: Callable[[str], None] = lambda _: None,
     reached: Callable[[Analysis], None] = lambda _: None,
     parts: Sequence[Part] = ANALYSES,
+    processes: int = 1,
 ) -> Analysis:
     """What a map preserves and how it grows, within a time budget.
 
@@ -135,6 +143,8 @@ def analyze(
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
         parts: the analyses to do, in this order; the verdict rests on these.
+        processes: 1, or more: then a forked copy of this process does those that need no integrals, where there is a
+            second processor (on Linux only; what runs in other threads should bear a fork). The answers are the same.
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -157,17 +167,26 @@ def analyze(
     todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
     found.pending = [part.name for part in todo]
     reached(found)
-    for part in todo:
-        progress(part.name)
-        try:
-            if run.left <= 0:
-                found.skipped.append(f"{part.name}: the time was over")
+    can_fork = processes > 1 and processors() > 1 and sys.platform == "linux"
+    apart = [part for part in todo if part.is_apart and can_fork]
+    skipped: dict[str, str] = {}
+    with _second_process(run, apart) as outcomes:
+        here, there = [part for part in todo if part not in apart], list(apart)
+        while here or there:
+            has_come = bool(there) and (not here or outcomes.poll())
+            part, outcome = (there if has_come else here).pop(0), None
+            progress(part.name)
+            if has_come:
+                with suppress(EOFError, OSError):  # the process was killed, or met an error, which it meets here again
+                    outcome = outcomes.recv()
+            result, reason = outcome or _outcome(run, part)
+            if reason:
+                skipped[part.name] = f"{part.name}: {reason}"
+                found.skipped = [skipped[one.name] for one in todo if one.name in skipped]
             else:
-                found[part.result] = part.look(run, **run.budget(part))
-        except KahanmapsError as error:
-            found.skipped.append(f"{part.name}: {error}")
-        found.pending.remove(part.name)
-        reached(found)
+                found[part.result] = result
+            found.pending.remove(part.name)
+            reached(found)
     if others := ", ".join(part.name for part in parts if not run.applies(part)):
         if run.root is not None:
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")
@@ -175,3 +194,46 @@ def analyze(
             found.skipped.append(f"{others}: for fields only")
     found.elapsed = total - run.left
     return found
+
+
+def _outcome(run: Run, part: Part) -> tuple[Any, str]:
+    """What a part found; or None, and why it was not done."""
+    if run.left <= 0:
+        return None, "the time was over"
+    try:
+        return part.look(run, **run.budget(part)), ""
+    except KahanmapsError as error:
+        return None, str(error)
+
+
+@contextmanager
+def _second_process(run: Run, parts: Sequence[Part]) -> Iterator[Connection]:
+    """A copy of this process that does the parts, if there are any, and sends their outcomes; it ends with the block.
+
+    As a copy it has the map and all functions without being told; what it finds comes back as pickles.
+    """
+    parent, (receiver, sender) = os.getpid(), Pipe(duplex=False)
+    if not parts:
+        yield receiver
+        return
+
+    def work() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        end_with_parent(parent)
+        run.progress = lambda _: None
+        with suppress(Exception):
+            for part in parts:
+                result, reason = _outcome(run, part)
+                if not reason:
+                    run.found[part.result] = result
+                sender.send((result, reason))
+
+    process = get_context("fork").Process(target=work, daemon=True)
+    process.start()
+    try:
+        sender.close()  # so that the end of the process is the end of the pipe
+        yield receiver
+    finally:
+        process.kill()
+        process.join()

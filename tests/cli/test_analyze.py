@@ -134,6 +134,11 @@ def test_undecided_gives_3(kahanmaps, monkeypatch):
 # Time, progress and interrupts
 
 
+@pytest.fixture
+def one_process(monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.analysis.processors", lambda: 1)
+
+
 def interrupted(*_, **__):
     raise KeyboardInterrupt
 
@@ -148,6 +153,7 @@ def interrupted(*_, **__):
         ),
     ],
 )
+@pytest.mark.usefixtures("one_process")
 def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, part, sections):
     monkeypatch.setattr(f"kahanmaps.laboratory.analyses.table.{part}", interrupted)
     outcome = kahanmaps("analyze weierstrass")
@@ -168,6 +174,7 @@ def test_an_interrupt_before_anything_was_begun_prints_nothing(kahanmaps, monkey
     assert (outcome.status, outcome.out) == (130, "")
 
 
+@pytest.mark.usefixtures("one_process")
 def test_sections_are_told_as_soon_as_they_are_final(kahanmaps, monkeypatch):
     told = []
     monkeypatch.setattr("kahanmaps_cli.commands.analyze.tell", lambda text, **_: told.append(text.strip()))

@@ -65,6 +65,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
                 **opt.given(options, "seconds", "seed"),
                 progress=progress,
                 reached=report,
+                processes=2,
             )
         except KeyboardInterrupt:
             if report.found is None:

@@ -47,6 +47,8 @@ class Part:
     reads: tuple[str, ...] = ()
     # The dimension above which it comes last and gets a quarter of its share: others cannot make use of it then.
     slow_above: float = inf
+    # Another process may do it: it reads, and is read by, others of this kind alone, and its result can be pickled.
+    is_apart: bool = False
     json: Callable[[Any], dict[str, Any]] | None = None
 
     def __post_init__(self) -> None:

@@ -189,9 +189,10 @@ ANALYSES = (
         Of.MAPS_OVER_Q,
         share=0.4,
         slow_above=WRITTEN_DIMENSION,
+        is_apart=True,
         json=_singularities_json,
     ),
-    Part("degrees", _degrees, "growth", statements.of_growth, Of.EVERY, share=0.25, reads=("heights",)),
+    Part("degrees", _degrees, "growth", statements.of_growth, Of.EVERY, share=0.25, reads=("heights",), is_apart=True),
     Part(
         "integrals",
         lambda run, **budget: find_integrals(run.bare, **run.asked, **budget),
@@ -220,12 +221,14 @@ ANALYSES = (
         ),
         of=Of.EVERY,
         share=0.08,
+        is_apart=True,
     ),
     Part(
         "symmetries",
         lambda run, **budget: linear_symmetries(run.field, **budget),
         "symmetry",
         statements.of_symmetries,
+        is_apart=True,
     ),
     Part(
         "commuting systems",
@@ -237,5 +240,6 @@ ANALYSES = (
         statements.of_commuting_systems,
         Of.FIELDS | Of.NUMBER_FIELDS,
         result="commuting",
+        is_apart=True,
     ),
 )

@@ -1,0 +1,104 @@
+"""Two processes find what one finds; what goes wrong in the second is done again in the first, and it ends with it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory import analysis
+from kahanmaps.laboratory.analyses.part import Of, Part
+from kahanmaps.laboratory.analysis import analyze
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="a second process is for Linux")
+HERE = os.getpid()
+
+
+@pytest.fixture(autouse=True)
+def two_processors(monkeypatch):
+    monkeypatch.setattr(analysis, "processors", lambda: 2)
+
+
+def where(*_, **__):
+    return os.getpid()
+
+
+def apart(name, look=where, *, is_apart=True):
+    return Part(name, look, of=Of.EVERY, is_apart=is_apart, json=lambda found: {name: found[name]})
+
+
+@pytest.mark.parametrize("name", ["euler_top", "hky"])
+def test_two_processes_find_what_one_finds_to_the_byte(name):
+    one, two = (json.dumps(analyze(load(name), seconds=300, processes=k).to_json()) for k in (1, 2))
+    assert one == two
+
+
+def test_parts_that_are_apart_are_done_elsewhere_in_their_order_and_the_others_here():
+    parts = [apart("first"), apart("second", lambda run, **_: run.found["first"]), apart("third", is_apart=False)]
+    found = analyze(load("harmonic"), parts=parts, processes=2)
+    assert found["first"] == found["second"] != found["third"] == HERE
+    assert analyze(load("harmonic"), parts=parts)["first"] == HERE  # with one process
+
+
+def test_what_a_killed_process_did_not_do_is_done_here():
+    def killed(*_, **__):
+        if os.getpid() != HERE:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return os.getpid()
+
+    found = analyze(load("harmonic"), parts=[apart("first"), apart("second", killed), apart("third")], processes=2)
+    assert found["first"] != found["second"] == found["third"] == HERE
+    assert found.skipped == []
+
+
+def test_a_part_that_gives_up_elsewhere_is_told_and_a_mistake_is_not_swallowed():
+    def gives_up(*_, **__):
+        raise InputError("too hard")
+
+    parts = [apart("first", gives_up), apart("second"), apart("third", gives_up, is_apart=False)]
+    assert analyze(load("harmonic"), parts=parts, processes=2).skipped == ["first: too hard", "third: too hard"]
+    with pytest.raises(ZeroDivisionError):
+        analyze(load("harmonic"), parts=[apart("first", lambda *_, **__: 1 // 0)], processes=2)
+
+
+ENDED = """
+import os, signal, sys, time
+from kahanmaps.documents.catalog import load
+from kahanmaps.laboratory import analysis
+from kahanmaps.laboratory.analyses.part import Of, Part
+
+def sleeping(*_, **__):
+    print(os.getpid(), flush=True)
+    time.sleep(60)
+
+analysis.processors = lambda: 2
+parts = [Part("far", sleeping, of=Of.EVERY, is_apart=True), Part("near", sleeping, of=Of.EVERY)]
+analysis.analyze(load("harmonic"), parts=parts, processes=2)
+"""
+
+
+def is_running(process):
+    try:
+        with open(f"/proc/{process}/stat") as stat:
+            return stat.read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_the_second_process_ends_with_the_first(how):
+    line = [sys.executable, "-c", ENDED]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        both = {int(process.stdout.readline()) for _ in range(2)}
+        (other,) = both - {process.pid}
+        process.send_signal(how)
+        process.wait(timeout=30)
+    end = time.monotonic() + 30
+    while is_running(other):
+        assert time.monotonic() < end
+        time.sleep(0.01)
