@@ -175,8 +175,8 @@ def _of_samples(
             points, start = points[:, goes_on], start[:, goes_on]
     except TimeoutError:
         stopped = True
-    kinds = dict[str, Any](indeterminate=lost[0], pre_indeterminate=lost[1], open=start.shape[1])
-    return replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths, **kinds)
+    census = replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths)
+    return replace(census, indeterminate=lost[0], pre_indeterminate=lost[1], open=start.shape[1])
 
 
 class _ProjectiveMap:
@@ -227,10 +227,8 @@ class _ProjectiveMap:
         last = X[0]
         for row in X[1:]:
             last = row + last * (row == 0)
-        power, exponent = last, self.prime - 2
-        while exponent:  # 1/x = x^(p - 2), and 0 for x = 0
-            X = X * power % self.prime if exponent & 1 else X
-            power, exponent = power * power % self.prime, exponent >> 1
+        for bit in reversed(f"{self.prime - 2:b}"):  # 1/x = x^(p - 2), and 0 for x = 0
+            X, last = X * last % self.prime if bit == "1" else X, last * last % self.prime
         return X
 
 

@@ -10,7 +10,7 @@ from flint import fmpq
 from search_helpers import analysis_of, system
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analyses import statements, table
@@ -128,12 +128,6 @@ def test_the_flow_of_a_polarised_map_is_part_of_the_report():
     assert [line for line in found.skipped if "flow" in line] == []
 
 
-def test_without_integrals_there_is_nothing_of_the_flow():
-    parts = [part for part in ANALYSES if part.result in ("flow", "densities")]
-    found = analyze(load("euler_top"), parts=parts)
-    assert (found.flow, found.skipped) == (None, [])
-
-
 def test_integrals_of_members_are_counted_where_the_flow_is_looked_at():
     def none(run, **_):
         found = find_integrals(run.bare)
@@ -162,48 +156,33 @@ QUICK_PARTS = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("eps", "expected"),
-    [
-        (None, ["the lines x = 0 and y = 0 are invariant, for flow and map"]),
-        ("1/2", ["the lines x = 0 and y = 0 are invariant, for flow and map"]),
-        (
-            "1",
-            [
-                "the line x = 0 is invariant for the flow; at eps = 1 the map contracts it: "
-                "det(I + eps f'(x)) is 0 there",
-                "the line y = 0 is invariant for the flow; at eps = 1 the map has no value on it: "
-                "det(I - eps f'(x)) is 0 there",
-            ],
-        ),
-    ],
-)
+KEPT = ["the lines x = 0 and y = 0 are invariant, for flow and map"]
+LOST = [
+    "the line x = 0 is invariant for the flow; at eps = 1 the map contracts it: det(I + eps f'(x)) is 0 there",
+    "the line y = 0 is invariant for the flow; at eps = 1 the map has no value on it: det(I - eps f'(x)) is 0 there",
+]
+
+
+@pytest.mark.parametrize(("eps", "expected"), [(None, KEPT), ("1/2", KEPT), ("1", LOST)])
 def test_what_is_said_of_hyperplanes_holds_at_the_eps_in_force(eps, expected):
     found = analyze(load("lotka_volterra"), eps=eps, parts=QUICK_PARTS)
     assert [line for line in lines_of(found, "structure") if "invariant" in line] == expected
 
 
+SAME = "flow and map have the same fixed points"
+WHERE = f"{SAME} where det(I - eps f'(x)) is not 0"
+SOME = f"{WHERE}; at eps = 1 it is 0 at the fixed point (0, 0), where the map has no value;"
+NONE = "at eps = 1 det(I - eps f'(x)) is 0 at all of them: the map has no value there"
+
+
 @pytest.mark.parametrize(
     ("given", "eps", "expected"),
     [
-        (load("lotka_volterra"), None, "flow and map have the same fixed points;"),
-        (load("lotka_volterra"), "1/2", "flow and map have the same fixed points;"),
-        (
-            load("lotka_volterra"),
-            "1",
-            "flow and map have the same fixed points where det(I - eps f'(x)) is not 0; "
-            "at eps = 1 it is 0 at the fixed point (0, 0), where the map has no value;",
-        ),
-        (
-            system("x y", "x", "-y"),
-            "1",
-            "at eps = 1 det(I - eps f'(x)) is 0 at all of them: the map has no value there",
-        ),
-        (
-            system("x y", "x*y", "x^2"),  # the line (0, y), eigenvalues 0 and y
-            None,
-            "flow and map have the same fixed points where det(I - eps f'(x)) is not 0; an eigenvalue",
-        ),
+        (load("lotka_volterra"), None, f"{SAME};"),
+        (load("lotka_volterra"), "1/2", f"{SAME};"),
+        (load("lotka_volterra"), "1", SOME),
+        (system("x y", "x", "-y"), "1", NONE),
+        (system("x y", "x*y", "x^2"), None, f"{WHERE}; an eigenvalue"),  # the line (0, y), eigenvalues 0 and y
     ],
 )
 def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expected):
@@ -211,16 +190,16 @@ def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expe
     assert lines_of(found, "vector field")[-1].startswith(expected)
 
 
+NOWHERE = "at eps = 1 the map has no value anywhere: det(I - eps f'(x)) is identically 0"
+SINGULAR = "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all images"
+
+
 @pytest.mark.parametrize(
     ("rhs", "eps", "defect"),
     [
-        (("x", "-y"), "1", "at eps = 1 the map has no value anywhere: det(I - eps f'(x)) is identically 0"),
+        (("x", "-y"), "1", NOWHERE),
         (("x", "-y"), "1/2", ""),
-        (
-            ("x^2 - 1/4", "x*y + y^2"),
-            "1",
-            "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all images",
-        ),
+        (("x^2 - 1/4", "x*y + y^2"), "1", SINGULAR),
         (("x^2 - 1/4", "x*y + y^2"), "1/2", ""),
     ],
 )
@@ -368,12 +347,3 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     both = replace(integrable, degrees=found.degrees)
     assert both.conclusion.kind == "undecided"
     assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence
-
-
-def test_a_hamiltonian_and_a_member_of_the_family_are_not_read_either():
-    for name in ("weierstrass", "harmonic"):
-        file = load(name)
-        one, other = map(results, (analysis_of(name), analyze(SystemFile.from_system(file.system, file.name))))
-        assert one.pop("parameters") == {key: str(value) for key, value in file.parameters.items()}
-        assert other.pop("parameters") == {}
-        assert one == other

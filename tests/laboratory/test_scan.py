@@ -11,10 +11,9 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.scan.growth import _goes_on
 from kahanmaps.laboratory.scan.members import Scanned
 from kahanmaps.laboratory.scan.result import Component
-from kahanmaps.laboratory.scan.scan import _confirmed, scan
+from kahanmaps.laboratory.scan.scan import _confirmed, _goes_on, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
 from kahanmaps.maps.residues import families
 
@@ -64,28 +63,18 @@ def test_everything_is_confirmed_and_nothing_is_left(three_lines):
     assert "up to 31" in three_lines.coverage
 
 
-def three_lines_scanned():
+def test_a_wrong_condition_is_not_confirmed(three_lines):
     file = parse_system(THREE_LINES)
-    return Scanned(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0)
-
-
-def test_a_wrong_condition_is_not_confirmed():
-    family = three_lines_scanned()
+    family = Scanned(file, ("g1", "g2"), map_with_symbols(file, ["g1", "g2"]), None, 0)
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))
     found = [_confirmed(one, family, [], random.Random(1)) for one in (good, wrong)]
     assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
-
-
-def test_one_member_speaks_for_others_only_as_long_as_their_degrees_agree(three_lines):
+    # One member speaks for others only as long as their degrees agree.
     points = {one.text: one for one in three_lines.components}
-    family = three_lines_scanned()
     known = points["(2, 3)"].growth
-    assert _goes_on(points["(3, 2)"], known, family)
-    # as if the first degrees of two components were the same and the further ones were not
-    assert not _goes_on(points["(1, 2)"], known, family)
-    assert not _goes_on(points["(3, 2)"], None, family)
+    assert [_goes_on(points[at], known, family) for at in ("(3, 2)", "(1, 2)")] == [True, False]
 
 
 def test_a_curve_in_a_plane_of_parameters_is_found_beside_the_surface_through_it():
@@ -132,6 +121,7 @@ def planar(first, second, *names):
 @pytest.mark.parametrize(
     ("second", "names", "text", "dimension"),
     [
+        ("x^2 + (a^2 - 2)*y", "a", "a^2 - 2 = 0", 0),
         ("x^2 + b*x + (a^2 - 2)*y", "ab", "a^2 - 2 = 0", 1),  # two lines modulo the primes at which 2 is a square
         ("x^2 + (a^3 - 2)*y + (b - a^2)*x*y", "ab", "a^3 - 2 = 0, a^2 - b = 0", 0),
     ],
@@ -140,19 +130,6 @@ def test_what_splits_over_a_number_field_is_found_as_one(second, names, text, di
     found = scan(planar("y", second, *names), [*names], terms=4)
     one = next(one for one in found.components if one.text == text)
     assert (one.dimension, one.is_confirmed, one.growth.growth) == (dimension, True, Growth.QUADRATIC)
-    assert not any(found.left)
-
-
-def test_points_over_quadratic_fields_have_their_minimal_polynomial():
-    family = planar("x*(x + 2*y)", "-y*(a^2*x + (a^2 - 1)*y)", "a")
-    # 2 and 3 are squares modulo all four primes, -1 modulo three of them
-    found = scan(family, ["a"], primes=(71, 73, 97, 193), terms=4)
-    quadratic = {c.text: c for c in found.components if c.growth is not None and c.growth.growth is Growth.QUADRATIC}
-    assert set(quadratic) == {"a^2 - 2 = 0", "a^2 - 3 = 0"}  # g = a^2 - 1 is 1 and 2
-    assert all(one.is_confirmed and one.values is None for one in quadratic.values())
-    assert quadratic["a^2 - 2 = 0"].growth.degrees[:8] == (1, 2, 4, 8, 13, 20, 28, 38)
-    assert "where\ta^2 - 2 = 0" in found.text.splitlines()
-    assert "a^2 + 1 = 0" in {one.text for one in found.components}
     assert not any(found.left)
 
 

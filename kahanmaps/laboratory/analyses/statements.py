@@ -14,7 +14,7 @@ from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, under_map
 from kahanmaps.laboratory.singular.outcomes import Outcome
-from kahanmaps.laboratory.symmetry.commuting import CommutingFamily, CommutingField
+from kahanmaps.laboratory.symmetry.commuting import CommutingField
 from kahanmaps.laboratory.symmetry.symmetries import MATRICES
 
 _POINTS = 8  # as many fixed points as three quadratic equations have
@@ -314,21 +314,18 @@ def of_commuting_systems(found: Findings) -> list[Statement]:
     for k, family in enumerate(search.families):
         opposite = family.base.system.scaled(-1), [g.system for g in family.directions]
         if opposite not in [(other.base.system, [g.system for g in other.directions]) for other in search.families[:k]]:
-            lines.append(Statement(Known(family.finding.verdict), _family_text(family)))
+            # All g of it, or how many parameters it has where that is long.
+            base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
+            moved = [f"t{j}*({', '.join(g.rhs)})" for j, g in enumerate(family.directions, 1)]
+            which = "g and -g, g" if base else "all g"  # the negatives of these are among them
+            letters = ", ".join(f"t{j}" for j in range(1, len(moved) + 1))
+            text = f"commutes with the Kahan maps of {which} = {' + '.join([*base, *moved])}, for all {letters}"
+            if len(text) > _LONG:
+                number = counted(len(moved), "parameter")
+                text = f"commutes with a linear family of {number}, which find-commuting writes out"
+            lines.append(Statement(Known(family.finding.verdict), text))
     lines += [Statement(Known.NOTE, text) for text in search.irrational]
     lines += [Statement(Known.UNDECIDED, text) for text in search.undecided]
     if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):
         lines.append(Statement(Known.PROVED, f"among the {search.kind_text} only 0, f and -f commute with f"))
     return lines
-
-
-def _family_text(family: CommutingFamily) -> str:
-    """All g of a linear family, or how many parameters it has where that is long."""
-    base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
-    moved = [f"t{k}*({', '.join(g.rhs)})" for k, g in enumerate(family.directions, 1)]
-    which = "g and -g, g" if base else "all g"  # the negatives of these are among them
-    letters = ", ".join(f"t{k}" for k in range(1, len(moved) + 1))
-    text = f"commutes with the Kahan maps of {which} = {' + '.join([*base, *moved])}, for all {letters}"
-    if len(text) > _LONG:
-        return f"commutes with a linear family of {counted(len(moved), 'parameter')}, which find-commuting writes out"
-    return text

@@ -23,14 +23,19 @@ from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, counted
+from kahanmaps.invariants.growth import OF_DEGREES, Growth
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.growth.curves import Ended
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.scan.conditions import beside, conditions
-from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
 from kahanmaps.laboratory.scan.members import Scanned, point_on
-from kahanmaps.laboratory.scan.result import Component, Scan
-from kahanmaps.laboratory.scan.sweep import Choice, Sweep, TimeOver, sweep
+from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
+from kahanmaps.laboratory.scan.sweep import Choice, Degrees, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.processes import processors
+
+Progress = Callable[[str], None]
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
@@ -62,6 +67,10 @@ _TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
 _MEMBERS = 3  # that confirm a component
 _TRIES = 20  # for a rational member
+_SECONDS, _ATTEMPTS = 10.0, 2  # for the growth at a member
+_TERMS, _LARGE = 26, 1000  # where no rational member is known: so many degrees, as far as they are not above this
+_SOME = 100  # the degree up to which they are compared, at least
+_MEASURED_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
 def scan(
@@ -164,10 +173,10 @@ def scan(
             run.omit(1, f"the confirmation of {counted(len(known) - k, 'component')}")
             break
     check = run.until(1 if analysis is None else _UNTIL[3])
-    known, missed = with_growth(known, family, run.began + seconds, check, run.tell)
+    known, missed = _with_growth(known, family, run.began + seconds, check, run.tell)
     run.omit(missed, f"the growth on {missed} components")
     if analysis is not None:
-        known, missed = with_verdicts(known, family, analysis, run.began + seconds, run.until(1), run.tell)
+        known, missed = _with_verdicts(known, family, analysis, run.began + seconds, run.until(1), run.tell)
         run.omit(missed, f"{missed} verdicts")
     return run.result(known, tuple(symmetries(run.sweeps, known, names)))
 
@@ -263,6 +272,103 @@ class _Sweeping:
         asked = (family.file, family.names, family.eps, family.seed, sweeps[0].generic if sweeps else ())
         ended = "interrupted" if self._interrupted else "time" if self.omitted else "complete"
         return Scan(*asked, tuple(known), sweeps, left, symmetric, ended, tuple(self.omitted))
+
+
+def _with_growth(
+    components: list[Component], family: Scanned, deadline: float, check: Callable[[], None], progress: Progress
+) -> tuple[list[Component], int]:
+    """The components with the growth at a rational member, those with the slowest first; for how many it is missing.
+
+    Where it is bounded or exponential one member of each class is enough, if further degrees of the others are its own.
+    """
+    found = sorted(components, key=lambda one: one.degrees[::-1])
+    enough: dict[Degrees, DegreeGrowth] = {}
+    missed = 0
+    for k, one in enumerate(found):
+        if one.degrees[-1] < 0:
+            continue
+        try:
+            progress(f"scan: growth on component {k + 1} of {len(components)}")
+            check()
+            if _goes_on(one, enough.get(one.degrees), family):
+                continue
+            left = max(0.1, deadline - time.monotonic())
+            known = None
+            if one.values is not None:
+                member, step = family.member(one.values)
+                given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
+                for attempt in range(_ATTEMPTS):  # singularities are followed at a random eps, which may be special
+                    known = degree_growth(member.map, step, seed=family.seed + attempt, **given)
+                    if known.growth is not Growth.UNKNOWN:
+                        break
+            # there may be a special member only
+            if known is None or not _agree(known.degrees, (1, *one.degrees)):
+                known = _beyond(one, family)
+        except TimeOver:
+            missed += 1
+            continue
+        found[k] = replace(one, growth=known)
+        if known is not None and known.growth not in _MEASURED_EACH:
+            enough[one.degrees] = known
+    kinds = {one.degrees: one.growth.growth for one in reversed(found) if one.growth is not None}
+
+    def order(one: Component) -> tuple[int, Degrees, str]:
+        return OF_DEGREES.index(kinds.get(one.degrees, Growth.UNKNOWN)), one.degrees[::-1], one.text
+
+    return sorted(found, key=order), missed
+
+
+def _beyond(one: Component, family: Scanned, most: int = _LARGE) -> DegreeGrowth | None:
+    """The growth that more degrees fit, measured modulo a prime; None where there is no member."""
+    found = family.degrees_on(one.equations, [one.degrees[-1]] * _TERMS, random.Random(family.seed), most)
+    if found is None:
+        return None
+    return DegreeGrowth((1, *found), family.eps, Ended.TERMS, f"{len(found)} iterates measured", family.seed, (), ())
+
+
+def _goes_on(one: Component, known: DegreeGrowth | None, family: Scanned) -> bool:
+    """Whether degrees go on as they do at a member of another component with the same first ones."""
+    if known is None:
+        return False
+    found = _beyond(one, family, max(_SOME, 2 * one.degrees[-1]))
+    return found is not None and _agree(found.degrees, known.degrees)
+
+
+def _agree(some: Degrees, others: Degrees) -> bool:
+    return all(a == b for a, b in zip(some, others, strict=False))
+
+
+def _with_verdicts(
+    components: list[Component],
+    family: Scanned,
+    seconds: float,
+    deadline: float,
+    check: Callable[[], None],
+    progress: Progress,
+) -> tuple[list[Component], int]:
+    """The components with what an analysis says of a member, where degrees do not grow exponentially; how many lack it.
+
+    Each has so many seconds, as long as there is time.
+    """
+    found: list[Component] = []
+    points: set[Degrees] = set()
+    missed = 0
+    for one in components:
+        asked = one.values is not None and one.growth is not None and one.growth.growth is not Growth.EXPONENTIAL
+        if asked and one.values is not None and one.degrees not in points:
+            member, step = family.member(one.values)
+            try:
+                progress(f"scan: analyzes a member where {one.text}")
+                check()
+                left = max(0.1, deadline - time.monotonic())
+                told = analyze(member, eps=step, seconds=min(seconds, left), seed=family.seed)
+                one = replace(one, verdict=told.conclusion)
+            except TimeOver:
+                missed += 1
+            if one.dimension == 0:
+                points.add(one.degrees)
+        found.append(one)
+    return found, missed
 
 
 def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:

@@ -123,19 +123,10 @@ class _Forms:
     infinity: Any
 
     @property
-    def all(self) -> tuple[Any, ...]:
-        """The forms in the order of columns; one may stand there twice."""
-        return (*self.poles, *self.images, self.infinity)
-
-    @property
-    def placed(self) -> list[tuple[Any, bool]]:
-        """The same, each with whether it counts at the image."""
-        return [(form, k in self.at_images) for k, form in enumerate(self.all)]
-
-    @property
-    def at_images(self) -> range:
-        """The columns of those that count at the image."""
-        return range(len(self.poles), len(self.poles) + len(self.images))
+    def all(self) -> list[tuple[Any, bool]]:
+        """The forms in the order of columns, each with whether it counts at the image; one may stand there twice."""
+        at_points = [(form, False) for form in self.poles]
+        return [*at_points, *((form, True) for form in self.images), (self.infinity, False)]
 
 
 @dataclass(frozen=True)
@@ -210,7 +201,7 @@ class _Curve:
 
     def components(self, curve: Sequence[nmod_poly]) -> list[Component]:
         """Those of the forms on a surface through any curve."""
-        return components(self.equation, self.forms.placed, curve, self.across)
+        return components(self.equation, self.forms.all, curve, self.across)
 
     def through(self, one: Component, curve: Sequence[nmod_poly]) -> _Curve:
         """The same with a point of a component on the surface through a curve. Raises OrdersUnknown without any."""
@@ -314,7 +305,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
         field = GF(random_prime(rng, _BITS))
         try:
             over = map_.at(eps, field)
-            functions = tuple(form_order(form, field) for form in forms.all)
+            functions = tuple(form_order(form, field) for form, _ in forms.all)
         except BadPrime:
             continue
         degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits, rng)
@@ -339,7 +330,7 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
     """The contracted hypersurfaces with their degrees and orders. Raises OrdersUnknown."""
     keys = list(kinds)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
-    total = [int(form.total_degree()) * (degree if k in forms.at_images else 1) for k, form in enumerate(forms.all)]
+    total = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
     column, sizes = fmpq_mat(len(total), 1, total), fmpq_mat(len(keys), 1)
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {key: [] for key in keys}
     if exponents.rank() == len(keys):
