@@ -230,10 +230,12 @@ def _second_process(run: Run, parts: Sequence[Part]) -> Iterator[Connection]:
                 sender.send((result, reason))
 
     process = get_context("fork").Process(target=work, daemon=True)
-    process.start()
+    with suppress(OSError):  # no memory for one more process, or too many: then all is done here
+        process.start()
     try:
         sender.close()  # so that the end of the process is the end of the pipe
         yield receiver
     finally:
-        process.kill()
-        process.join()
+        if process.pid is not None:
+            process.kill()
+            process.join()

@@ -56,6 +56,14 @@ def test_what_a_killed_process_did_not_do_is_done_here():
     assert found.skipped == []
 
 
+def test_where_no_process_can_be_made_all_is_done_here(monkeypatch):
+    def refused():
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr("os.fork", refused)
+    assert analyze(load("harmonic"), parts=[apart("first")], processes=2)["first"] == HERE
+
+
 def test_a_part_that_gives_up_elsewhere_is_told_and_a_mistake_is_not_swallowed():
     def gives_up(*_, **__):
         raise InputError("too hard")
