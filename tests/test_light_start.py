@@ -11,7 +11,7 @@ from functools import cache
 
 from kahanmaps.experiments.results.store import Store
 
-HEAVY = {"numpy", "flint", "rich", "numba", "matplotlib", "distributed"}
+HEAVY = {"numpy", "flint", "rich", "numba", "llvmlite", "matplotlib", "distributed"}
 
 COMMAND = """
 from kahanmaps_cli.main import main

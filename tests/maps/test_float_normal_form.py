@@ -5,13 +5,12 @@ which kernel, how many threads, how many orbits together, in what portions and w
 the last bit; and each way in which an orbit can end has its status and its step, which the other orbits do not notice.
 """
 
-import random
 from itertools import combinations
 
 import numpy as np
 import pytest
 from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly
-from helpers import HENON_HEILES, quick
+from helpers import HENON_HEILES
 
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
@@ -19,8 +18,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
-from kahanmaps.maps.floats import steps as float_steps
-from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, _factors, _sine, _Unclear, planar_blocks
+from kahanmaps.maps.floats.blocks import _doubles, _factors, _sine, _Unclear, planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
@@ -38,6 +36,8 @@ MEMBERS = {
     "irrational roots": draw_generic(4, seed=3),
 }
 FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
+
+LINES, CUBES = (0, 1, 1, 0), (1, 0, 0, 1)  # U V (U + V) and (U^3 + V^3)/3
 
 over_members = pytest.mark.parametrize("name", MEMBERS)
 KERNELS = ["numpy", pytest.param("numba", marks=pytest.mark.skipif(not has_numba(), reason="numba is not installed"))]
@@ -126,13 +126,13 @@ def test_backward_undoes_forward(name):
 
 def test_a_real_root_gives_one_real_block_and_a_pair_one_complex_block():
     blocks = planar_blocks(FORMS["real and complex"], EPS)
-    assert (blocks.reals, len(blocks.kinds), blocks.rows) == (1, 2, 6)
+    assert (blocks.reals, len(blocks.kappa), blocks.rows) == (1, 2, 6)
     assert blocks.labels == ("1.25992", "-0.629961+-1.09112i")
 
 
 def test_nearly_all_blocks_are_canonical():
-    kinds = np.concatenate([planar_blocks(form, EPS).kinds for form in FORMS.values()])
-    assert set(kinds.tolist()) == {LINES, CUBES}
+    rows = np.concatenate([planar_blocks(form, EPS).coefficients for form in FORMS.values()])
+    assert set(map(tuple, rows.tolist())) == {LINES, CUBES}
 
 
 @over_kernels
@@ -140,7 +140,7 @@ def test_repeated_factors_of_h_have_blocks_too(kernel):
     # x1' = x1^2, x3' = -2 x1 x3 at the root -1; x2' = 0, x4' = -3 x2^2 at 1
     member = member_of_repeated_factor()
     form = normal_form(member)
-    assert planar_blocks(form, EPS).kinds.tolist() == [GENERAL, GENERAL]
+    assert len({LINES, CUBES, *map(tuple, planar_blocks(form, EPS).coefficients.tolist())}) == 4
     system, start = member.chosen.system, ["1/3", "1/2", "1/5", "-1/7"]
     exact = [point.x for point in Orbit(KahanMap(system, EPS), start, 12)]
     orbit = FloatOrbit(system, EPS, start, 12, form=form, kernel=kernel)
@@ -188,7 +188,8 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     pytest.importorskip("numba")
     blocks = planar_blocks(FORMS[name], EPS)
     starts = starts_of(blocks.rows, 300) / 5
-    for r, kind in enumerate(blocks.kinds):
+    kinds = list(map(tuple, blocks.coefficients.tolist()))
+    for r, kind in enumerate(kinds):
         if kind == LINES:
             at, size = (2 * r, 2) if r < blocks.reals else (4 * r - 2 * blocks.reals, 4)
             rows = blocks.into @ starts[20 + r]
@@ -198,7 +199,7 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     for it in (one, other):
         it.advance(40)
     same(one, other)
-    assert (one.near_singular[20 : 20 + len(blocks.kinds)] > 0).tolist() == [kind == LINES for kind in blocks.kinds]
+    assert (one.near_singular[20 : 20 + len(kinds)] > 0).tolist() == [kind == LINES for kind in kinds]
 
 
 def the_same_in_any_company(member, form, starts, steps, some, kernel) -> FloatEnsemble:
@@ -233,7 +234,7 @@ def test_orbits_of_complex_general_blocks_do_not_depend_on_their_company(kernel)
     member = complex_member_of_repeated_factor()
     form = normal_form(member)
     blocks = planar_blocks(form, EPS)
-    assert (blocks.kinds.tolist(), blocks.reals) == ([GENERAL], 0)
+    assert (len(blocks.kappa), blocks.reals) == (1, 0)
     starts = starts_of(4, 300)
     starts[7] *= 1e200
     exact = Orbit(KahanMap(member.chosen.system, EPS), [fmpq(k, 9) for k in (1, -2, 3, 4)], 5)
@@ -330,7 +331,7 @@ def test_block_integrals_do_not_drift(name):
     starts = starts_of(MEMBERS[name].chosen.system.dim, 20) / 40
     orbits = ensemble(name, starts, kernel="numpy", sampled=20)
     orbits.advance(400)
-    assert len(orbits.drift) == len(planar_blocks(FORMS[name], EPS).kinds)
+    assert len(orbits.drift) == len(planar_blocks(FORMS[name], EPS).kappa)
     for drift in orbits.drift:
         # 400 steps of some roundings each are 1e-13. Where an orbit passes near infinity, the numerator and the
         # denominator of the integral are larger than their quotient by the cube and the square of the distance.
@@ -374,86 +375,6 @@ def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
 def test_entries_far_below_the_largest_of_a_row_are_zero():
     row = [arb(1), arb(2) ** -121, arb(2) ** -120, arb(0), arb(-1)]
     assert _doubles(row) == [1.0, 0.0, 2.0**-120, 0.0, -1.0]
-
-
-# The operations, against the formulas written with complex numbers.
-
-BLOCKS = {
-    "lines": (0, 1, 1, 0),
-    "cubes": (1, 0, 0, 1),
-    "general": (0.7, -1.3, 0.4, 2.1),
-    "complex": (0.7 - 0.2j, -1.3 + 0.9j, 0.4 + 1.7j, 2.1 - 0.6j),
-}
-
-
-def plane(abcd, U, V):
-    """The image, w = (1 + B)(1 - B) + A C, A C, and h = (A U + 2 B V) U + C V^2."""
-    a, b, c, d = abcd
-    A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
-    w = (1 + B) * (1 - B) + A * C
-    return ((1 + B) * U + C * V) / w, ((1 - B) * V - A * U) / w, w, A * C, (A * U + 2 * B * V) * U + C * V * V
-
-
-def parts_of(*numbers):
-    return [part for number in map(complex, numbers) for part in (number.real, number.imag)]
-
-
-@pytest.mark.parametrize("name", ["lines", "cubes", "general"])
-def test_a_real_step_is_that_of_the_formulas(name):
-    rng = random.Random(3)
-    for _ in range(20):
-        U, V = rng.uniform(-2, 2), rng.uniform(-2, 2)
-        *step, h = plane(BLOCKS[name], U, V)
-        k = parts_of(*BLOCKS[name])
-        assert getattr(float_steps, f"real_{name}")(U, V, k) == pytest.approx(step, rel=1e-9)
-        assert float_steps.real_integral(U, V, k, 0.3) == pytest.approx(0.3 * h / step[2], rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["lines", "general", "complex"])
-def test_a_complex_step_is_that_of_the_formulas(name):
-    rng = random.Random(4)
-    function = getattr(float_steps, f"complex_{name if name != 'complex' else 'general'}")
-    for _ in range(20):
-        U, V, kappa = (complex(rng.uniform(-2, 2), rng.uniform(-2, 2)) for _ in range(3))
-        x, y, w, g, h = plane(BLOCKS[name], U, V)
-        k = parts_of(*BLOCKS[name])
-        found = function(*parts_of(U, V), k)
-        assert found == pytest.approx([*parts_of(x, y), abs(w) ** 2, abs(g) ** 2], rel=1e-9)
-        assert float_steps.complex_integral(*parts_of(U, V), k, *parts_of(kappa)) == pytest.approx(
-            parts_of(kappa * h / w), rel=1e-9
-        )
-
-
-KINDS = (("lines", 2), ("lines", 4), ("cubes", 2))
-RUNS = [("general", 2, 1), ("general", 4, 1), *((*kind, count) for kind in KINDS for count in (1, 2, 5))]
-
-
-@pytest.mark.parametrize("width", [1, 3, 300])
-@pytest.mark.parametrize(("name", "parts", "count"), RUNS)
-@pytest.mark.parametrize("compiled", quick([False, True], [False]), ids=["as Python", "compiled"])
-def test_compiled_loops_over_the_blocks_of_a_run_do_what_the_formulas_do(
-    name, parts, count, width, compiled, monkeypatch
-):
-    pytest.importorskip("numba")
-    from kahanmaps.maps.floats import numba_kernel
-
-    if not compiled:  # the loops as they are written; only the formulas in them are compiled, which takes no seconds
-        loops = {own: loop for own, loop in vars(numba_kernel).items() if hasattr(loop, "py_func")}
-        for own, loop in loops.items():
-            monkeypatch.setattr(numba_kernel, own, loop.py_func)
-    kind = {"lines": LINES, "cubes": CUBES, "general": GENERAL}[name]
-    run = float_steps.Run(kind, parts, 1, count, 0)
-    k = parts_of(*BLOCKS[name])
-    state = np.random.default_rng(3).uniform(-0.3, 0.3, (2 + parts * count, width))
-    expected, usual = state.copy(), np.ones(count * width)
-    for _ in range(3):
-        *image, _, _ = float_steps.FORMULAS[kind, parts](*run.of(expected.copy()), k)
-        for rows, after in zip(run.of(expected), image, strict=True):
-            rows[:] = after
-    flat = state.ravel().copy()
-    numba_kernel._sweep(flat, width, np.array(run), np.array([k]), 3, usual)
-    assert np.array_equal(flat.reshape(state.shape), expected)
-    assert usual.all()
 
 
 LINEAR_FORMS = [(1, 0), (0, 1), (1, -1), (1, 1), (3, 2)]

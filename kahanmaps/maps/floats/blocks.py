@@ -12,9 +12,9 @@ A linear change of U and V (h is divided by its determinant) makes h one of
     cubes    (U^3 + V^3)/3                      (1, 0, 0, 1)    one real linear factor
     general                      whatever they are              a repeated factor, h = 0, or a frame too oblique
 
-so that nearly every map has no coefficient left, and costs a kernel five or six multiplications and a division. The
-two factors that serve as U and V are those whose forms in x are the least oblique. The block's integral
-h_r/(1 + eps^2 D) is kappa (A U^2 + 2 B U V + C V^2)/w.
+so that nearly every map has no coefficient left, and costs five or six multiplications and a division. The two factors
+that serve as U and V are those whose forms in x are the least oblique. The block's integral h_r/(1 + eps^2 D) is
+kappa (A U^2 + 2 B U V + C V^2)/w.
 
 A real root gives one real block (two rows: U, V), a pair of complex roots one complex block (four rows: Re U, Im U,
 Re V, Im V). Roots, coefficients and the linear maps between x and the rows are found in balls and rounded once, so each
@@ -40,8 +40,7 @@ from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
-LINES, CUBES, GENERAL = 0, 1, 2  # kinds of block
-
+LINES, CUBES, GENERAL = "lines", "cubes", "general"
 _CANONICAL = {LINES: (0, 1, 1, 0), CUBES: (1, 0, 0, 1)}
 _ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # one of them makes u^3 or u^2 appear in a form that is not 0
 _OBLIQUE = 0.02  # of the sine between the forms U and V: below, digits are lost, so no canonical form
@@ -57,21 +56,20 @@ class PlanarBlocks:
     """The planar maps of a normal form for one eps, in doubles.
 
     Real blocks, `reals` of them, come first, by increasing root; then one block for each root with positive imaginary
-    part. `coefficients` has a row (Re a, Im a, Re b, Im b, ...) for each, `kinds` says LINES, CUBES or GENERAL, `kappa`
-    is (Re, Im). `into` is the 2m x 2m matrix that takes x to the rows, `out` the one that takes them back.
+    part. `coefficients` has a row (a, b, c, d) of complex numbers for each. `into` is the 2m x 2m matrix that takes x
+    to the rows, `out` the one that takes them back.
 
     >>> from flint import fmpq_poly
     >>> from kahanmaps.family.draw import draw_with_chi
     >>> from kahanmaps.family.planar import normal_form
     >>> blocks = planar_blocks(normal_form(draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7)), "1/10")
-    >>> blocks.reals, blocks.kinds.tolist(), blocks.labels
-    (1, [1, 0], ('1.25992', '-0.629961+-1.09112i'))
+    >>> blocks.reals, blocks.coefficients.real.tolist(), blocks.labels
+    (1, [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]], ('1.25992', '-0.629961+-1.09112i'))
     """
 
     reals: int
-    kinds: NDArray[np.int64]
-    coefficients: FloatArray
-    kappa: FloatArray
+    coefficients: NDArray[np.complex128]
+    kappa: NDArray[np.complex128]
     into: FloatArray
     out: FloatArray
     roots: tuple[complex, ...]
@@ -89,6 +87,29 @@ class PlanarBlocks:
             real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # a ball around 0, rounded
             found.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
         return tuple(found)
+
+    def integrals(self, z: FloatArray) -> NDArray[np.complex128]:
+        """The integrals h/(1 + eps^2 D) at the states z (rows, ...): an array (blocks, ...)."""
+        found = np.empty((len(self.kappa), *z.shape[1:]), dtype=np.complex128)
+        with np.errstate(all="ignore"):
+            for r, (coefficients, kappa) in enumerate(zip(self.coefficients, self.kappa, strict=True)):
+                if r < self.reals:
+                    U, V = z[2 * r : 2 * r + 2]
+                    (a, b, c, d), kappa = coefficients.real, kappa.real
+                else:
+                    at = 4 * r - 2 * self.reals
+                    U, V = z[at] + 1j * z[at + 1], z[at + 2] + 1j * z[at + 3]
+                    a, b, c, d = coefficients
+                A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
+                found[r] = kappa * (((A * U + 2.0 * B * V) * U + C * V * V) / ((1.0 + B) * (1.0 - B) + A * C))
+        return found
+
+    def distances(self, z: FloatArray, base: NDArray[np.complex128]) -> FloatArray:
+        """How far the block integrals at the states z (rows, ...) are from `base`: an array (blocks, ...)."""
+        with np.errstate(all="ignore"):
+            distance: FloatArray = np.abs(self.integrals(z) - base)
+        distance[np.isnan(distance)] = np.inf
+        return distance
 
 
 def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
@@ -140,35 +161,33 @@ class _Blocks:
 
     def rounded(self) -> PlanarBlocks:
         """Each number as a double. Raises _Unclear where the precision is too low for that."""
-        kinds, coefficients, kappas, into, out = [], [], [], [], []
+        coefficients, kappas = [], []
+        into: list[list[float]] = []
+        out: list[list[float]] = []
         for root in self.roots:
-            kind, numbers, kappa, into_uv, out_uv = self._block(root)
-            kinds.append(kind)
+            numbers, kappa, into_uv, out_uv = self._block(root)
             real = root.imag.is_zero()
-            coefficients.append(_doubles([part for entry in numbers for part in (entry.real, entry.imag)]))
-            kappas.append(_doubles([kappa.real, kappa.imag]))
+            parts = _doubles([part for entry in numbers for part in (entry.real, entry.imag)])
+            coefficients.append([complex(x, y) for x, y in zip(parts[::2], parts[1::2], strict=True)])
+            kappas.append(complex(*_doubles([kappa.real, kappa.imag])))
             for row, column in zip(into_uv, out_uv, strict=True):
                 into.append(_doubles([entry.real for entry in row]))
                 out.append(_doubles([entry.real if real else 2 * entry.real for entry in column]))
                 if not real:
                     into.append(_doubles([entry.imag for entry in row]))
                     out.append(_doubles([-2 * entry.imag for entry in column]))
-        reals = sum(1 for root in self.roots if root.imag.is_zero())
-        tables = [np.array(table, dtype=np.float64) for table in (coefficients, kappas, into, out)]
+        tables = [np.array(table) for table in (coefficients, kappas, into, out)]
         if not all(np.isfinite(table).all() for table in tables):
             raise InputError("the normal form leaves the range of machine floats: use exact arithmetic")
         return PlanarBlocks(
-            reals,
-            np.array(kinds, dtype=np.int64),
-            tables[0].reshape(-1, 8),
-            tables[1].reshape(-1, 2),
-            tables[2],
+            sum(1 for root in self.roots if root.imag.is_zero()),
+            *tables[:3],
             np.ascontiguousarray(tables[3].T),
             tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots),
         )
 
-    def _block(self, root: acb) -> tuple[int, list[acb], acb, list[list[acb]], list[list[acb]]]:
-        """Kind; a, b, c, d; kappa; the rows of U and V over x; the columns of x over U and V."""
+    def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
+        """a, b, c, d; kappa; the rows of U and V over x; the columns of x over U and V."""
         cubic = [_value(coefficient, root) for coefficient in self.form.coefficients]
         rows = [[_value(element[k], root) for element in self.inverse] for k in (0, 1)]
         kind, frame = self._frame(root, cubic, rows)
@@ -182,7 +201,7 @@ class _Blocks:
         else:
             scale_U, scale_V = acb(1), acb(1)
         numbers = [acb(entry) for entry in _CANONICAL.get(kind, ())] or [3 * a, b, c, 3 * d]
-        if kind == GENERAL and self._is_zero(root):
+        if kind == GENERAL and all(self._vanishes(coefficient, root) for coefficient in self.form.coefficients):
             numbers = [acb(0)] * 4
         frame = ([entry * scale_U for entry in frame[0]], [entry * scale_V for entry in frame[1]])
         kappa = 1 / (24 * self.eps**3 * det * scale_U * scale_V)
@@ -194,9 +213,9 @@ class _Blocks:
         x_v = [_dot(row[m:], lagrange) for row in S]
         back = _inverse(frame)
         out = [[(x * back[0][k] + y * back[1][k]) / step for x, y in zip(x_u, x_v, strict=True)] for k in (0, 1)]
-        return kind, numbers, kappa, into, out
+        return numbers, kappa, into, out
 
-    def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[int, Frame]:
+    def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[str, Frame]:
         """The kind of h and two linear forms in u and v, still without scale, that make it so."""
         if self._vanishes(self.discriminant, root):
             return GENERAL, self._upright(rows)
@@ -219,9 +238,6 @@ class _Blocks:
         rest = [y - slant * x for x, y in zip(*rows, strict=True)]
         height = acb(_inner(rest, rest).real.sqrt())
         return [one / length, zero], [-slant / height, one / height]
-
-    def _is_zero(self, root: acb) -> bool:
-        return all(self._vanishes(coefficient, root) for coefficient in self.form.coefficients)
 
     def _vanishes(self, element: fmpq_poly, root: acb) -> bool:
         """Whether an element of K is 0 at the root, exactly."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.errors import InputError
 
@@ -55,3 +58,46 @@ def exact(value: float) -> fmpq:
     """The rational number that a finite double is."""
     numerator, denominator = value.as_integer_ratio()
     return fmpq(numerator, denominator)
+
+
+class _Floats:
+    """Machine numbers, as far as evaluating a rational function, and printing a point, need a field."""
+
+    zero = 0.0
+    one = 1.0
+
+    @staticmethod
+    def convert(value: Any) -> float:
+        return to_float(rational(value))
+
+    @staticmethod
+    def value(polynomial: Any, point: Sequence[float]) -> None:
+        """None: there is no other way than term by term."""
+
+    @staticmethod
+    def is_zero(value: float) -> bool:
+        return value == 0.0
+
+    @staticmethod
+    def format(value: float) -> str:
+        return repr(value)
+
+    @staticmethod
+    def working() -> AbstractContextManager[None]:
+        return nullcontext()
+
+
+FLOATS: Any = _Floats()
+
+
+def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
+    """The rational function in double precision; None where the denominator is 0 or the value is no finite number."""
+
+    def value(point: Sequence[float]) -> float | None:
+        try:
+            found: float | None = function.value(_Floats, point)
+        except (OverflowError, ZeroDivisionError):
+            return None
+        return found if found is not None and isfinite(found) else None
+
+    return value

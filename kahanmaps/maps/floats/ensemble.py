@@ -1,34 +1,34 @@
-"""Many float orbits at once, and the choice of the kernel that computes them.
+"""Many float orbits at once.
 
-Two methods: "normal form" where a NormalForm of the system is given (blocks.py), "generic" elimination for any
-quadratic system. Two kernels: numpy, always there, and numba (the extra `fast`). Method, kernel and start settle the
-numbers; threads, and the way steps are portioned, only settle how fast they come (steps.py).
+Two methods: "normal form" where a NormalForm of the system is given (blocks.py), "generic" for any map; steps.py says
+what a step is. Two kernels: numpy, always there, and "numba", machine code (the extra `fast`; machine_code.py). Method,
+kernel and start settle the numbers; threads, and the way steps are portioned, only settle how fast they come.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.floats.advance import NOTHING, Engine, Kept, Word
-from kahanmaps.maps.floats.blocks import planar_blocks, require_same_system
+from kahanmaps.maps.floats.blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.steps import (
     RUNNING,
     SINGULAR,
     STATUS,
-    GenericEquation,
     Lanes,
-    PlanarRows,
-    generic_equation,
+    Table,
+    advance_by_numpy,
+    map_step,
+    planar_step,
 )
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
@@ -38,6 +38,9 @@ from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SAMPLED = 1000  # steps between samples of the block integrals
+_ALONE = 4  # orbits that machine code takes one by one
+_SHARES = 8  # of the orbits for each thread: other programs run too
+_NUMBERS = 1_000_000  # of a portion that are recorded
 
 Function = Callable[[Sequence[float]], float | None]
 
@@ -59,106 +62,6 @@ class Drift:
     def of(self, orbit: int) -> Drift:
         """The same for one orbit, each entry a number."""
         return Drift(self.name, self.initial[orbit], self.largest[orbit], self.last[orbit])
-
-
-class Stepping:
-    """A map, eps and a method, with the kernel that advances lanes: what orbits and ensembles are made of.
-
-    A system stands for its Kahan map.
-
-    `kernel` is "numpy", "numba" or None: numba if it is installed.
-    """
-
-    def __init__(
-        self,
-        system: QuadraticSystem | BirationalMap,
-        eps: fmpq,
-        *,
-        backward: bool,
-        form: NormalForm | None,
-        kernel: str | None,
-        threads: int | None = 1,
-    ) -> None:
-        if to_float(eps) == 0.0:
-            raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        compiled = choose_kernel(kernel, long=True) == "numba"
-        if threads is not None and threads < 1:
-            raise InputError(f"found {threads} threads, expected at least 1")
-        map_ = as_map(system).rounded
-        map_over = map_.at(eps)
-        self._map = map_over.inverse if backward else map_over
-        self.matrix_name = map_over.denominator_name(backward)
-        self.dim = system.dim
-        self.rows: PlanarRows | None = None
-        if form is not None:
-            require_same_system(form, map_)
-            self.rows = PlanarRows(planar_blocks(form, -eps if backward else eps))
-        self.compiled = compiled
-        self.threads = (threads or processors()) if compiled else 1
-        method = "generic" if form is None else "normal form"
-        self.name = f"numba {method}, {counted(self.threads, 'thread')}" if compiled else f"numpy {method}"
-        self._engine = self._made()
-
-    def __getstate__(self) -> dict[str, Any]:
-        """For `pickle`: compiled code and its working arrays are made anew."""
-        return {name: value for name, value in vars(self).items() if name != "_engine"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self._engine = self._made()
-
-    def _made(self) -> Engine:
-        planar: Callable[[PlanarRows], Engine]
-        generic: Callable[[GenericEquation], Engine]
-        if self.compiled:
-            from kahanmaps.maps.floats.numba_kernel import generic_numba as generic
-            from kahanmaps.maps.floats.numba_kernel import planar_numba as planar
-        else:
-            from kahanmaps.maps.floats.numpy_kernel import GenericNumpy as generic
-            from kahanmaps.maps.floats.numpy_kernel import PlanarNumpy as planar
-        if self.rows is not None:
-            engine = planar(self.rows)
-        else:
-            engines = [generic(generic_equation(one)) for one in self._map.factors]
-            engine = engines[0] if len(engines) == 1 else Word(engines)
-        engine.threads = self.threads
-        return engine
-
-    def lanes(self, starts: FloatArray) -> Lanes:
-        """Lanes at the starts, an array (n, dim) of finite numbers."""
-        if self.rows is None:
-            return Lanes.of(np.ascontiguousarray(starts.T))
-        lanes = Lanes.of(_product(self.rows.into, starts.T), len(self.rows.blocks.kinds))
-        lanes.base[:] = self.rows.integrals(lanes.z)
-        return lanes
-
-    def advance(
-        self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None = None
-    ) -> None:
-        """Take all lanes `steps` steps from the index `first`, with states at multiples of `every` in `record`.
-
-        The distances of the block integrals from the start are looked at every `sampled` steps.
-        """
-        kept = NOTHING if record is None else Kept(every, record, first // every)
-        self._engine.advance(lanes, first, steps, kept, 0 if self.rows is None else sampled)
-
-    def points(self, record: FloatArray) -> FloatArray:
-        """The points x (count, n, dim) of recorded states (count, rows, n)."""
-        count, _, n = record.shape
-        if self.rows is None:
-            return np.ascontiguousarray(record.transpose(0, 2, 1))
-        if n == 1:  # numbers side by side are multiplied fastest
-            record = np.ascontiguousarray(record[:, :, 0].T)[None]
-        x = _product(self.rows.blocks.out, record, self.rows.places)
-        return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.dim)
-
-    def piece(self, n: int) -> int:
-        """How many steps of n lanes take about a tenth of a second."""
-        # row steps a second, roughly, of one core
-        planar = self.rows is not None
-        speed = 1e10 if self.compiled and planar else 8e8 if self.compiled else 1e8 if n > 64 else 1e6
-        work = n * self.dim * (1 if planar else len(self._map.factors) * self.dim**2 / 8)
-        return max(1, int(0.1 * speed * self.threads / work))
 
 
 def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
@@ -205,21 +108,50 @@ class FloatEnsemble:
         epsilon = rational(eps)
         if sampled < 1:
             raise InputError(f"found a sample every {sampled} steps, expected at least 1")
-        system = as_map(system)
-        self._starts = _points(starts, system)
-        self._stepping = Stepping(system, epsilon, backward=backward, form=form, kernel=kernel, threads=threads)
-        self._lanes = self._stepping.lanes(self._starts)
+        self.system = as_map(system)
+        self._starts = _points(starts, self.system)
+        if to_float(epsilon) == 0.0:
+            raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
+        compiled = choose_kernel(kernel, long=True) == "numba"
+        if threads is not None and threads < 1:
+            raise InputError(f"found {threads} threads, expected at least 1")
+        map_ = self.system.rounded
+        map_over = map_.at(epsilon)
+        self._matrix = map_over.denominator_name(backward)
+        self._blocks: PlanarBlocks | None = None
+        state = self._starts.T
+        if form is not None:
+            require_same_system(form, map_)
+            self._blocks = planar_blocks(form, -epsilon if backward else epsilon)
+            state = _product(self._blocks.into, state)
+            self._base = self._blocks.integrals(state)
+            self._largest = np.zeros(self._base.shape)
+        self._factors = (map_over.inverse if backward else map_over).factors
+        self._write_step()
+        self._lanes = Lanes.of(state)
+        compiled = compiled and self._step.fast_code is not None
+        self._threads = (threads or processors()) if compiled else 1
+        method = "generic" if form is None else "normal form"
+        #: What computes: "numba normal form, 2 threads".
+        self.kernel = f"numba {method}, {counted(self._threads, 'thread')}" if compiled else f"numpy {method}"
+        self._compiled = compiled
         self._watched = [Watched(name, function, self._starts) for name, function in (integrals or {}).items()]
         self._sampled = sampled
         self._interrupted = False
-        self.system = system
         self.backward = backward
         self.step = 0
 
-    @property
-    def kernel(self) -> str:
-        """What computes: "numba normal form, 2 threads"."""
-        return self._stepping.name
+    def _write_step(self) -> None:
+        self._step = map_step(self._factors) if self._blocks is None else planar_step(self._blocks)
+        self._machine_code: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `pickle`: the step is written, and compiled, anew."""
+        return {name: value for name, value in vars(self).items() if name not in ("_step", "_machine_code")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._write_step()
 
     @property
     def n(self) -> int:
@@ -231,7 +163,7 @@ class FloatEnsemble:
         """The present points (n, dim), NaN for orbits that have ended."""
         if self.step == 0:
             return self._starts.copy()
-        x: FloatArray = self._stepping.points(self._lanes.z[None])[0]
+        x: FloatArray = self._points_of(self._lanes.z[None])[0]
         x[self._lanes.status != RUNNING] = np.nan
         return x
 
@@ -248,7 +180,7 @@ class FloatEnsemble:
 
     @property
     def near_singular(self) -> NDArray[np.int64]:
-        """How many near-singular steps each orbit has taken (see steps.py), counted for each block."""
+        """How many near-singular steps each orbit has taken (see steps.py)."""
         return self._lanes.near.copy()
 
     @property
@@ -259,11 +191,24 @@ class FloatEnsemble:
     @property
     def drift(self) -> tuple[Drift, ...]:
         """Of the block integrals h/(1 + eps^2 D), by root of chi, and of the functions that are watched."""
-        return (*block_drifts(self._stepping, self._lanes), *(watched.drift for watched in self._watched))
+        drifts = []
+        if self._blocks is not None:
+            now = self._blocks.distances(self._lanes.z, self._base)
+            now[:, self._lanes.status != RUNNING] = np.nan
+            largest = np.fmax(self._largest, now)
+            for r, label in enumerate(self._blocks.labels):
+                initial: NDArray[Any] = self._base[r].copy() if r >= self._blocks.reals else self._base[r].real.copy()
+                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], now[r]))
+        return (*drifts, *(watched.drift for watched in self._watched))
 
     def end(self, orbit: int) -> OrbitEnd:
         """How one orbit stands, in the words of single orbits."""
-        return end_of(self._lanes, orbit, self.step, self._stepping.matrix_name)
+        code, last = int(self._lanes.status[orbit]), int(self._lanes.failed_at[orbit]) - 1
+        if code == RUNNING:
+            return OrbitEnd("completed", self.step, counted(self.step, "step"))
+        if code == SINGULAR:
+            return OrbitEnd("singular", last, f"{self._matrix} is singular in machine numbers at step {last}")
+        return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of machine floats")
 
     def interrupt(self) -> None:
         """Ask `advance` or `records` to return after the portion in hand (safe to call from a signal handler)."""
@@ -289,35 +234,79 @@ class FloatEnsemble:
         else:
             yield np.empty((0, self.n, self.system.dim))
         for record in self._recorded(steps, every, progress):
-            if record is not None:
-                x = self._stepping.points(record)
+            if len(record):
+                x = self._points_of(record)
                 for watched in self._watched:
                     watched.look(x)
                 yield x
 
-    def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray | None]:
+    def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
+        """Take the steps in portions of about a tenth of a second; the states at multiples of `every` (0: none)."""
         self._interrupted = False
-        stepping, lanes, stop = self._stepping, self._lanes, self.step + steps
-        for first, count, rows in portions(stepping, self.n, self.step, stop, every):
-            record = np.empty((rows, len(lanes.z), self.n)) if rows else None
-            stepping.advance(lanes, first, count, every, self._sampled, record)
+        lanes, stop, rows = self._lanes, self.step + steps, self._step.rows
+        # Both seconds an operation are rough, those of arrays grow with the number of orbits only in part.
+        if self._compiled:
+            speed = 8e9 if self.n > _ALONE else 1.5e9
+            seconds = self.n * self._step.operations / speed / self._threads
+        else:
+            seconds = self._step.operations * (1e-6 + self.n * 1e-9)
+        piece = max(1, int(0.1 / seconds))
+        intervals = [every, 0 if self._blocks is None else self._sampled]
+        for interval in filter(None, intervals):
+            piece = min(piece, interval * max(1, _NUMBERS // (self.n * rows)))
+        while self.step < stop:
+            first, count = self.step, min(piece, stop - self.step)
+            tables = []
+            for interval in intervals:
+                length = (first + count) // interval - first // interval if interval else 0
+                tables.append(Table(interval, np.empty((length, rows, self.n))))
+            self._advance(first, count, [table for table in tables if len(table.states)])
             self.step = first + count
-            yield record
+            for interval, states in tables:  # states after the end of an orbit become NaN
+                if len(states) and (lanes.status != RUNNING).any():
+                    at = (first // interval + 1 + np.arange(len(states))) * interval
+                    gone = (lanes.failed_at >= 0) & (at[:, None] >= lanes.failed_at)
+                    states.transpose(0, 2, 1)[gone] = np.nan
+            if self._blocks is not None and len(tables[1].states):
+                states = tables[1].states.transpose(1, 0, 2)
+                seen = self._blocks.distances(states, self._base[:, None])
+                seen[:, np.isnan(states).any(axis=0)] = 0.0
+                np.maximum(self._largest, seen.max(axis=1), out=self._largest)
+            yield tables[0].states
             if progress is not None:
                 progress(self.step)
             if self._interrupted:
                 return
 
+    def _advance(self, first: int, count: int, tables: list[Table]) -> None:
+        if not self._compiled:
+            advance_by_numpy(self._step, self._lanes, first, count, tables)
+            return
+        if self._machine_code is None:
+            from kahanmaps.maps.floats.machine_code import MachineCode
 
-def portions(stepping: Stepping, n: int, step: int, stop: int, every: int) -> Iterator[tuple[int, int, int]]:
-    """First index, steps and recorded rows of portions that take a tenth of a second and some megabytes."""
-    piece = stepping.piece(n)
-    if every:
-        piece = min(piece, every * max(1, 1_000_000 // (n * stepping.dim)))
-    while step < stop:
-        count = min(piece, stop - step)
-        yield step, count, (step + count) // every - step // every if every else 0
-        step += count
+            rows = self._step.rows
+            width = 1 if self.n <= _ALONE else 32 if rows <= 2 else 16 if rows <= 8 else 8
+            self._machine_code = MachineCode(self._step, width)
+        share = -(-self.n // (self._threads * _SHARES * 64)) * 64
+        low = range(0, self.n, share if self._threads > 1 else self.n)
+        given = [(self._lanes, k, min(self.n, k + low.step), first, count, tables) for k in low]
+        if len(given) == 1:
+            self._machine_code.advance(*given[0])
+            return
+        with ThreadPoolExecutor(min(self._threads, len(given))) as pool:
+            for done in [pool.submit(self._machine_code.advance, *each) for each in given]:
+                done.result()
+
+    def _points_of(self, record: FloatArray) -> FloatArray:
+        """The points x (count, n, dim) of recorded states (count, rows, n)."""
+        count, _, n = record.shape
+        if self._blocks is None:
+            return np.ascontiguousarray(record.transpose(0, 2, 1))
+        if n == 1:  # numbers side by side are multiplied fastest
+            record = np.ascontiguousarray(record[:, :, 0].T)[None]
+        x = _product(self._blocks.out, record)
+        return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.system.dim)
 
 
 class Watched:
@@ -368,31 +357,6 @@ def ensemble(
     return found
 
 
-def block_drifts(stepping: Stepping, lanes: Lanes) -> Iterator[Drift]:
-    """The drift of every block integral h/(1 + eps^2 D), up to now."""
-    if stepping.rows is None:
-        return
-    blocks = stepping.rows.blocks
-    now = stepping.rows.distances(lanes.z, lanes.base)
-    now[:, lanes.status != RUNNING] = np.nan
-    largest = np.fmax(lanes.largest, now)
-    for r, label in enumerate(blocks.labels):
-        initial: NDArray[Any] = lanes.base[r, 0].copy()
-        if r >= blocks.reals:
-            initial = initial + 1j * lanes.base[r, 1]
-        yield Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], now[r])
-
-
-def end_of(lanes: Lanes, orbit: int, step: int, matrix: str) -> OrbitEnd:
-    """How an orbit that has been asked for `step` steps stands; `matrix` is the name of that of the equation."""
-    code, last = int(lanes.status[orbit]), int(lanes.failed_at[orbit]) - 1
-    if code == RUNNING:
-        return OrbitEnd("completed", step, counted(step, "step"))
-    if code == SINGULAR:
-        return OrbitEnd("singular", last, f"{matrix} is singular in machine numbers at step {last}")
-    return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of machine floats")
-
-
 def require_every(every: int) -> None:
     """Raises InputError unless every >= 1."""
     if every < 1:
@@ -414,14 +378,10 @@ def _points(starts: Any, system: QuadraticSystem | BirationalMap) -> FloatArray:
     return points
 
 
-def _product(matrix: FloatArray, columns: FloatArray, places: Sequence[int] | None = None) -> FloatArray:
-    """matrix columns (..., rows, n), every sum from left to right: BLAS orders them by the shape of the arrays.
-
-    `places` says which row stands where, if they are in another order.
-    """
-    first, *rest = range(matrix.shape[1]) if places is None else places
+def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
+    """matrix columns (..., rows, n), every sum from left to right: BLAS orders them by the shape of the arrays."""
     with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
-        total: FloatArray = matrix[:, :1] * columns[..., first : first + 1, :]
-        for j, place in enumerate(rest, 1):
-            total += matrix[:, j, None] * columns[..., place : place + 1, :]
+        total: FloatArray = matrix[:, :1] * columns[..., :1, :]
+        for j in range(1, matrix.shape[1]):
+            total += matrix[:, j, None] * columns[..., j : j + 1, :]
     return total

@@ -1,26 +1,23 @@
 """Float orbits: the Kahan map in machine numbers.
 
 A second implementation, apart from the exact one and tested against it. The only road from exact numbers to machine
-numbers is `to_floats`. What users need is gathered here: `steps` says what a step is, `blocks` what the normal form is
-in doubles, `numpy_kernel` and `numba_kernel` do the steps, `ensemble` advances many orbits, `stream` writes them.
+numbers is `to_floats`. What users need is gathered here. `steps` says what a step is, `straight_line` how it is written
+out, `machine_code` compiles it, `blocks` is the normal form in doubles, `ensemble` advances many orbits, `stream`
+writes them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.doubles import FLOATS, FloatArray, float_function, to_float, to_floats
 from kahanmaps.maps.floats.ensemble import (
     SAMPLED,
     Drift,
@@ -35,6 +32,7 @@ from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 __all__ = [
+    "FLOATS",
     "Drift",
     "FloatArray",
     "FloatEnsemble",
@@ -52,9 +50,9 @@ class FloatOrbit:
     `start` holds exact numbers, `eps` is half the time step, `steps` how many steps to take (None: no limit), `every`
     says which of them are delivered, `backward` steps by the inverse map. With `form`, the normal form of the system,
     steps are much faster and lose fewer digits. `kernel` is "numpy" or "numba"; by default numba, if it is installed,
-    for more than 100,000 steps. Points are computed some ahead of the one
-    delivered; what the attributes say about near-singular steps and drift is about what was computed. See FloatEnsemble
-    for many orbits and for `integrals` and `sampled`.
+    for more than 100,000 steps. Points are computed some ahead of the one delivered; what the attributes say about
+    near-singular steps and drift is about what was computed. See FloatEnsemble for many orbits, and for `integrals` and
+    `sampled`.
 
     >>> orbit = FloatOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/2", [1], 4, every=2)
     >>> [(step, float(x[0])) for step, x in orbit]
@@ -110,7 +108,7 @@ class FloatOrbit:
 
     @property
     def near_singular(self) -> int:
-        """How many near-singular steps were taken (see steps.py), counted for each block."""
+        """How many near-singular steps were taken (see steps.py)."""
         return int(self._ensemble.near_singular[0])
 
     @property
@@ -155,49 +153,6 @@ class FloatOrbit:
 
 _LONG = 100_000  # steps, from which on loading compiled code pays
 _FOR_EVER = 1 << 62
-
-
-class _Floats:
-    """Machine numbers, as far as evaluating a rational function, and printing a point, need a field."""
-
-    zero = 0.0
-    one = 1.0
-
-    @staticmethod
-    def convert(value: Any) -> float:
-        return to_float(rational(value))
-
-    @staticmethod
-    def value(polynomial: Any, point: Sequence[float]) -> None:
-        """None: there is no other way than term by term."""
-
-    @staticmethod
-    def is_zero(value: float) -> bool:
-        return value == 0.0
-
-    @staticmethod
-    def format(value: float) -> str:
-        return repr(value)
-
-    @staticmethod
-    def working() -> AbstractContextManager[None]:
-        return nullcontext()
-
-
-FLOATS: Any = _Floats()
-
-
-def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
-    """The rational function in double precision; None where the denominator is 0 or the value is no finite number."""
-
-    def value(point: Sequence[float]) -> float | None:
-        try:
-            found: float | None = function.value(_Floats, point)
-        except (OverflowError, ZeroDivisionError):
-            return None
-        return found if found is not None and isfinite(found) else None
-
-    return value
 
 
 def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:

@@ -1,28 +1,18 @@
-"""What a step in machine numbers is, operation by operation, and what is kept of many orbits side by side.
+"""What a step in floating-point numbers is: written out for a map or for a normal form, or, of large maps, in arrays.
 
-The formulas are written so that they can be given floats or arrays; plain Python and whole numpy arrays
-(numpy_kernel.py) and compiled loops (numba_kernel.py) run them as they stand. A result names its kernel; with the same
-one it comes out the same, to the last bit: one orbit or many, one thread or two, in one piece or in portions.
+A step takes the rows of a state to those of its image. For a map they are its coordinates, and the step solves
+M(x) x~ = r(x), M(x) being I - eps f'(x) for Kahan maps; for a normal form they are the coordinates of its planar blocks
+(blocks.py), where the same equation falls apart into blocks of two rows. A step is *near-singular* if a pivot is small
+(straight_line.py); such steps are counted, and the orbit goes on. It ends *singular* where a pivot is 0, and as an
+*overflow* where a number on the way or a coordinate of the image is not finite.
 
-In normal form a state holds the rows of blocks.py, those of one kind together (`PlanarRows`). A step is
-*near-singular* in a block if
-
-    |w| <= 2^-40 (1 + |A C|),     w = (1 + B)(1 - B) + A C = 1 + eps^2 D,
-
-at a complex root |w|^2 <= 2^-80 (1 + |A C|^2): then at most 13 of the 53 bits of w are left. Near-singular steps are
-counted, one for each block, and the orbit goes on. It ends *singular* where w is 0, and as an *overflow* where w or a
-coordinate of the image is no finite number.
-
-The generic step, for any map, eliminates in the matrix M(x), which is I - eps f'(x) for Kahan maps. Going down a
-column, a row whose entry is more than 8 times the pivot found so far becomes the pivot row; so no row is subtracted
-more than 8 times from another, and where eps f'(x) is small no rows are exchanged. Such a step is near-singular if a
-pivot is at most 2^-40 of the largest of 1 and the entries of its row, as it was in the beginning. The orbit ends
-*singular* where a pivot is 0, and as an *overflow* where an entry, a pivot or a coordinate of the image is no finite
-number.
+A result names its kernel; with the same one it comes out the same, to the last bit: one orbit or many, one thread or
+two, in one piece or in portions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,246 +20,134 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, PlanarBlocks
+from kahanmaps.maps.floats.blocks import PlanarBlocks
 from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.straight_line import (
+    LARGEST,
+    MAX_OPERATIONS,
+    NEAR,
+    Code,
+    Findings,
+    Pair,
+    TooLong,
+    extreme,
+    solve,
+    solve_two,
+)
 from kahanmaps.maps.implicit import StepOver
 from kahanmaps.maps.kahan import KahanMapOver
 
 IntArray = NDArray[np.int64]
 
-NEAR = 2.0**-40
-NEAR_SQUARED = NEAR * NEAR
-# In real canonical blocks |A C| <= |w - 1|: w is 1 + U V, or 1 - (U^2 + U V + V^2). So a step with |w| above this is
-# not near-singular, whatever A C is.
-CLEAR = 4 * NEAR
-MUCH = 8.0
-_CACHED = 512  # lanes whose integrals are computed together
-LARGEST = float(np.finfo(np.float64).max)
-
 RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
 STATUS = ("completed", "overflow", "singular")  # by code; the words of OrbitEnd
 
-# Formulas. k holds the coefficients Re a, Im a, Re b, ... of a block; the last two results are w and A C, and for
-# complex blocks their squared absolute values. 1/w may be infinite, and what follows then no number: the caller looks
-# at w.
 
+class FloatStep:
+    """A step: `careful` takes the rows of a state, arrays, to those of its image, and says what happened in three more.
 
-def real_lines(U: Any, V: Any, k: Any) -> Any:
-    """(a, b, c, d) = (0, 1, 1, 0): A = V, B = U + V, C = U."""
-    B = U + V
-    p = 1.0 + B
-    q = 1.0 - B
-    g = V * U
-    w = p * q + g
-    i = 1.0 / w
-    return (p * U + g) * i, (q * V - g) * i, w, g
-
-
-def real_cubes(U: Any, V: Any, k: Any) -> Any:
-    """(a, b, c, d) = (1, 0, 0, 1): A = U, B = 0, C = V."""
-    g = U * V
-    w = 1.0 + g
-    i = 1.0 / w
-    return (U + V * V) * i, (V - U * U) * i, w, g
-
-
-def real_general(U: Any, V: Any, k: Any) -> Any:
-    """Any real a, b, c, d."""
-    A = k[0] * U + k[2] * V
-    B = k[2] * U + k[4] * V
-    C = k[4] * U + k[6] * V
-    p = 1.0 + B
-    q = 1.0 - B
-    g = A * C
-    w = p * q + g
-    i = 1.0 / w
-    return (p * U + C * V) * i, (q * V - A * U) * i, w, g
-
-
-def complex_lines(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any) -> Any:
-    """(a, b, c, d) = (0, 1, 1, 0): A = V, B = U + V, C = U."""
-    Br = Ur + Vr
-    Bi = Ui + Vi
-    pr = 1.0 + Br
-    qr = 1.0 - Br
-    gr = Vr * Ur - Vi * Ui
-    gi = Vr * Ui + Vi * Ur
-    wr = (pr * qr + Bi * Bi) + gr
-    wi = (Bi * qr - pr * Bi) + gi
-    n = wr * wr + wi * wi
-    i = 1.0 / n
-    xr = (pr * Ur - Bi * Ui) + gr
-    xi = (pr * Ui + Bi * Ur) + gi
-    yr = (qr * Vr + Bi * Vi) - gr
-    yi = (qr * Vi - Bi * Vr) - gi
-    cr = wr * i
-    ci = wi * i
-    return xr * cr + xi * ci, xi * cr - xr * ci, yr * cr + yi * ci, yi * cr - yr * ci, n, gr * gr + gi * gi
-
-
-def complex_general(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any) -> Any:
-    """Any complex a, b, c, d."""
-    Ar = (k[0] * Ur - k[1] * Ui) + (k[2] * Vr - k[3] * Vi)
-    Ai = (k[0] * Ui + k[1] * Ur) + (k[2] * Vi + k[3] * Vr)
-    Br = (k[2] * Ur - k[3] * Ui) + (k[4] * Vr - k[5] * Vi)
-    Bi = (k[2] * Ui + k[3] * Ur) + (k[4] * Vi + k[5] * Vr)
-    Cr = (k[4] * Ur - k[5] * Ui) + (k[6] * Vr - k[7] * Vi)
-    Ci = (k[4] * Ui + k[5] * Ur) + (k[6] * Vi + k[7] * Vr)
-    pr = 1.0 + Br
-    qr = 1.0 - Br
-    gr = Ar * Cr - Ai * Ci
-    gi = Ar * Ci + Ai * Cr
-    wr = (pr * qr + Bi * Bi) + gr
-    wi = (Bi * qr - pr * Bi) + gi
-    n = wr * wr + wi * wi
-    i = 1.0 / n
-    xr = (pr * Ur - Bi * Ui) + (Cr * Vr - Ci * Vi)
-    xi = (pr * Ui + Bi * Ur) + (Cr * Vi + Ci * Vr)
-    yr = (qr * Vr + Bi * Vi) - (Ar * Ur - Ai * Ui)
-    yi = (qr * Vi - Bi * Vr) - (Ar * Ui + Ai * Ur)
-    cr = wr * i
-    ci = wi * i
-    return xr * cr + xi * ci, xi * cr - xr * ci, yr * cr + yi * ci, yi * cr - yr * ci, n, gr * gr + gi * gi
-
-
-def real_integral(U: Any, V: Any, k: Any, kappa: Any) -> Any:
-    """The block integral h/(1 + eps^2 D)."""
-    A = k[0] * U + k[2] * V
-    B = k[2] * U + k[4] * V
-    C = k[4] * U + k[6] * V
-    w = (1.0 + B) * (1.0 - B) + A * C
-    return kappa * ((((A * U) + (2.0 * B) * V) * U + (C * V) * V) / w)
-
-
-def complex_integral(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, kappa_r: Any, kappa_i: Any) -> Any:
-    """The block integral h/(1 + eps^2 D), real and imaginary part."""
-    Ar = (k[0] * Ur - k[1] * Ui) + (k[2] * Vr - k[3] * Vi)
-    Ai = (k[0] * Ui + k[1] * Ur) + (k[2] * Vi + k[3] * Vr)
-    Br = (k[2] * Ur - k[3] * Ui) + (k[4] * Vr - k[5] * Vi)
-    Bi = (k[2] * Ui + k[3] * Ur) + (k[4] * Vi + k[5] * Vr)
-    Cr = (k[4] * Ur - k[5] * Ui) + (k[6] * Vr - k[7] * Vi)
-    Ci = (k[4] * Ui + k[5] * Ur) + (k[6] * Vi + k[7] * Vr)
-    wr = ((1.0 + Br) * (1.0 - Br) + Bi * Bi) + (Ar * Cr - Ai * Ci)
-    wi = (-2.0 * Br) * Bi + (Ar * Ci + Ai * Cr)
-    er = (Ar * Ur - Ai * Ui) + 2.0 * (Br * Vr - Bi * Vi)
-    ei = (Ar * Ui + Ai * Ur) + 2.0 * (Br * Vi + Bi * Vr)
-    fr = Cr * Vr - Ci * Vi
-    fi = Cr * Vi + Ci * Vr
-    hr = (er * Ur - ei * Ui) + (fr * Vr - fi * Vi)
-    hi = (er * Ui + ei * Ur) + (fr * Vi + fi * Vr)
-    n = wr * wr + wi * wi
-    sr = (hr * wr + hi * wi) / n
-    si = (hi * wr - hr * wi) / n
-    return kappa_r * sr - kappa_i * si, kappa_r * si + kappa_i * sr
-
-
-# What the kernels are given, and what they keep.
-
-FORMULAS: dict[tuple[int, int], Any] = {
-    (LINES, 2): real_lines,
-    (CUBES, 2): real_cubes,
-    (GENERAL, 2): real_general,
-    (LINES, 4): complex_lines,
-    (GENERAL, 4): complex_general,
-}  # by kind and the number of rows of a block
-
-
-class Run(NamedTuple):
-    """Neighbouring blocks of one kind that take their steps together; a general one is alone, for its coefficients.
-
-    Its rows are those from `row` on: of all `blocks` of them the first coordinate, of all the second, ... (`parts`).
+    These tell in which orbits the step is near-singular, singular, or an overflow. Unless the step is too long, it is
+    written out as well: `fast_code` and `careful_code`, the fast one with one more value that tells where it is right.
     """
 
-    kind: int
-    parts: int
-    row: int
-    blocks: int
-    first: int
-
-    def of(self, z: FloatArray) -> list[FloatArray]:
-        """The coordinates, each an array (blocks, n), views of the state z (rows, n)."""
-        return [z[self.row + k * self.blocks : self.row + (k + 1) * self.blocks] for k in range(self.parts)]
+    def __init__(self, rows: int, write: Callable[[Sequence[Any], Findings], Sequence[Any]] | None) -> None:
+        self.rows = rows
+        self.fast_code: Code | None = None
+        if write is not None:
+            self.fast_code, self.careful_code = (_written(rows, write, careful) for careful in (False, True))
+            self.fast_on_floats, self.fast = self.fast_code.function(float), self.fast_code.function(np.ndarray)
+            self.careful = self.careful_code.function(np.ndarray)
 
     @property
-    def near(self) -> float:
-        """What w, or |w|^2, is compared with."""
-        return NEAR if self.parts == 2 else NEAR_SQUARED
+    def operations(self) -> int:
+        """How many operations a fast step has, roughly."""
+        return len(self.fast_code.operations) if self.fast_code is not None else self.rows**3
 
 
-class PlanarRows:
-    """The blocks of a normal form in runs; `places` says where in a state each row of the blocks is."""
-
-    def __init__(self, blocks: PlanarBlocks) -> None:
-        self.blocks = blocks
-        self.runs: list[Run] = []
-        order: list[int] = []
-        first = 0
-        while first < len(blocks.kinds):
-            kind, real, end = int(blocks.kinds[first]), first < blocks.reals, first + 1
-            last = blocks.reals if real else len(blocks.kinds)
-            while end < last and kind != GENERAL and blocks.kinds[end] == kind:
-                end += 1
-            parts, count = 2 if real else 4, end - first
-            start = 2 * first if real else 4 * first - 2 * blocks.reals  # of the rows in the order of the blocks
-            self.runs.append(Run(kind, parts, len(order), count, first))
-            order += [start + parts * b + k for k in range(parts) for b in range(count)]
-            first = end
-        self.places = np.argsort(order).tolist()
-        self.into = blocks.into[order]
-
-    def coefficients(self, run: Run) -> tuple[FloatArray, ...]:
-        """Re a, Im a, Re b, ... of the blocks of a run, columns."""
-        return tuple(self.blocks.coefficients[run.first : run.first + run.blocks].T[:, :, None])
-
-    def integrals(self, z: FloatArray) -> FloatArray:
-        """The integrals h/(1 + eps^2 D) at the states z (rows, n): an array (blocks, 2, n), Re and Im."""
-        found = np.zeros((len(self.blocks.kinds), 2, z.shape[1]))
-        numbers = [(run, self.coefficients(run), slice(run.first, run.first + run.blocks)) for run in self.runs]
-        with np.errstate(all="ignore"):
-            for low in range(0, z.shape[1], _CACHED):
-                lanes = slice(low, low + _CACHED)
-                for run, k, here in numbers:
-                    kappa = self.blocks.kappa[here].T[:, :, None]
-                    integral: Any = real_integral if run.parts == 2 else complex_integral
-                    value = integral(*run.of(z[:, lanes]), k, *kappa[: run.parts // 2])
-                    if run.parts == 2:
-                        found[here, 0, lanes] = value
-                    else:
-                        found[here, 0, lanes], found[here, 1, lanes] = value
-        return found
-
-    def distances(self, z: FloatArray, base: FloatArray) -> FloatArray:
-        """How far the block integrals at the states z (rows, n) are from `base`: an array (blocks, n)."""
-        moved, reals = self.integrals(z), self.blocks.reals
-        with np.errstate(all="ignore"):
-            moved -= base
-            distance: FloatArray = np.abs(moved[:, 0])
-            distance[reals:] = np.sqrt((moved[reals:] * moved[reals:]).sum(axis=1))
-        distance[np.isnan(distance)] = np.inf
-        return distance
+def _written(rows: int, write: Callable[[Sequence[Any], Findings], Sequence[Any]], careful: bool) -> Code:
+    code, asked = Code(rows, 4 * MAX_OPERATIONS if careful else MAX_OPERATIONS), Findings(careful)
+    image = write(code.arguments, asked)
+    for x in image:
+        asked.number(x)
+    code.outputs = [*image, *asked.outputs()]
+    return code
 
 
-class GenericEquation(NamedTuple):
+def planar_step(blocks: PlanarBlocks) -> FloatStep:
+    """A step of a normal form."""
+
+    def write(z: Sequence[Any], asked: Findings) -> list[Any]:
+        image: list[Any] = []
+        for r, coefficients in enumerate(blocks.coefficients):
+            at, real = len(image), r < blocks.reals
+            if real:
+                U, V = z[at : at + 2]
+                a, b, c, d = coefficients.real.tolist()
+            else:
+                U, V = Pair(z[at], z[at + 1]), Pair(z[at + 2], z[at + 3])
+                a, b, c, d = (Pair(x.real, x.imag) for x in coefficients.tolist())
+            A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
+            for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], asked):
+                image += [x] if real else [x.x, x.y]
+        return image
+
+    return FloatStep(blocks.rows, write)
+
+
+def map_step(factors: Sequence[StepOver]) -> FloatStep:
+    """A step of each of the maps, one after the other. Raises InputError where a number is out of range."""
+    equations = [float_equation(one) for one in factors]
+
+    def write(x: Sequence[Any], asked: Findings) -> Sequence[Any]:
+        for equation in equations:
+            x = equation.image(x, asked)
+        return x
+
+    rows = factors[0].dim
+    try:
+        return FloatStep(rows, write)
+    except TooLong:
+        return LargeStep(rows, equations)
+
+
+class FloatEquation(NamedTuple):
     """The equation M(x) x~ = r(x) in doubles, with the terms that are there; r is the last column of (M | r).
 
-    Entry (i, j) is `constants[i, j]` plus the sum of `factors[t] y[columns[t]]` over
-    `first[i (n + 1) + j] <= t < first[i (n + 1) + j + 1]`, where y is x and behind it y[a] y[b] for every pair (a, b)
-    of `products`.
+    Entry (i, j) is the sum of c y[k] over the pairs (k, c) of `terms[i][j]`, and `constants[i][j]`; y is x and behind
+    it y[a] y[b] for every pair (a, b) of `products`.
     """
 
-    constants: FloatArray
-    first: IntArray
-    columns: IntArray
-    factors: FloatArray
-    products: IntArray
+    constants: list[list[float]]
+    terms: list[list[list[tuple[int, float]]]]
+    products: list[tuple[int, int]]
 
-    @property
-    def rows(self) -> int:
-        """The dimension."""
-        return len(self.constants)
+    def monomials(self, x: Sequence[Any]) -> list[Any]:
+        """The values y at x."""
+        y = list(x)
+        for a, b in self.products:
+            y.append(y[a] * y[b])
+        return y
+
+    def image(self, x: Sequence[Any], asked: Findings) -> list[Any]:
+        """The image of x."""
+        y, n = self.monomials(x), len(self.constants)
+        rows = []
+        for constants, entries in zip(self.constants, self.terms, strict=True):
+            rows.append(
+                [sum((c * y[k] for k, c in terms), start) for start, terms in zip(constants, entries, strict=True)]
+            )
+
+        def bound() -> Any:
+            size: Any = 0.0
+            for k in sorted({k for entries in self.terms for terms in entries[:n] for k, _ in terms}):
+                size = extreme("max", size, abs(y[k]))
+            most = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
+            return size * most + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
+
+        return solve(rows, bound, asked)
 
 
-def generic_equation(map_over: StepOver) -> GenericEquation:
+def float_equation(map_over: StepOver) -> FloatEquation:
     """The equation of a step of a map over QQ, each number rounded once. Raises InputError where one is out of range.
 
     A row of a Kahan map is of the size of 1 where eps is small, that of another map is divided by its largest
@@ -289,67 +167,147 @@ def generic_equation(map_over: StepOver) -> GenericEquation:
             products.append((smaller, last))
         return index[exponent]
 
-    constants = np.zeros((n, n + 1))
-    first, columns, factors = [0], [], []
-    for i, row in enumerate(equation.terms):
+    all_constants, all_terms = [], []
+    for row in equation.terms:
         largest = max((abs(c) for entry in row[:n] for _, c in entry), default=fmpq(1))
         scale = fmpq(1) if isinstance(map_over, KahanMapOver) else 1 / largest
+        constants, terms = [0.0] * (n + 1), []
         for j, entry in enumerate(row):
             found = []
             for k, coefficient in entry:
-                value = _nearest(coefficient * scale if j < n else -coefficient * scale)
+                number = coefficient * scale if j < n else -coefficient * scale
+                try:
+                    value = int(number.p) / int(number.q)
+                except OverflowError as error:
+                    raise InputError(
+                        "eps times a coefficient leaves the range of machine floats: use exact arithmetic"
+                    ) from error
                 exponent = equation.exponents[k][:n]
                 if any(exponent):
                     found.append((place(exponent), value))
                 else:
-                    constants[i, j] = value
-            for column, value in sorted(found):  # the order in which whole arrays are added
-                columns.append(column)
-                factors.append(value)
-            first.append(len(columns))
-    return GenericEquation(
-        constants,
-        np.array(first, dtype=np.int64),
-        np.array(columns, dtype=np.int64),
-        np.array(factors, dtype=np.float64),
-        np.array(products, dtype=np.int64).reshape(-1, 2),
-    )
+                    constants[j] = value
+            terms.append(sorted(found))
+        all_constants.append(constants)
+        all_terms.append(terms)
+    return FloatEquation(all_constants, all_terms, products)
 
 
-def _nearest(number: fmpq) -> float:
-    try:
-        return int(number.p) / int(number.q)
-    except OverflowError as error:
-        raise InputError("eps times a coefficient leaves the range of machine floats: use exact arithmetic") from error
+class LargeStep(FloatStep):
+    """A step in whole arrays, with exchanges of rows as LAPACK does them, for maps of many variables."""
+
+    def __init__(self, rows: int, equations: Sequence[FloatEquation]) -> None:
+        super().__init__(rows, None)
+        self._equations = equations
+
+    def careful(self, *x: FloatArray) -> tuple[Any, ...]:  # type: ignore[override]  # elsewhere an attribute
+        near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
+        image = np.array(x)
+        for equation in self._equations:
+            n, y = self.rows, equation.monomials(image)
+            M = np.repeat(np.array(equation.constants)[:, :, None], len(near), axis=2)
+            for i, entries in enumerate(equation.terms):
+                for j, terms in enumerate(entries):
+                    for k, c in terms:
+                        M[i, j] += c * y[k]
+            sizes = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)
+            lanes = np.arange(len(near))
+            for p in range(n):
+                best = p + np.abs(M[p:, p]).argmax(axis=0)
+                for rows in (M.transpose(0, 2, 1), sizes):
+                    rows[p], rows[best, lanes] = rows[best, lanes], rows[p].copy()
+                pivots = np.abs(M[p, p])
+                near |= ~(pivots > NEAR * sizes[p])
+                singular |= finite & (pivots == 0.0)
+                finite &= pivots <= LARGEST
+                M[p + 1 :, p:] -= (M[p + 1 :, p] / M[p, p])[:, None] * M[p, p:]
+            image = M[:, n]
+            for p in range(n - 1, -1, -1):
+                image[p] /= M[p, p]
+                image[:p] -= M[:p, p] * image[p]
+            finite &= (np.abs(image) <= LARGEST).all(axis=0)
+        overflow = ~finite & ~singular
+        return *image, near & finite & ~singular, singular, overflow
 
 
 class Lanes(NamedTuple):
     """The states of n orbits side by side, one a column, and what happened to each.
 
     `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of
-    near-singular steps, `near_at` the index of the point at the first one (-1: none). `base` (blocks, 2, n) has the
-    block integrals at the start, `largest` (blocks, n) the largest distance from it in a sample. The column of an orbit
-    that has ended is 0.
+    near-singular steps, `near_at` the index of the point at the first one (-1: none). The column of an orbit that has
+    ended is 0.
     """
 
     z: FloatArray
-    status: NDArray[np.int8]
+    status: IntArray
     failed_at: IntArray
     near: IntArray
     near_at: IntArray
-    base: FloatArray
-    largest: FloatArray
 
     @classmethod
-    def of(cls, z: FloatArray, blocks: int = 0) -> Lanes:
+    def of(cls, z: FloatArray) -> Lanes:
         """Lanes that are about to start."""
         n = z.shape[1]
-        return cls(
-            z,
-            np.zeros(n, dtype=np.int8),
-            np.full(n, -1, dtype=np.int64),
-            np.zeros(n, dtype=np.int64),
-            np.full(n, -1, dtype=np.int64),
-            np.zeros((blocks, 2, n)),
-            np.zeros((blocks, n)),
-        )
+        counts = [np.full(n, start, dtype=np.int64) for start in (RUNNING, -1, 0, -1)]
+        return cls(np.ascontiguousarray(z), *counts)
+
+    def note(self, which: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
+        """Take down what a careful step of some running orbits from the index met; which of them have ended."""
+        near, singular, overflow = (np.broadcast_to(x, which.shape) for x in (near, singular, overflow))
+        ended = singular | overflow
+        self.status[which[ended]] = np.where(singular[ended], SINGULAR, OVERFLOW)
+        self.failed_at[which[ended]] = index + 1
+        close = which[near & ~ended]
+        self.near_at[close] = np.where(self.near[close] == 0, index, self.near_at[close])
+        self.near[close] += 1
+        return ended
+
+
+class Table(NamedTuple):
+    """Where states go: those at multiples of `every` to the rows of an array (records, rows, n), from the first on."""
+
+    every: int
+    states: FloatArray
+
+
+_FEW = 16  # orbits, up to which Python's own floats are faster than arrays
+_GROUP = 2048  # orbits that are taken together, so that arrays stay in the processor's cache
+
+
+def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tables: Sequence[Table]) -> None:
+    """Take all orbits `steps` steps from the index `first`: in arrays, or a few one by one in Python's own floats."""
+    n = lanes.z.shape[1]
+    single = n <= _FEW and step.fast_code is not None
+    width = 1 if single else _GROUP
+    with np.errstate(all="ignore"):
+        for low in range(0, n, width):
+            part = slice(low, min(n, low + width))
+            dead = lanes.status[part] != RUNNING
+            x: Any = lanes.z[:, low].tolist() if single else list(lanes.z[:, part])
+            for index in range(first, first + steps):
+                try:
+                    *image, good = (
+                        (x, False) if step.fast is None else (step.fast_on_floats if single else step.fast)(*x)
+                    )
+                except ZeroDivisionError:  # where arrays get an infinity
+                    image, good = x, False
+                if good is not True and not np.all(good | dead):
+                    again = np.flatnonzero(~(good | dead))
+                    before, after = (
+                        np.array([np.broadcast_to(row, dead.shape) for row in state]) for state in (x, image)
+                    )
+                    *careful, near, singular, overflow = step.careful(*before[:, again])
+                    ended = lanes.note(low + again, index, near, singular, overflow)
+                    for row, values in zip(after, careful, strict=True):
+                        row[again] = np.where(ended, 0.0, values)
+                    dead[again] |= ended
+                    image = after[:, 0].tolist() if single else list(after)
+                x = image
+                for every, states in tables:
+                    if (index + 1) % every == 0:
+                        for row, values in zip(states[(index + 1) // every - first // every - 1], x, strict=True):
+                            row[part] = values
+                if single and dead[0]:
+                    break
+            for row, values in zip(lanes.z, x, strict=True):
+                row[part] = np.where(dead, 0.0, values)

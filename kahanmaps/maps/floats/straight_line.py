@@ -1,0 +1,423 @@
+"""A step of a map as straight-line code: a list of operations on floating-point numbers, written for the map at hand.
+
+`Code` records what is done with its values. Coefficients are folded in: nothing is multiplied by 0 or 1, nothing is
+computed twice, and what does not depend on each other stays apart. The list is run in two ways, with the same numbers
+to the last bit: as a Python function of floats or of whole numpy arrays (`Code.function`), and as machine code for
+vectors of orbits (machine_code.py).
+
+`solve` writes the solution of M y = r for a matrix whose zeros are known. Rows and columns with a single entry are
+solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal form are such
+blocks, with complex entries at a complex root), larger ones by Gaussian elimination.
+
+Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 of the numbers
+that it is made of: then at most 13 of its 53 bits are left. An elimination takes the diagonal in an order that fills in
+little, and is right as long as no row is subtracted more than 8 times from another. There are two versions of each
+step. The *fast* one says in which orbits all pivots are far from 0, no row had to be exchanged and all numbers are
+finite; the *careful* one, for the others, exchanges rows and says what happened. Where the fast one is content the two
+give the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+NEAR = 2.0**-40
+MUCH = 8.0  # times the pivot row, at most, is subtracted from another row
+LARGEST = float(np.finfo(np.float64).max)
+MAX_OPERATIONS = 4000  # of a fast step; longer ones take too long to be compiled
+
+_SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "le": "<=", "eq": "==", "and": "&", "or": "|"}
+
+
+class TooLong(Exception):
+    """A step has more operations than are worth being written out."""
+
+
+class Code:
+    """Operations in the order in which they are done; number k of them is value `inputs + k`.
+
+    >>> code = Code(2)
+    >>> x, y = code.arguments
+    >>> code.outputs = [(x + 0.0) * y, y * x - 1.0]
+    >>> code.function(float)(3.0, 5.0)
+    (15.0, 14.0)
+    >>> len(code.operations)
+    2
+    """
+
+    def __init__(self, inputs: int, limit: int = MAX_OPERATIONS) -> None:
+        self.inputs = inputs
+        self.operations: list[tuple[str, tuple[Any, ...]]] = []
+        self.outputs: Sequence[Any] = ()
+        self._limit = limit
+        self._known: dict[tuple[str, tuple[Any, ...]], Value] = {}
+        self.arguments = [Value(self, k) for k in range(inputs)]
+
+    def emit(self, name: str, *operands: Any) -> Value:
+        """The value of an operation, which is recorded unless it is there already."""
+        keys = tuple(x.number if isinstance(x, Value) else ("constant", float(x)) for x in operands)
+        key = (name, tuple(sorted(keys, key=repr)) if name in ("add", "mul", "and", "or") else keys)
+        if key not in self._known:
+            if len(self.operations) >= self._limit:
+                raise TooLong
+            self._known[key] = Value(self, self.inputs + len(self.operations))
+            self.operations.append((name, operands))
+        return self._known[key]
+
+    def function(self, kind: type) -> Callable[..., tuple[Any, ...]]:
+        """A Python function from the inputs to the outputs: of floats, or of arrays (`kind` is np.ndarray)."""
+        lines = [f"def step({', '.join(f'v{k}' for k in range(self.inputs))}):"]
+        for k, (name, operands) in enumerate(self.operations, self.inputs):
+            x = [_text(operand) for operand in operands]
+            if name in _SYMBOLS:
+                text = f"{x[0]} {_SYMBOLS[name]} {x[1]}"
+            elif name in ("neg", "not"):
+                text = f"-{x[0]}" if name == "neg" else f"{x[0]} ^ True"
+            elif name == "select" and kind is float:
+                text = f"{x[1]} if {x[0]} else {x[2]}"
+            else:
+                text = f"{name}({', '.join(x)})"
+            lines.append(f"    v{k} = {text}")
+        lines.append(f"    return ({''.join(f'{_text(x)}, ' for x in self.outputs)})")
+        names: dict[str, Any] = {"select": np.where, "max": np.maximum, "min": np.minimum}
+        if kind is float:
+            names = {"max": max, "min": min}
+        exec("\n".join(lines), names)
+        found: Callable[..., tuple[Any, ...]] = names["step"]
+        return found
+
+
+def _text(x: Any) -> str:
+    return f"v{x.number}" if isinstance(x, Value) else repr(x) if isinstance(x, bool) else f"({float(x)!r})"
+
+
+class Value:
+    """A number, or a truth value, in a `Code`; Python's floats stand for constants."""
+
+    def __init__(self, code: Code, number: int) -> None:
+        self.code, self.number = code, number
+
+    def _negated(self) -> Any:
+        """x where this is -x, else None."""
+        k = self.number - self.code.inputs
+        name, operands = self.code.operations[k] if k >= 0 else ("", ())
+        return operands[0] if name == "neg" else None
+
+    def __neg__(self) -> Any:
+        positive = self._negated()
+        return self.code.emit("neg", self) if positive is None else positive
+
+    def __add__(self, other: Any) -> Any:
+        if is_zero(other):
+            return self
+        for x, y in ((self, other), (other, self)):
+            if isinstance(y, Value) and y._negated() is not None:
+                return x - y._negated()
+        return self.code.emit("add", self, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        if is_zero(other):
+            return self
+        if isinstance(other, Value) and other._negated() is not None:
+            return self + other._negated()
+        return self.code.emit("sub", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        if is_zero(other):
+            return -self
+        positive = self._negated()
+        return self.code.emit("sub", other, self) if positive is None else other + positive
+
+    def __mul__(self, other: Any) -> Any:
+        if isinstance(other, float | int) and other in (0.0, 1.0, -1.0):
+            return 0.0 if other == 0.0 else self if other == 1.0 else -self
+        for x, y in ((self, other), (other, self)):
+            if isinstance(y, Value) and y._negated() is not None:
+                return -(x * y._negated())
+        return self.code.emit("mul", self, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        return self if is_one(other) else self.code.emit("div", self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return 0.0 if is_zero(other) else self.code.emit("div", other, self)
+
+    def __abs__(self) -> Any:
+        positive = self._negated()
+        return self.code.emit("abs", self if positive is None else positive)
+
+    def __gt__(self, other: Any) -> Any:
+        return self.code.emit("gt", self, other)
+
+    def __lt__(self, other: Any) -> Any:
+        return self.code.emit("gt", other, self)
+
+    def __le__(self, other: Any) -> Any:
+        return self.code.emit("le", self, other)
+
+    def is_equal(self, other: Any) -> Any:
+        return self.code.emit("eq", self, other)
+
+    def __and__(self, other: Any) -> Any:
+        return (self if other else False) if isinstance(other, bool) else self.code.emit("and", self, other)
+
+    __rand__ = __and__
+
+    def __or__(self, other: Any) -> Any:
+        return (True if other else self) if isinstance(other, bool) else self.code.emit("or", self, other)
+
+    __ror__ = __or__
+
+    def __invert__(self) -> Any:
+        return self.code.emit("not", self)
+
+
+class Pair:
+    """A complex number x + i y of values or floats."""
+
+    def __init__(self, x: Any, y: Any) -> None:
+        self.x, self.y = x, y
+
+    def __neg__(self) -> Pair:
+        return Pair(-self.x, -self.y)
+
+    def __add__(self, other: Any) -> Pair:
+        other = _pair(other)
+        return Pair(self.x + other.x, self.y + other.y)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Pair:
+        other = _pair(other)
+        return Pair(self.x - other.x, self.y - other.y)
+
+    def __rsub__(self, other: Any) -> Pair:
+        return _pair(other) - self
+
+    def __mul__(self, other: Any) -> Pair:
+        other = _pair(other)
+        return Pair(self.x * other.x - self.y * other.y, self.x * other.y + self.y * other.x)
+
+    __rmul__ = __mul__
+
+    def norm(self) -> Any:
+        """x^2 + y^2."""
+        return self.x * self.x + self.y * self.y
+
+
+def _pair(x: Any) -> Pair:
+    return x if isinstance(x, Pair) else Pair(x.real, x.imag) if isinstance(x, complex) else Pair(x, 0.0)
+
+
+def is_zero(x: Any) -> bool:
+    """Whether this is the constant 0."""
+    return isinstance(x, float | int) and x == 0.0
+
+
+def is_one(x: Any) -> bool:
+    """Whether this is the constant 1."""
+    return isinstance(x, float | int) and x == 1.0
+
+
+def select(condition: Any, one: Any, other: Any) -> Any:
+    """One number where the condition holds and the other elsewhere."""
+    if isinstance(condition, bool):
+        return one if condition else other
+    same = one is other or (isinstance(one, float) and isinstance(other, float) and one == other)
+    return one if same else condition.code.emit("select", condition, one, other)
+
+
+def extreme(name: str, x: Any, y: Any) -> Any:
+    """The larger ("max") or smaller ("min") of two numbers >= 0; where one is no number, either."""
+    values = [v for v in (x, y) if isinstance(v, Value)]
+    if len(values) == 1 and (0.0 if name == "max" else np.inf) in (x, y):
+        return values[0]
+    return values[0].code.emit(name, x, y) if values else max(x, y) if name == "max" else min(x, y)
+
+
+class Findings:
+    """What is asked of the numbers on the way through a step.
+
+    `good` says that all is as usual, of a fast step; `near`, `zero` and `finite` belong to a careful one: whether a
+    pivot was small, whether one was 0 and whether all numbers were finite.
+    """
+
+    def __init__(self, careful: bool) -> None:
+        self.careful = careful
+        self.good: Any = True
+        self.near: Any = False
+        self.zero: Any = False
+        self.finite: Any = True
+        self._sum: Any = 0.0
+
+    def pivot(self, pivot: Any, size: Any, zero: Any = None) -> None:
+        """A number that is divided by, and that of which it should be more than 2^-40 (`zero`: the same for 0)."""
+        if isinstance(pivot, float):  # a coefficient: 0 if the matrix is singular everywhere
+            self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
+            return
+        usual = abs(pivot) > size
+        if self.careful:
+            self.near, self.zero = self.near | ~usual, self.zero | pivot.is_equal(0.0)
+            self.number(pivot)
+        else:
+            self.good = self.good & usual
+            self.number(pivot)
+
+    def number(self, x: Any) -> None:
+        """A number that should be finite. A sum of all says so if it is; if not, the careful step looks at each."""
+        if isinstance(x, Value):
+            if self.careful:
+                self.finite = self.finite & (abs(x) <= LARGEST)
+            else:
+                self._sum = x + self._sum
+
+    def outputs(self) -> list[Any]:
+        """The truth values of a step: `good`, or whether it was near-singular, singular, and an overflow."""
+        if not self.careful:
+            return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
+        singular = self.zero
+        fails = singular | _negation(self.finite)
+        return [self.near & _negation(fails), singular, fails & _negation(singular)]
+
+
+def _negation(x: Any) -> Any:
+    return not x if isinstance(x, bool) else ~x
+
+
+def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: Findings) -> list[Any]:
+    """The solution y of M y = r, the rows being those of (M | r), for an M that is not singular everywhere.
+
+    `bound` gives a number that no entry of M exceeds, which is needed for fast eliminations only.
+    """
+    n = len(rows)
+    matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
+    right, left, found = [row[n] for row in rows], set(range(n)), [0.0] * n
+    # A row with one entry comes first. A column with one entry comes last: the other rows do not need its unknown.
+    after: list[tuple[int, int]] = []
+    while left:
+        single = next((i for i in sorted(left) if len(matrix[i]) == 1), None)
+        if single is not None:
+            left.remove(single)
+            ((j, pivot),) = matrix[single].items()
+            asked.pivot(pivot, NEAR)
+            found[j] = right[single] / pivot
+            for k in left:
+                if j in matrix[k]:
+                    right[k] = right[k] - matrix[k].pop(j) * found[j]
+            continue
+        columns: dict[int, list[int]] = {}
+        for i in sorted(left):
+            for j in matrix[i]:
+                columns.setdefault(j, []).append(i)
+        alone = next((j for j in sorted(columns) if len(columns[j]) == 1), None)
+        if alone is None:
+            break
+        after.append((columns[alone][0], alone))
+        left.remove(columns[alone][0])
+    while left:  # blocks of rows that have unknowns in common
+        block: set[int] = set()
+        more = {min(left)}
+        while more != block:
+            block, unknowns = more, {j for i in more for j in matrix[i]}
+            more = {i for i in left if unknowns & matrix[i].keys()}
+        left -= block
+        order = sorted(unknowns)
+        square = [[*(matrix[i].get(j, 0.0) for j in order), right[i]] for i in sorted(block)]
+        values = solve_two(square, asked) if len(square) == 2 else _eliminate(square, bound, asked)
+        for j, value in zip(order, values, strict=True):
+            found[j] = value
+    for i, j in reversed(after):
+        asked.pivot(matrix[i][j], NEAR)
+        total = right[i]
+        for k, entry in matrix[i].items():
+            total = total if k == j else total - entry * found[k]
+        found[j] = total / matrix[i][j]
+    return found
+
+
+def solve_two(rows: Sequence[Sequence[Any]], asked: Findings) -> list[Any]:
+    """Cramer's rule for two equations, whose entries may be complex (`Pair`)."""
+    (a, b, r), (c, d, s) = rows
+    product = b * c
+    det = a * d - product
+    if isinstance(det, Pair):
+        norm = det.norm()
+        asked.pivot(norm, NEAR**2 + NEAR**2 * _pair(product).norm())
+        share = _inverse(norm)
+        inverse: Any = Pair(det.x * share, -(det.y * share))
+    else:
+        asked.pivot(det, NEAR + NEAR * abs(product))
+        inverse = _inverse(det)
+    return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
+
+
+def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: Findings) -> list[Any]:
+    """Gaussian elimination; the careful one exchanges rows where a pivot is small."""
+    n, M = len(rows), [[*row, 1.0] for row in rows]  # with the sizes of the rows behind the right-hand side
+    order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
+    for row in M if asked.careful else ():
+        for x in row[:n]:
+            row[-1] = extreme("max", row[-1], abs(x))
+    inverses: list[Any] = []
+    smallest, factors = np.inf, 0.0
+    for step, (i, j) in enumerate(order):
+        columns = [*(c for _, c in order[step + 1 :]), n]
+        later = [k for k, _ in order[step + 1 :]]
+        for k in later if asked.careful else ():
+            swap = abs(M[k][j]) > MUCH * abs(M[i][j])
+            for c in (j, *columns, n + 1):
+                one, other = M[i][c], M[k][c]
+                M[i][c], M[k][c] = select(swap, other, one), select(swap, one, other)
+        inverses.append(_inverse(M[i][j]))
+        if asked.careful:
+            asked.pivot(M[i][j], NEAR * M[i][n + 1])
+        else:
+            asked.number(M[i][j])
+            smallest = extreme("min", smallest, abs(M[i][j]))
+        for k in later:
+            if not is_zero(M[k][j]):
+                factor = M[k][j] * inverses[-1]
+                factors = extreme("max", factors, abs(factor))
+                for c in columns:
+                    M[k][c] = M[k][c] - factor * M[i][c]
+    if not asked.careful:
+        asked.good = asked.good & (smallest > NEAR * bound()) & (factors <= MUCH)
+    found: list[Any] = [0.0] * n
+    for (i, j), inverse in zip(reversed(order), reversed(inverses), strict=True):
+        found[j] = M[i][n] * inverse
+        for k, _ in order:
+            if k == i:
+                break
+            M[k][n] = M[k][n] - M[k][j] * found[j]
+    return found
+
+
+def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
+    """Row and column of each pivot: on the diagonal where it can be, and such that few zeros are lost (Markowitz)."""
+    rows, order = {i: set(row) for i, row in enumerate(pattern)}, []
+    while rows:
+        counts: dict[int, int] = {}
+        for row in rows.values():
+            for j in row:
+                counts[j] = counts.get(j, 0) + 1
+        places = [(i, j) for i, row in rows.items() for j in row]
+        places = [(i, j) for i, j in places if i == j] or places
+        i, j = min(places, key=lambda place: ((len(rows[place[0]]) - 1) * (counts[place[1]] - 1), place))
+        pivot = rows.pop(i)
+        order.append((i, j))
+        for row in rows.values():
+            if j in row:
+                row |= pivot
+                row.discard(j)
+    return order
+
+
+def _inverse(x: Any) -> Any:
+    return 1.0 / x if isinstance(x, Value) or x else np.inf
