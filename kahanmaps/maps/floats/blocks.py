@@ -176,15 +176,12 @@ class _Blocks:
                 if not real:
                     into.append(_doubles([entry.imag for entry in row]))
                     out.append(_doubles([-2 * entry.imag for entry in column]))
-        tables = [np.array(table) for table in (coefficients, kappas, into, out)]
+        tables = [np.array(coefficients), np.array(kappas), np.array(into), np.ascontiguousarray(np.array(out).T)]
         if not all(np.isfinite(table).all() for table in tables):
             raise InputError("the normal form leaves the range of machine floats: use exact arithmetic")
-        return PlanarBlocks(
-            sum(1 for root in self.roots if root.imag.is_zero()),
-            *tables[:3],
-            np.ascontiguousarray(tables[3].T),
-            tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots),
-        )
+        reals = sum(1 for root in self.roots if root.imag.is_zero())
+        roots = tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots)
+        return PlanarBlocks(reals, tables[0], tables[1], tables[2], tables[3], roots)
 
     def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
         """a, b, c, d; kappa; the rows of U and V over x; the columns of x over U and V."""

@@ -163,7 +163,7 @@ class FloatEnsemble:
         """The present points (n, dim), NaN for orbits that have ended."""
         if self.step == 0:
             return self._starts.copy()
-        x: FloatArray = self._points_of(self._lanes.z[None])[0]
+        x: FloatArray = self._points_of(self._lanes.z[None].copy())[0]
         x[self._lanes.status != RUNNING] = np.nan
         return x
 
@@ -288,15 +288,17 @@ class FloatEnsemble:
             rows = self._step.rows
             width = 1 if self.n <= _ALONE else 32 if rows <= 2 else 16 if rows <= 8 else 8
             self._machine_code = MachineCode(self._step, width)
-        share = -(-self.n // (self._threads * _SHARES * 64)) * 64
-        low = range(0, self.n, share if self._threads > 1 else self.n)
-        given = [(self._lanes, k, min(self.n, k + low.step), first, count, tables) for k in low]
-        if len(given) == 1:
-            self._machine_code.advance(*given[0])
+        share = self.n if self._threads == 1 else -(-self.n // (self._threads * _SHARES * 64)) * 64
+        lows = range(0, self.n, share)
+
+        def advance(low: int) -> None:
+            self._machine_code.advance(self._lanes, low, min(self.n, low + share), first, count, tables)
+
+        if len(lows) == 1:
+            advance(0)
             return
-        with ThreadPoolExecutor(min(self._threads, len(given))) as pool:
-            for done in [pool.submit(self._machine_code.advance, *each) for each in given]:
-                done.result()
+        with ThreadPoolExecutor(min(self._threads, len(lows))) as pool:
+            list(pool.map(advance, lows))
 
     def _points_of(self, record: FloatArray) -> FloatArray:
         """The points x (count, n, dim) of recorded states (count, rows, n)."""

@@ -1,9 +1,10 @@
 """Lyapunov exponents of float orbits, many at once, by the exact tangent map.
 
-A frame of n tangent vectors goes along with each orbit by dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is (I - eps
-f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, and is made orthonormal again after every step; the logarithms of its
-lengths add up to the exponents. The tangent map is the exact derivative of the map, evaluated in double precision:
-nothing is differenced.
+The orbits are taken in portions (ensemble.py). The tangent map dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is
+(I - eps f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, is computed at all points of a portion at once, and multiplied
+along each orbit as long as the product stays well conditioned. A frame of n tangent vectors goes along with the
+products and is made orthonormal again after each; the logarithms of its lengths add up to the exponents. The tangent
+map is the exact derivative of the map, evaluated in double precision: nothing is differenced.
 Source: benettin-1980 for the method, petrera-suris-2016, eq. (Jac), for the tangent map.
 """
 
@@ -12,10 +13,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import mul
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.written.plain import all_fields
@@ -23,23 +25,30 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
+_PORTION = 200_000  # entries of the tangent maps that are computed at once
+_STEPS = 512  # of a portion, at most
+_CONDITION = 16.0  # logarithm of the condition of a product of tangent maps, at most: more would cost digits
+_LARGEST_NORM = 300.0  # logarithm of the norm of a tangent map: squares are taken
+_LITTLE = 10_000  # orbits times steps, below which compiling does not pay
 
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov:
-    """The exponents of an ensemble in machine numbers, largest first.
+    """The exponents of an ensemble in floating point, largest first.
 
     `unit` is the time of a step: 2 eps, and 1 for a map without a time step, whose exponents are per step. `exponents`
-    (orbits, dim) are per unit of time, over all counted steps of the orbits that went through, and `half` the same over
-    the first half of them: how far they differ tells how far they have converged. `log_volume` is the mean of log |det
-    dPhi| per unit of time, computed apart, which the exponents add up to. `ended` counts the orbits that left the range
-    of floats or met a pole; they are in no average. `steps` are those counted, after `transient` steps that were not;
-    fewer than asked for if `stopped` by the clock.
+    (orbits, dim) are per unit of time, over all counted steps of the orbits that completed them; `half`, the same over
+    the first half of the steps, shows how far they have converged. `log_volume` is the mean of log |det dPhi| per unit
+    of time, computed apart, which the exponents add up to. `ended` counts the orbits that left the range of floats or
+    met a pole; they are in no average. `steps` are those counted, after `transient` steps that were not; fewer than
+    requested if `stopped` by the clock.
     """
 
     unit: float
@@ -59,19 +68,19 @@ class Lyapunov:
     def __str__(self) -> str:
         lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]
         lines.append("# exponent\tper unit of time\tper step\tspread\tchange from half")
-        table = zip(self.mean, self.mean * self.unit, self.spread, self.change, strict=True)
+        table = zip(self.mean, self.per_step, self.spread, self.change, strict=True)
         lines += ["\t".join([str(k), *(f"{number:.6g}" for number in row)]) for k, row in enumerate(table, 1)]
         return "\n".join(lines)
 
     @property
-    def per_step(self) -> FloatArray:
-        """The exponents for each step instead of a unit of time: 2 eps times as large."""
-        return self.exponents * self.unit
+    def mean(self) -> FloatArray:
+        """The mean of each exponent over the orbits, per unit of time; NaN where no orbit was completed."""
+        return _over_orbits(np.mean, self.exponents)
 
     @property
-    def mean(self) -> FloatArray:
-        """The mean of each exponent over the orbits, per unit of time; NaN where no orbit went through."""
-        return _over_orbits(np.mean, self.exponents)
+    def per_step(self) -> FloatArray:
+        """The mean of each exponent over the orbits, per step."""
+        return self.mean * self.unit
 
     @property
     def spread(self) -> FloatArray:
@@ -85,13 +94,15 @@ class Lyapunov:
 
     @property
     def residual(self) -> float:
-        """The largest distance of a sum of exponents from the mean of log |det dPhi|: rounding, if all is well.
+        """The largest distance of a sum of exponents from log |det dPhi|: rounding, if all is well; NaN of no orbit."""
+        return (
+            float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max()) if len(self.exponents) else float("nan")
+        )
 
-        NaN where no orbit went through.
-        """
-        if len(self.exponents) == 0:
-            return float("nan")
-        return float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max())
+
+def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
+    found: FloatArray = function(values, axis=0) if len(values) else np.full(values.shape[1], np.nan)
+    return found
 
 
 def lyapunov_exponents(
@@ -131,135 +142,90 @@ def lyapunov_exponents(
         raise InputError(f"found starts of the shape {x.shape}, expected rows of {n} finite numbers, at least one")
     if len(x) * n * n > MAX_NUMBERS:
         raise InputError(f"found {len(x)} starts, expected at most {MAX_NUMBERS // (n * n)} in dimension {n}")
-    walk = _Walk([_Step(equation) for equation in map_.at(rational(eps)).equations], x)
+    orbits = FloatEnsemble(map_, eps, x, kernel="numpy" if len(x) * steps < _LITTLE else None, threads=1)
+    equations = map_.at(rational(eps)).equations
     end = time.monotonic() + seconds
-    done = counted = half_at = 0
-    half = walk.sums.copy()
-    while done < transient + steps:
-        progress(f"step {done} of {transient + steps}")
-        if time.monotonic() > end or len(walk.lanes) == 0:
-            break
-        walk.step()
-        done += 1
-        if done == transient:
-            walk.reset()
-        counted = max(0, done - transient)
-        if counted == steps // 2:
-            half, half_at = walk.sums.copy(), counted
-    alive = walk.lanes if counted else walk.lanes[:0]
+    frames = np.broadcast_to(np.eye(n), (len(x), n, n))
+    sums, half, volumes, alive = np.zeros((len(x), n)), np.zeros((len(x), n)), np.zeros(len(x)), np.ones(len(x), bool)
+    marks = [transient, transient + steps // 2, transient + steps]
+    while orbits.step < marks[-1] and alive.any() and time.monotonic() <= end:
+        progress(f"step {orbits.step} of {marks[-1]}")
+        mark = next(mark for mark in marks if mark > orbits.step)
+        count = min(mark - orbits.step, _STEPS, max(1, _PORTION // (len(x) * n * n)))
+        before = orbits.x[None]
+        after = np.concatenate(list(orbits.records(count, 1)))[-count:]
+        alive &= ~np.isnan(after).any(axis=(0, 2))
+        points = np.concatenate([before, after])[:, alive]
+        with np.errstate(all="ignore"):
+            maps, logs = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
+            maps, logs = maps.reshape(count, -1, n, n), logs.reshape(count, -1)
+            norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
+        sound = np.isfinite(logs).all(axis=0) & (norms < _LARGEST_NORM).all(axis=0)
+        alive[alive] = sound
+        maps, logs, norms, Q = maps[:, sound], logs[:, sound], norms[:, sound], frames[alive]
+        # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|.
+        condition = (np.log(2.0) + n * (norms - np.log(n) / 2) - logs).max(initial=1.0)
+        length = max(1, min(count, int(_CONDITION / condition), int(_LARGEST_NORM / norms.max(initial=1.0))))
+        volumes[alive] += logs.sum(axis=0)
+        for first in range(0, count, length):
+            Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first : first + length], Q))
+            sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
+        frames = np.zeros((len(x), n, n))
+        frames[alive] = Q
+        if orbits.step == transient:
+            sums[:], volumes[:] = 0.0, 0.0
+        elif orbits.step == marks[1]:
+            half = sums.copy()
+    counted = max(0, orbits.step - transient)
+    ended = len(x) - int(alive.sum())
+    alive &= counted > 0
     unit = time_step(size, map_) or 1.0
-    span, first = unit * max(1, counted), unit * max(1, half_at)
-    order = np.argsort(-walk.sums[alive] / span, axis=1)
-    exponents = np.take_along_axis(walk.sums[alive] / span, order, axis=1)
-    early = np.take_along_axis(half[alive] / first, order, axis=1)
+    order = np.argsort(-sums[alive], axis=1)
+    early = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
     return Lyapunov(
         unit,
         counted,
-        min(done, transient),
+        min(orbits.step, transient),
         len(x),
-        len(x) - len(walk.lanes),
-        exponents,
-        early if half_at else np.full_like(early, np.nan),
-        walk.volumes[alive] / span,
-        len(walk.lanes) > 0 and counted < steps,
+        ended,
+        np.take_along_axis(sums[alive], order, axis=1) / (unit * max(1, counted)),
+        np.take_along_axis(early, order, axis=1),
+        volumes[alive] / (unit * max(1, counted)),
+        ended < len(x) and counted < steps,
     )
 
 
-class _Step:
-    """The matrices of the equation of a factor at many points."""
+def _tangent_maps(equations: Sequence[Equation], x: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """dPhi at points x (count, n), whose images are `last`, and log |det dPhi|.
 
-    def __init__(self, equation: Equation) -> None:
-        n = equation.dim
-        self._exponents = np.array(equation.exponents, dtype=np.int64)[:, :n]
-        self._coefficients = np.zeros((n, n + 1, len(equation.exponents)))
-        for i, row in enumerate(equation.terms):
-            for j, entry in enumerate(row):
-                for k, coefficient in entry:
-                    self._coefficients[i, j, k] = to_float(coefficient)
+    It is the product over the factors of M(x)^{-1} N(x, x~), N = -(d/dx)(M x~ - r) at fixed x~.
+    """
+    x, image, volume, total = x.T, last.T, 0.0, None
+    for equation in equations:
+        n, exponents = equation.dim, [[int(e) for e in exponent] for exponent in equation.exponents]
+        L, N = np.zeros((n, n + 1, len(last))), np.zeros((n, n, len(last)))  # (M | -r)
 
-    def matrices(self, x: FloatArray) -> FloatArray:
-        """(M | -r) at the points."""
-        monomials = np.prod(x[:, None, :] ** self._exponents, axis=2)
-        found: FloatArray = np.tensordot(monomials, self._coefficients, axes=(1, 2))
-        return found
+        def product(exponent: Sequence[int], x: FloatArray = x) -> Any:
+            return reduce(mul, (x[i] ** e if e > 1 else x[i] for i, e in enumerate(exponent) if e), 1.0)
 
-    def numerators(self, x: FloatArray, image: FloatArray) -> FloatArray:
-        """N = -(d/dx)(M x~ - r) at fixed x~."""
-        slopes = np.zeros((len(x), *self._exponents.shape))  # of each monomial by each variable
-        for k, exponents in enumerate(self._exponents.T):
-            less = self._exponents.copy()
-            less[:, k] -= exponents > 0
-            slopes[:, :, k] = exponents * np.prod(x[:, None, :] ** less, axis=2)
-        after = np.concatenate([image, np.ones((len(image), 1))], axis=1)
-        found: FloatArray = -(np.einsum("ijk,bj->bik", self._coefficients, after) @ slopes)
-        return found
-
-
-class _Walk:
-    """Points, frames and sums of logarithms of all orbits; `lanes` are those still going."""
-
-    def __init__(self, factors: Sequence[_Step], x: FloatArray) -> None:
-        n = x.shape[1]
-        self._factors = factors
-        self._x = x
-        self._frames = np.broadcast_to(np.eye(n), (len(x), n, n)).copy()
-        self.sums = np.zeros((len(x), n))
-        self.volumes = np.zeros(len(x))
-        self.lanes: NDArray[np.int64] = np.arange(len(x))
-
-    def reset(self) -> None:
-        """Count from here."""
-        self.sums[:] = 0.0
-        self.volumes[:] = 0.0
-
-    def step(self) -> None:
-        """One step of all orbits; those without an image, or with one out of range, end."""
-        for one in self._factors:
-            self._step(one)
-
-    def _step(self, one: _Step) -> None:
-        x = self._x
-        with np.errstate(all="ignore"):
-            rows = one.matrices(x)
-            below, right = rows[:, :, :-1], -rows[:, :, -1]
-            sound: NDArray[Any] = np.asarray(np.isfinite(rows).all(axis=(1, 2)))
-            sound[sound] = np.linalg.det(below[sound]) != 0.0
-            image = np.full_like(x, np.nan)
-            image[sound] = _solved(below[sound], right[sound][:, :, None])[:, :, 0]
-            above = one.numerators(x, image)
-            sound &= np.isfinite(above).all(axis=(1, 2))
-            below, above = below[sound], above[sound]
-            frames = _solved(below, above @ self._frames[sound])
-            fine: NDArray[Any] = np.asarray(np.isfinite(frames).all(axis=(1, 2)))
-            fine[fine] = np.abs(frames[fine]).max(axis=(1, 2), initial=0.0) < 1e150  # squares are taken
-            sound[sound] = fine
-            frames, R = np.linalg.qr(frames[fine])
-            lengths = np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
-            volumes = np.linalg.slogdet(above[fine])[1] - np.linalg.slogdet(below[fine])[1]
-            good = np.isfinite(lengths).all(axis=1) & np.isfinite(volumes)
-            sound[sound] = good
-        self.lanes = self.lanes[sound]
-        self._x, self._frames = image[sound], frames[good]
-        self.sums[self.lanes] += lengths[good]
-        self.volumes[self.lanes] += volumes[good]
-
-
-def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """The solutions; NaN for all where a matrix is singular in spite of its determinant."""
-    try:
-        found: NDArray[Any] = np.linalg.solve(matrix, right)
-    except np.linalg.LinAlgError:
-        found = np.full_like(right, np.nan)
-        for k in range(len(matrix)):
-            try:
-                found[k] = np.linalg.solve(matrix[k], right[k])
-            except np.linalg.LinAlgError:
-                continue
-    return found
-
-
-def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
-    if len(values) == 0:
-        return np.full(values.shape[1], np.nan)
-    found: FloatArray = function(values, axis=0)
-    return found
+        values = [product(exponent[:n]) for exponent in exponents]
+        terms = [
+            (i, j, k, to_float(c)) for i, row in enumerate(equation.terms) for j, e in enumerate(row) for k, c in e
+        ]
+        for i, j, k, c in terms:
+            L[i, j] += c * values[k]
+        if len(equations) > 1:
+            M = L.copy()
+            eliminate(M, n, 1)
+            image = -M[:, n]
+        for i, j, k, c in terms:
+            for l, e in enumerate(exponents[k][:n]):
+                if e:
+                    less = [d - (l == q) for q, d in enumerate(exponents[k][:n])]
+                    N[i, l] -= c * e * product(less) * (image[j] if j < n else 1.0)
+        M = np.concatenate([L[:, :n], N], axis=1)
+        volume = volume + np.log(eliminate(N, n, 0)).sum(axis=0) - np.log(eliminate(M, n, n)).sum(axis=0)
+        slope = np.moveaxis(M[:, n:], 2, 0)
+        total = slope if total is None else slope @ total
+        x = image
+    return np.ascontiguousarray(total), volume

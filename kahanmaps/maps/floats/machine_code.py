@@ -17,7 +17,7 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-import llvmlite.binding as llvm
+import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, FloatStep, Lanes, Table
 from kahanmaps.maps.floats.straight_line import Code, Value

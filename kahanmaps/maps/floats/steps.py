@@ -13,6 +13,7 @@ two, in one piece or in portions.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,34 +44,50 @@ RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
 STATUS = ("completed", "overflow", "singular")  # by code; the words of OrbitEnd
 
 
-class FloatStep:
-    """A step: `careful` takes the rows of a state, arrays, to those of its image, and says what happened in three more.
+Write = Callable[[Sequence[Any], Findings], Sequence[Any]]
 
-    These tell in which orbits the step is near-singular, singular, or an overflow. Unless the step is too long, it is
-    written out as well: `fast_code` and `careful_code`, the fast one with one more value that tells where it is right.
+
+class FloatStep:
+    """A step of states with so many rows: `write` gives the image of a state, and asks `Findings` about the numbers.
+
+    `careful` takes the rows of a state, arrays, to those of its image and three more, which tell in which orbits the
+    step is near-singular, singular, or an overflow. `fast` has one more, which tells in which orbits it is right.
+    Raises TooLong for a step with more operations than are worth being written out.
     """
 
-    def __init__(self, rows: int, write: Callable[[Sequence[Any], Findings], Sequence[Any]] | None) -> None:
-        self.rows = rows
-        self.fast_code: Code | None = None
-        if write is not None:
-            self.fast_code, self.careful_code = (_written(rows, write, careful) for careful in (False, True))
-            self.fast_on_floats, self.fast = self.fast_code.function(float), self.fast_code.function(np.ndarray)
-            self.careful = self.careful_code.function(np.ndarray)
+    def __init__(self, rows: int, write: Write) -> None:
+        self.rows, self._write = rows, write
+        self.fast_code: Code | None = self._code(careful=False)
+        self.operations = len(self.fast_code.operations)
+        self.fast_on_floats = self.fast_code.function(float)
+        self.fast = self.fast_code.function(np.ndarray)
 
-    @property
-    def operations(self) -> int:
-        """How many operations a fast step has, roughly."""
-        return len(self.fast_code.operations) if self.fast_code is not None else self.rows**3
+    @cached_property
+    def careful_code(self) -> Code:
+        """Written when it is needed, which is seldom."""
+        return self._code(careful=True)
 
+    @cached_property
+    def careful_on_floats(self) -> Callable[..., tuple[Any, ...]]:
+        """The same of a single state."""
+        return self.careful_code.function(float)
 
-def _written(rows: int, write: Callable[[Sequence[Any], Findings], Sequence[Any]], careful: bool) -> Code:
-    code, asked = Code(rows, 4 * MAX_OPERATIONS if careful else MAX_OPERATIONS), Findings(careful)
-    image = write(code.arguments, asked)
-    for x in image:
-        asked.number(x)
-    code.outputs = [*image, *asked.outputs()]
-    return code
+    @cached_property
+    def _careful(self) -> Callable[..., tuple[Any, ...]]:
+        return self.careful_code.function(np.ndarray)
+
+    def careful(self, *x: FloatArray) -> tuple[Any, ...]:
+        """The image, and what happened."""
+        return self._careful(*x)
+
+    def _code(self, careful: bool) -> Code:
+        limit = 4 * MAX_OPERATIONS if careful else MAX_OPERATIONS
+        code, asked = Code(self.rows, limit), Findings(careful)
+        image = self._write(code.arguments, asked)
+        for x in image:
+            asked.number(x)
+        code.outputs = [*image, *asked.outputs()]
+        return code
 
 
 def planar_step(blocks: PlanarBlocks) -> FloatStep:
@@ -197,37 +214,50 @@ class LargeStep(FloatStep):
     """A step in whole arrays, with exchanges of rows as LAPACK does them, for maps of many variables."""
 
     def __init__(self, rows: int, equations: Sequence[FloatEquation]) -> None:
-        super().__init__(rows, None)
+        self.rows, self.operations, self.fast_code = rows, len(equations) * rows**3, None
         self._equations = equations
 
-    def careful(self, *x: FloatArray) -> tuple[Any, ...]:  # type: ignore[override]  # elsewhere an attribute
+    def careful(self, *x: FloatArray) -> tuple[Any, ...]:
         near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
-        image = np.array(x)
+        image: Any = np.array(x)
         for equation in self._equations:
             n, y = self.rows, equation.monomials(image)
-            M = np.repeat(np.array(equation.constants)[:, :, None], len(near), axis=2)
+            M = np.zeros((n, n + 2, len(near)))
+            M[:, :-1] = np.array(equation.constants)[:, :, None]
             for i, entries in enumerate(equation.terms):
                 for j, terms in enumerate(entries):
                     for k, c in terms:
                         M[i, j] += c * y[k]
-            sizes = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)
-            lanes = np.arange(len(near))
-            for p in range(n):
-                best = p + np.abs(M[p:, p]).argmax(axis=0)
-                for rows in (M.transpose(0, 2, 1), sizes):
-                    rows[p], rows[best, lanes] = rows[best, lanes], rows[p].copy()
-                pivots = np.abs(M[p, p])
-                near |= ~(pivots > NEAR * sizes[p])
-                singular |= finite & (pivots == 0.0)
-                finite &= pivots <= LARGEST
-                M[p + 1 :, p:] -= (M[p + 1 :, p] / M[p, p])[:, None] * M[p, p:]
+            M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # sizes of the rows
+            pivots = eliminate(M, n, 1)
+            near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
+            singular |= finite & (pivots == 0.0).any(axis=0)
+            finite &= (pivots <= LARGEST).all(axis=0)
             image = M[:, n]
-            for p in range(n - 1, -1, -1):
-                image[p] /= M[p, p]
-                image[:p] -= M[:p, p] * image[p]
             finite &= (np.abs(image) <= LARGEST).all(axis=0)
         overflow = ~finite & ~singular
         return *image, near & finite & ~singular, singular, overflow
+
+
+def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
+    """Gaussian elimination with partial pivoting in many matrices (n, n + count + ..., lanes) at once, in place.
+
+    The solutions stand in the `count` columns of the right-hand sides then; columns behind them are exchanged with
+    their rows. Returns the absolute values (n, lanes) of the pivots.
+    """
+    lanes, end = np.arange(M.shape[2]), n + count
+    pivots = np.empty((n, len(lanes)))
+    for p in range(n):
+        best = p + np.abs(M[p:, p]).argmax(axis=0)
+        if (best != p).any():
+            rows = M.transpose(0, 2, 1)
+            rows[p], rows[best, lanes] = rows[best, lanes], rows[p].copy()
+        pivots[p] = np.abs(M[p, p])
+        M[p + 1 :, p:end] -= (M[p + 1 :, p] / M[p, p])[:, None] * M[p, p:end]
+    for p in range(n - 1, -1, -1):
+        M[p, n:end] /= M[p, p]
+        M[:p, n:end] -= M[:p, p, None] * M[p, n:end]
+    return pivots
 
 
 class Lanes(NamedTuple):
@@ -286,9 +316,15 @@ def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tabl
             x: Any = lanes.z[:, low].tolist() if single else list(lanes.z[:, part])
             for index in range(first, first + steps):
                 try:
-                    *image, good = (
-                        (x, False) if step.fast is None else (step.fast_on_floats if single else step.fast)(*x)
-                    )
+                    if step.fast_code is None:
+                        image, good = x, False
+                    elif single:
+                        *image, good = step.fast_on_floats(*x)
+                        if not good:
+                            *image, near, singular, overflow = step.careful_on_floats(*x)
+                            good = not (near or singular or overflow)
+                    else:
+                        *image, good = step.fast(*x)
                 except ZeroDivisionError:  # where arrays get an infinity
                     image, good = x, False
                 if good is not True and not np.all(good | dead):
