@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from itertools import islice
 from typing import Any
 
@@ -11,15 +13,19 @@ from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Whole
-from kahanmaps_cli.runs.ensemble_run import FAILURES_SHOWN, Asked, EnsembleRun, normal_form_for
-from kahanmaps_cli.runs.ensemble_starts import asked_starts
+from kahanmaps_cli.runs.ensemble_starts import normal_form_for, requested_starts, starts_record
+from kahanmaps_cli.screen.numbers import json_number, short_float
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, say
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.signals import interruptible
 
-_MAX_STEPS = 10**13  # years
+MAX_STEPS = 10**13  # years
+FAILURES_SHOWN = 20
+_WORTH_COMPILING = 5_000_000  # of numpy's time, below which it is done before code is loaded and compiled
+_LOOKS = 100  # at integrals that were asked for, unless --every says when
+_VALUES = 200_000  # of them at most
 
 
 @click.command("ensemble")
@@ -59,26 +65,68 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     eps = opt.eps_of(file, options)
     number = lib.fmpq(1) if eps is None else eps
     file.map.at(number)  # the demands on eps, in the words of orbit
-    starts = asked_starts(file, options)
+    starts = requested_starts(file, options)
     normal_form = normal_form_for(file, options["method"])
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
-    run = EnsembleRun(Asked(file, number, starts, form, integrals, options))
+    value = lib.to_float(number)  # backward too: the inverse conserves what the map conserves
+
+    def of_point(function: Any) -> Callable[[Sequence[float]], float | None]:
+        in_floats = lib.float_function(function)
+        return lambda x: in_floats([*x, value])
+
+    steps, every, output = options["steps"], options["every"], options["output"]
+    is_short = steps * (30 * min(len(starts), 20) + len(starts)) < _WORTH_COMPILING
+    ensemble = lib.FloatEnsemble(
+        file.map,
+        number,
+        starts,
+        form=form,
+        kernel="numpy" if options["kernel"] is None and is_short else options["kernel"],
+        backward=options["backward"],
+        threads=options["threads"],
+        integrals={name: of_point(claimed.function) for name, claimed in integrals.items()},
+    )
+    method = "generic" if form is None else "normal-form"
     if verbose and not quiet:
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
-        say(f"method {run.method}: {why}; kernel {run.kernel}")
-    steps, output = options["steps"], options["output"]
-    with interruptible(run.interrupt), Progress(quiet) as progress:
-        run.walk(lambda k: progress(f"step {k} of {steps}"))
+        say(f"method {method}: {why}; kernel {ensemble.kernel}")
+    # Integrals are looked at more often than the first and the last point are written.
+    whole = every or max(1, steps)
+    interval = whole
+    if integrals and not every:
+        interval = max(1, -(-steps // max(1, min(_LOOKS, _VALUES // len(starts)))))
+    file_of_points = None if output is None else lib.NpyFile(output, starts.shape, "<f8")
+    with interruptible(ensemble.interrupt), Progress(quiet) as progress, file_of_points or nullcontext():
+        portions = ensemble.records(steps, interval, progress=lambda k: progress(f"step {k} of {steps}"))
+        for k, points in enumerate(portions):
+            if file_of_points is not None and (interval == whole or k == 0):
+                file_of_points.append(points)
+        if file_of_points is not None and interval != whole and ensemble.step == steps:
+            file_of_points.append(ensemble.x[None])
+    records = 0 if file_of_points is None else file_of_points.rows
+    found = {
+        "orbits": ensemble.n,
+        "steps": steps,
+        "status": "interrupted" if ensemble.step < steps else "completed",
+        "steps_taken": ensemble.step,
+        "counts": {word: int((ensemble.status == word).sum()) for word in ("completed", "overflow", "singular")},
+        "failures": list(islice(_failures(ensemble), FAILURES_SHOWN)),
+        "near_singular": _near_singular(ensemble),
+        "drift": _drifts(ensemble),
+    }
     if as_json:
-        print_json(_record(file, eps, options, run))
+        shape = {"shape": [records, *starts.shape], "every": whole, "axes": ["record", "orbit", "x"]}
+        direction = "backward" if options["backward"] else "forward"
+        how = {"variables": list(file.variables), "method": method, "kernel": ensemble.kernel, "direction": direction}
+        how |= {**lib.eps_record(eps, file.map), **starts_record(options, len(starts)), **found}
+        print_json(record_of("ensemble", file, "float", **how, output=output and {"file": output, **shape}))
     else:
-        _print(file, eps, options, run)
-    interrupted = run.reached < steps
+        _print(file, eps, options["backward"], ensemble.kernel, found)
     if not quiet and output is not None:
-        say(f"{output}: {counted(run.records, 'record')} of {counted(run.shape[0], 'orbit')}")
-    if not quiet and interrupted:
-        say(f"interrupted after step {run.reached}")
-    return 130 if interrupted else 0 if run.counts["completed"] == run.shape[0] else 3
+        say(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
+    if not quiet and ensemble.step < steps:
+        say(f"interrupted after step {ensemble.step}")
+    return 130 if ensemble.step < steps else 0 if found["counts"]["completed"] == ensemble.n else 3
 
 
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:
@@ -92,59 +140,57 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError("found - twice, and there is one standard input")
     if steps < 0:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
-    if steps > _MAX_STEPS:
-        raise click.UsageError(f"found --steps {steps}, expected at most {_MAX_STEPS:.0e}: it would take years")
+    if steps > MAX_STEPS:
+        raise click.UsageError(f"found --steps {steps}, expected at most {MAX_STEPS:.0e}: it would take years")
     if every is not None and output is None:
         raise click.UsageError("--every K is for -o FILE.npy")
     if output is not None and not output.endswith(".npy"):
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _print(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: EnsembleRun) -> None:
+def _failures(ensemble: lib.FloatEnsemble) -> Any:
+    for orbit in (ensemble.failed_at >= 0).nonzero()[0].tolist():
+        yield {"orbit": orbit, **ensemble.end(orbit).to_json()}
+
+
+def _near_singular(ensemble: lib.FloatEnsemble) -> dict[str, Any]:
+    """How many steps were near-singular, in how many orbits, and where first."""
+    near, at = ensemble.near_singular, ensemble.near_singular_at
+    orbits = near.nonzero()[0].tolist()
+    first = min(orbits, key=lambda k: int(at[k]), default=None)
+    where = None if first is None else {"orbit": first, "step": int(at[first])}
+    return {"steps": int(near.sum()), "orbits": len(orbits), "first": where}
+
+
+def _drifts(ensemble: lib.FloatEnsemble) -> list[dict[str, Any]]:
+    """How far each integral moved in the orbit where it moved most, of those that were completed."""
+    going = (ensemble.failed_at < 0).nonzero()[0]
+    found: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(going)} for drift in ensemble.drift]
+    for record, drift in zip(found, ensemble.drift if len(going) else (), strict=False):
+        worst = int(going[drift.largest[going].argmax()])
+        record |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
+        record["initial"] = json_number(drift.initial[worst])
+    return found
+
+
+def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: dict[str, Any]) -> None:
     """Tab-separated lines, aligned on a terminal."""
-    backward = ", backward" if options["backward"] else ""
-    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{backward}")
-    rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
-    rows += [(word, str(number)) for word, number in run.counts.items()]
-    near = run.near()
-    if near is not None:
-        where = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
-        rows.append(("near-singular", f"{counted(near['steps'], 'step')} in {counted(near['orbits'], 'orbit')}{where}"))
-    rows += [("drift", line) for line in run.moved_lines()]
-    shown = list(islice(run.failures(), FAILURES_SHOWN))
-    rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in shown]
-    more = run.shape[0] - run.counts["completed"] - len(shown)
+    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
+    rows = [("orbits", str(found["orbits"])), ("steps", str(found["steps_taken"])), ("kernel", kernel)]
+    rows += [(word, str(number)) for word, number in found["counts"].items()]
+    near = found["near_singular"]
+    where = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
+    rows.append(("near-singular", f"{counted(near['steps'], 'step')} in {counted(near['orbits'], 'orbit')}{where}"))
+    for drift in found["drift"]:
+        text = "no orbit was completed"
+        if "largest" in drift:
+            initial = drift["initial"]
+            start = "+-".join(map(short_float, initial)) + "i" if isinstance(initial, list) else short_float(initial)
+            text = f"at most {short_float(drift['largest'])} (orbit {drift['orbit']}, from {start})"
+        rows.append(("drift", f"{drift['name']}\t{text}"))
+    rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in found["failures"]]
+    more = found["orbits"] - found["counts"]["completed"] - len(found["failures"])
     if more:
         rows.append(("ended early", f"and {counted(more, 'more orbit')}"))
     for name, text in rows:
         tell(f"{name}\t{text}", 15)
-
-
-def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], run: EnsembleRun) -> dict[str, Any]:
-    steps, output = options["steps"], options["output"]
-    drawn_at_random = options["starts"] is None
-    box = None
-    if drawn_at_random:
-        box = "1" if options["box"] is None else lib.format_number(options["box"])
-    every = options["every"] or max(1, steps)
-    more = {
-        **lib.eps_record(eps, file.map),
-        "variables": list(file.variables),
-        "method": run.method,
-        "kernel": run.kernel,
-        "direction": "backward" if options["backward"] else "forward",
-        "starts": {"random": options["count"], "box": box} if drawn_at_random else {"file": options["starts"]},
-        "seed": (options["seed"] or 0) if drawn_at_random else None,
-        "orbits": run.shape[0],
-        "steps": steps,
-        "status": "interrupted" if run.reached < steps else "completed",
-        "steps_taken": run.reached,
-        "counts": run.counts,
-        "failures": list(islice(run.failures(), FAILURES_SHOWN)),
-        "near_singular": run.near(),
-        "drift": run.moved(),
-        "output": None
-        if output is None
-        else {"file": output, "shape": [run.records, *run.shape], "every": every, "axes": ["record", "orbit", "x"]},
-    }
-    return record_of("ensemble", file, "float", **more)

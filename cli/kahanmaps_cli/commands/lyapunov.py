@@ -9,7 +9,7 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.ensemble_starts import asked_starts
+from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
 from kahanmaps_cli.screen.progress import Progress, say
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import on_terminal, print_table, tell
@@ -44,10 +44,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
-    _require_sense(options, steps, transient)
+    if options["starts"] is not None and any(options[name] is not None for name in ("count", "box", "seed")):
+        raise click.UsageError("--random, --box and --seed draw starts: they do not go with --starts FILE")
+    if not 2 <= steps <= _MAX_STEPS or not 0 <= transient <= _MAX_STEPS:
+        raise click.UsageError(
+            f"found --steps {steps} and --transient {transient}, expected 2 to {_MAX_STEPS} and 0 to {_MAX_STEPS}"
+        )
     file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
-    starts = asked_starts(file, options, count=_DEFAULT_STARTS)
+    starts = requested_starts(file, options, count=_DEFAULT_STARTS)
     with Progress(quiet) as progress:
         found = lib.lyapunov_exponents(
             file.map,
@@ -69,21 +74,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     return 3 if found.ended or found.stopped else 0
 
 
-def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
-    if options["starts"] is not None and any(options[name] is not None for name in ("count", "box", "seed")):
-        raise click.UsageError("--random, --box and --seed draw starts: they do not go with --starts FILE")
-    if not 2 <= steps <= _MAX_STEPS or not 0 <= transient <= _MAX_STEPS:
-        raise click.UsageError(
-            f"found --steps {steps} and --transient {transient}, expected 2 to {_MAX_STEPS} and 0 to {_MAX_STEPS}"
-        )
-
-
 def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
     tell(f"# {file.name}{lib.eps_told(eps, file.map)}, double precision")
     tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
     tell(f"steps\t{found.steps} after {found.transient}")
     columns = {"per unit of time": found.mean} if file.map.time_steps else {}
-    columns |= {"per step": found.mean * found.unit, "spread": found.spread, "change from half": found.change}
+    columns |= {"per step": found.per_step, "spread": found.spread, "change from half": found.change}
     rows = [
         [str(k), *(f"{number:.6g}" for number in numbers)]
         for k, numbers in enumerate(zip(*columns.values(), strict=True), 1)
@@ -100,21 +96,18 @@ def _numbers(values: Any) -> list[float | None]:
 
 
 def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.Lyapunov) -> dict[str, Any]:
-    random = options["starts"] is None
-    box = "1" if options["box"] is None else str(options["box"])
     return record_of(
         "lyapunov",
         file,
         "float",
         variables=list(file.variables),
         **lib.eps_record(eps, file.map),
-        starts={"random": found.orbits, "box": box} if random else {"file": options["starts"]},
-        seed=(options["seed"] or 0) if random else None,
+        **starts_record(options, found.orbits),
         steps_asked=options["steps"],
         seconds=options["seconds"],
         **lib.attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
         per_time=_numbers(found.mean),
-        per_step=_numbers(found.mean * found.unit),
+        per_step=_numbers(found.per_step),
         spread=_numbers(found.spread),
         change_from_half=_numbers(found.change),
         sum=_numbers([found.mean.sum()])[0],

@@ -37,12 +37,32 @@ def drawn(count: int, dim: int, box: Any, seed: int) -> lib.NDArray[Any]:
     return lib.starts_in_box(count, dim, size, seed)
 
 
-def asked_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.NDArray[Any]:
-    """The starts that the options ask for: those of a file, or drawn at random, `count` of them unless they say."""
+def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.NDArray[Any]:
+    """The starts of the options: those of a file, or drawn at random, `count` of them unless the options say."""
     if options["starts"] is not None:
         return read_starts(options["starts"], file.variables)
     count = options["count"] if count is None or options["count"] is not None else count
     return drawn(count, file.dim, 1 if options["box"] is None else options["box"], options["seed"] or 0)
+
+
+def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
+    """What a record says of them, so that they can be had again."""
+    if options["starts"] is not None:
+        return {"starts": {"file": options["starts"]}, "seed": None}
+    box = "1" if options["box"] is None else lib.format_number(options["box"])
+    return {"starts": {"random": orbits, "box": box}, "seed": options["seed"] or 0}
+
+
+def normal_form_for(file: lib.SystemFile, method: str | None) -> lib.SystemNormalForm | lib.NoNormalForm:
+    """The normal form that steps are made in, or why there is none."""
+    if method == "generic":
+        return lib.NoNormalForm("generic, as asked for")
+    normal_form = file.normal_form
+    if not isinstance(normal_form, lib.NoNormalForm) and normal_form.T is not None:
+        normal_form = lib.NoNormalForm("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
+    if isinstance(normal_form, lib.NoNormalForm) and method == "normal-form":
+        raise InputError(f"the method normal-form needs a normal form, and there is none: {normal_form.reason}")
+    return normal_form
 
 
 def read_starts(path: str, variables: Sequence[str]) -> lib.NDArray[Any]:
@@ -66,7 +86,7 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.NDArray[Any]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{where}: found neither a .npy file nor UTF-8 text with a point in each line") from None
-    return _Text(where, variables).read(text)
+    return _from_text(text, where, variables)
 
 
 def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[Any]:
@@ -78,10 +98,13 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[
     try:
         rows = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as error:  # its head is read like Python, and may go wrong like Python: in its tokens, its depth
-        raise InputError(f"{where}: found a .npy file that cannot be read: {_first(error)}") from None
+        message = [*str(error).splitlines(), type(error).__name__][0]
+        raise InputError(f"{where}: found a .npy file that cannot be read: {message[:200]}") from None
     dtype, shape, dim = rows.dtype, rows.shape, len(variables)
     if dtype.kind not in "fiu":
-        raise InputError(f"{where}: found an array of {_kind(dtype)}, expected real numbers")
+        kinds = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}
+        kind = kinds.get(dtype.kind, f"the type {str(dtype)[:40]}")
+        raise InputError(f"{where}: found an array of {kind}, expected real numbers")
     if len(shape) != 2 or shape[1] != dim or shape[0] < 1:
         raise InputError(
             f"{where}: found an array of shape {shape}, expected (n, {dim}): one row for each start, with columns "
@@ -98,66 +121,36 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[
     return starts
 
 
-class _Text:
-    """Reads text with a point in each line."""
+def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.NDArray[Any]:
+    """The points of text, one a line; a first line of names says in which columns the variables stand."""
+    import numpy as np
 
-    def __init__(self, where: str, variables: Sequence[str]) -> None:
-        self.where = where
-        self.variables = list(variables)
-        self.columns: list[int] | None = None
-        self.width = len(self.variables)
-
-    def read(self, text: str) -> lib.NDArray[Any]:
-        import numpy as np
-
-        rows: list[list[float]] = []
-        fresh = True
-        for number, line in enumerate(text.split("\n"), start=1):
-            content = line.partition("#")[0].strip().strip("()[]{}")  # as people print points
-            if not content:
-                continue
-            cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()
-            if fresh and self._is_header(cells):
-                fresh = False
-                continue
-            fresh = False
-            rows.append(self._row(number, cells))
-            if len(rows) * len(self.variables) > MAX_NUMBERS:
-                raise InputError(f"{self.where}:{number}: found more than {MAX_NUMBERS} numbers, expected fewer")
-        if not rows:
-            raise InputError(
-                f"{self.where}: found no point, expected one a line: {', '.join(self.variables)}, e.g. 1/2,-1/3,..."
-            )
-        return np.array(rows, dtype=np.float64)
-
-    def _is_header(self, cells: list[str]) -> bool:
-        """Whether this is a line of names; then the columns of the variables are looked up there."""
-        if not set(self.variables) <= set(cells):
-            return False
-        self.columns, self.width = [cells.index(name) for name in self.variables], len(cells)
-        return True
-
-    def _row(self, number: int, cells: list[str]) -> list[float]:
-        where = f"{self.where}:{number}"
-        if len(cells) != self.width:
+    rows: list[list[float]] = []
+    columns: list[int] | None = None
+    width, is_first = len(variables), True
+    for number, line in enumerate(text.split("\n"), start=1):
+        content = line.partition("#")[0].strip().strip("()[]{}")  # as people print points
+        if not content:
+            continue
+        cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()
+        if is_first and set(variables) <= set(cells):
+            columns, width, is_first = [cells.index(name) for name in variables], len(cells), False
+            continue
+        is_first = False
+        if len(cells) != width:
             what = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
-            named = "" if self.columns is not None else f": {', '.join(self.variables)}"
-            raise InputError(f"{where}: found {what}, expected {self.width}{named}")
+            names = "" if columns is not None else f": {', '.join(variables)}"
+            raise InputError(f"{where}:{number}: found {what}, expected {width}{names}")
         row: list[float] = []
-        for k in range(len(cells)) if self.columns is None else self.columns:
+        for k in range(len(cells)) if columns is None else columns:
             try:
                 row.append(lib.to_float(lib.parse_number(cells[k])))
             except InputError as error:
                 message = error.message if isinstance(error, ExpressionError) else error
-                raise InputError(f"{where}: entry {k + 1}: {message}") from error
-        return row
-
-
-def _kind(dtype: Any) -> str:
-    kinds = {"f": "machine floats", "c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}
-    return kinds.get(dtype.kind, f"the type {str(dtype)[:40]}")
-
-
-def _first(error: Exception) -> str:
-    lines = str(error).splitlines()
-    return lines[0][:200] if lines else type(error).__name__
+                raise InputError(f"{where}:{number}: entry {k + 1}: {message}") from error
+        rows.append(row)
+        if len(rows) * len(variables) > MAX_NUMBERS:
+            raise InputError(f"{where}:{number}: found more than {MAX_NUMBERS} numbers, expected fewer")
+    if not rows:
+        raise InputError(f"{where}: found no point, expected one a line: {', '.join(variables)}, e.g. 1/2,-1/3,...")
+    return np.array(rows, dtype=np.float64)

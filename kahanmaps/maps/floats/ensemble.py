@@ -211,7 +211,10 @@ class FloatEnsemble:
         return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of machine floats")
 
     def interrupt(self) -> None:
-        """Ask `advance` or `records` to return after the portion in hand (safe to call from a signal handler)."""
+        """Ask `advance` or `records` to return after the portion in hand, or after the next one if there is none.
+
+        Safe to call from a signal handler.
+        """
         self._interrupted = True
 
     def advance(self, steps: int, *, progress: Callable[[int], None] | None = None) -> None:
@@ -242,7 +245,6 @@ class FloatEnsemble:
 
     def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
         """Take the steps in portions of about a tenth of a second; the states at multiples of `every` (0: none)."""
-        self._interrupted = False
         lanes, stop, rows = self._lanes, self.step + steps, self._step.rows
         # Both seconds an operation are rough, those of arrays grow with the number of orbits only in part.
         if self._compiled:
@@ -276,7 +278,8 @@ class FloatEnsemble:
             if progress is not None:
                 progress(self.step)
             if self._interrupted:
-                return
+                break
+        self._interrupted = False
 
     def _advance(self, first: int, count: int, tables: list[Table]) -> None:
         if not self._compiled:
