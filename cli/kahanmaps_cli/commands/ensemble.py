@@ -70,8 +70,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
     value = lib.to_float(number)  # backward too: the inverse conserves what the map conserves
 
-    def of_point(function: Any) -> Callable[[Sequence[float]], float | None]:
-        in_floats = lib.float_function(function)
+    def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
+        in_floats = lib.float_function(claimed.function)
         return lambda x: in_floats([*x, value])
 
     steps, every, output = options["steps"], options["every"], options["output"]
@@ -84,7 +84,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         kernel="numpy" if options["kernel"] is None and is_short else options["kernel"],
         backward=options["backward"],
         threads=options["threads"],
-        integrals={name: of_point(claimed.function) for name, claimed in integrals.items()},
+        integrals={name: of_point(claimed) for name, claimed in integrals.items()},
     )
     method = "generic" if form is None else "normal-form"
     if verbose and not quiet:
@@ -117,9 +117,20 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if as_json:
         shape = {"shape": [records, *starts.shape], "every": whole, "axes": ["record", "orbit", "x"]}
         direction = "backward" if options["backward"] else "forward"
-        how = {"variables": list(file.variables), "method": method, "kernel": ensemble.kernel, "direction": direction}
-        how |= {**lib.eps_record(eps, file.map), **starts_record(options, len(starts)), **found}
-        print_json(record_of("ensemble", file, "float", **how, output=output and {"file": output, **shape}))
+        record = record_of(
+            "ensemble",
+            file,
+            "float",
+            **lib.eps_record(eps, file.map),
+            variables=list(file.variables),
+            method=method,
+            kernel=ensemble.kernel,
+            direction=direction,
+            **starts_record(options, len(starts)),
+            **found,
+            output=output and {"file": output, **shape},
+        )
+        print_json(record)
     else:
         _print(file, eps, options["backward"], ensemble.kernel, found)
     if not quiet and output is not None:

@@ -200,7 +200,8 @@ def _tangent_maps(equations: Sequence[Equation], x: FloatArray, last: FloatArray
 
     It is the product over the factors of M(x)^{-1} N(x, x~), N = -(d/dx)(M x~ - r) at fixed x~.
     """
-    x, image, volume, total = x.T, last.T, 0.0, None
+    x, image, total = x.T, last.T, None
+    volume = np.zeros(len(last))
     for equation in equations:
         n, exponents = equation.dim, [[int(e) for e in exponent] for exponent in equation.exponents]
         L, N = np.zeros((n, n + 1, len(last))), np.zeros((n, n, len(last)))  # (M | -r)

@@ -292,7 +292,7 @@ def _negation(x: Any) -> Any:
 
 
 def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: Findings) -> list[Any]:
-    """The solution y of M y = r, the rows being those of (M | r), for an M that is not singular everywhere.
+    """The solution y of M y = r, the rows being those of (M | r); any numbers where M is singular.
 
     `bound` gives a number that no entry of M exceeds, which is needed for fast eliminations only.
     """
@@ -326,9 +326,12 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: Findin
         more = {min(left)}
         while more != block:
             block, unknowns = more, {j for i in more for j in matrix[i]}
-            more = {i for i in left if unknowns & matrix[i].keys()}
+            more = {i for i in left if unknowns & matrix[i].keys()} | block
         left -= block
         order = sorted(unknowns)
+        if len(order) != len(block):  # singular everywhere
+            asked.pivot(0.0, NEAR)
+            continue
         square = [[*(matrix[i].get(j, 0.0) for j in order), right[i]] for i in sorted(block)]
         values = solve_two(square, asked) if len(square) == 2 else _eliminate(square, bound, asked)
         for j, value in zip(order, values, strict=True):
@@ -362,6 +365,9 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: Findings)
     """Gaussian elimination; the careful one exchanges rows where a pivot is small."""
     n, M = len(rows), [[*row, 1.0] for row in rows]  # with the sizes of the rows behind the right-hand side
     order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
+    if len(order) < n:  # singular everywhere
+        asked.pivot(0.0, NEAR)
+        return [0.0] * n
     for row in M if asked.careful else ():
         for x in row[:n]:
             row[-1] = extreme("max", row[-1], abs(x))
@@ -400,7 +406,10 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: Findings)
 
 
 def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
-    """Row and column of each pivot: on the diagonal where it can be, and such that few zeros are lost (Markowitz)."""
+    """Row and column of each pivot: on the diagonal where it can be, and such that few zeros are lost (Markowitz).
+
+    There are fewer than rows where the zeros alone make the matrix singular.
+    """
     rows, order = {i: set(row) for i, row in enumerate(pattern)}, []
     while rows:
         counts: dict[int, int] = {}
@@ -409,6 +418,8 @@ def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
                 counts[j] = counts.get(j, 0) + 1
         places = [(i, j) for i, row in rows.items() for j in row]
         places = [(i, j) for i, j in places if i == j] or places
+        if not places:
+            break
         i, j = min(places, key=lambda place: ((len(rows[place[0]]) - 1) * (counts[place[1]] - 1), place))
         pivot = rows.pop(i)
         order.append((i, j))
