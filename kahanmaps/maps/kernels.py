@@ -1,4 +1,4 @@
-"""What computes many orbits: numpy, which is always there, or loops compiled by numba, the extra `fast`."""
+"""What computes many orbits: numpy, which is always there, or machine code, by numba or its compiler (extra `fast`)."""
 
 from __future__ import annotations
 

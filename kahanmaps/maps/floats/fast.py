@@ -50,7 +50,7 @@ class FloatOrbit:
     `start` holds exact numbers, `eps` is half the time step, `steps` how many steps to take (None: no limit), `every`
     says which of them are delivered, `backward` steps by the inverse map. With `form`, the normal form of the system,
     steps are much faster and lose fewer digits. `kernel` is "numpy" or "numba"; by default numba, if it is installed,
-    for more than 100,000 steps. Points are computed some ahead of the one delivered; what the attributes say about
+    for more than 20,000 steps. Points are computed some ahead of the one delivered; what the attributes say about
     near-singular steps and drift is about what was computed. See FloatEnsemble for many orbits, and for `integrals` and
     `sampled`.
 
@@ -151,7 +151,7 @@ class FloatOrbit:
         self.end = ensemble.end(0)
 
 
-_LONG = 100_000  # steps, from which on loading compiled code pays
+_LONG = 20_000  # steps, from which on compiling pays
 _FOR_EVER = 1 << 62
 
 
