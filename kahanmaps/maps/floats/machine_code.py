@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import struct
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -38,15 +39,7 @@ class MachineCode:
     """A step as machine code for vectors of `width` orbits, which takes ranges of orbits through steps."""
 
     def __init__(self, step: FloatStep, width: int) -> None:
-        self.width = width
-        module = llvm.parse_assembly(_text(step, width))
-        machine = _machine()
-        module.triple, module.data_layout = machine.triple, str(machine.target_data)
-        module.verify()
-        self._engine = llvm.create_mcjit_compiler(module, machine)  # to which the machine belongs from now on
-        self._engine.finalize_object()
-        kinds = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
-        self._call = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("advance"))
+        self._engine, self._call = _compiled(_text(step, width))
 
     def advance(self, lanes: Lanes, low: int, high: int, first: int, steps: int, tables: Sequence[Table]) -> None:
         """Take the orbits low, ..., high - 1 `steps` steps from the index `first`; there are at most two tables."""
@@ -58,11 +51,20 @@ class MachineCode:
         self._call(*arrays, lanes.z.shape[1], low, high, first, steps, *records)
 
 
-def _machine() -> Any:
+@lru_cache(maxsize=32)
+def _compiled(text: str) -> tuple[Any, Any]:
+    """The engine that holds the machine code of a module, and its function `advance`."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
-    return llvm.Target.from_default_triple().create_target_machine(llvm.get_host_cpu_name(), features, opt=2)
+    machine = llvm.Target.from_default_triple().create_target_machine(llvm.get_host_cpu_name(), features, opt=2)
+    module = llvm.parse_assembly(text)
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    module.verify()
+    engine = llvm.create_mcjit_compiler(module, machine)  # to which the machine belongs from now on
+    engine.finalize_object()
+    kinds = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
+    return engine, ctypes.CFUNCTYPE(None, *kinds)(engine.get_function_address("advance"))
 
 
 def _text(step: FloatStep, width: int) -> str:

@@ -1,0 +1,360 @@
+"""Float steps of any map and of normal forms: against exact ones, and the same numbers by whatever kernel.
+
+Specified here, for one table of systems: a step agrees with the exact one, written out for numpy, as machine code, and
+in arrays where it is too long for that; kernels, threads, company, portions and records make no difference, to the last
+bit, hostile orbits among them; each way to end has its status and its step, which other orbits do not notice.
+"""
+
+import pickle
+
+import numpy as np
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_poly
+from helpers import EULER_TOP, FORCED_PLANE, NAMED_SYSTEMS
+
+from kahanmaps.algebra.fields import RR
+from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.planar import normal_form
+from kahanmaps.maps.floats import steps
+from kahanmaps.maps.floats.blocks import planar_blocks
+from kahanmaps.maps.floats.doubles import exact
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, to_floats
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.kernels import has_numba
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+needs_numba = pytest.mark.skipif(not has_numba(), reason="numba is not installed")
+KERNELS = ["numpy", pytest.param("numba", marks=needs_numba)]
+over_kernels = pytest.mark.parametrize("kernel", KERNELS)
+
+RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
+# Many variables, few terms: x_i' = x_{i+1} x_{i-1} - x_i, with a constant in the first.
+CHAIN = QuadraticSystem.from_text(
+    [f"x{i}" for i in range(8)],
+    [f"x{(i + 1) % 8}*x{i - 1 if i else 7} - x{i}" + (" + 1/2" if i == 0 else "") for i in range(8)],
+)
+# At eps = 1/50 all elements of the diagonal of I - eps f'(x) are small: rows have to be exchanged.
+PIVOTS = QuadraticSystem.from_text(
+    ["x", "y", "z"], ["50*x + 30*y + x*z", "20*x + 50*y + 10*z + y^2", "15*y + 40*x + 50*z - x*y"]
+)
+# chi = t^2 - 1 and planar cubics u^2 v at -1, u^3 at 1, in coordinates of a shear
+A = fmpq_mat(4, 4, [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1])
+REPEATED = FamilyMember(A, parse_polynomial("x1^2*x3 + x2^3", ["x1", "x2", "x3", "x4"]))
+# chi = t^2 + 1 and the planar cubic u^2 v at i: twice the real part of (x1 + i x2)^2 (x3 - i x4)/2
+A = fmpq_mat(4, 4, [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0])
+COMPLEX_REPEATED = FamilyMember(A, parse_polynomial("(x1^2 - x2^2)*x3 + 2*x1*x2*x4", ["x1", "x2", "x3", "x4"]))
+MEMBERS = {
+    "one plane": draw_with_eigenvalues([1], seed=2),
+    "three real roots": draw_with_eigenvalues([1, -2, 3], seed=7),
+    "a complex pair": draw_with_chi(fmpq_poly([1, 0, 1]), seed=1),
+    "real and complex": draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7),
+    "two complex pairs": draw_with_chi(fmpq_poly([1, 0, 0, 0, 1]), seed=4),
+    "irrational roots": draw_generic(4, seed=3),
+    "repeated factors": REPEATED,
+    "a repeated factor at a complex root": COMPLEX_REPEATED,
+}
+FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
+GENERIC = {
+    **NAMED_SYSTEMS,
+    "chain": CHAIN,
+    "pivots": PIVOTS,
+    "member": MEMBERS["three real roots"].chosen.system,
+}
+CASES = {name: (system, None) for name, system in GENERIC.items()}
+CASES |= {f"normal form, {name}": (MEMBERS[name].chosen.system, form) for name, form in FORMS.items()}
+over_members = pytest.mark.parametrize("name", MEMBERS)
+
+
+def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1, 1, (n, dim))
+
+
+def same(one: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
+    """Equal in everything that can be asked, NaN where NaN is."""
+    assert np.array_equal(one.x[some], other.x, equal_nan=True)
+    for name in ("status", "failed_at", "near_singular", "near_singular_at"):
+        assert np.array_equal(getattr(one, name)[some], getattr(other, name)), name
+    for left, right in zip(one.drift, other.drift, strict=True):
+        assert np.array_equal(left.largest[some], right.largest), left.name
+        assert np.array_equal(left.last[some], right.last, equal_nan=True), left.name
+
+
+# Right numbers.
+
+
+@pytest.mark.parametrize("kernel", [*KERNELS, "in arrays"])
+@pytest.mark.parametrize("system", GENERIC.values(), ids=GENERIC)
+def test_a_step_of_an_ensemble_is_that_of_the_exact_map(system, kernel, monkeypatch):
+    if kernel == "in arrays":
+        monkeypatch.setattr(steps, "MAX_OPERATIONS", 1)
+        kernel = "numpy"
+    starts = starts_of(system.dim, 20) / 4
+    orbits = FloatEnsemble(system, "1/50", starts, kernel=kernel)
+    orbits.advance(1)
+    phi = KahanMap(system, "1/50")
+    for start, found in zip(starts, orbits.x, strict=True):
+        x = [exact(entry) for entry in start.tolist()]
+        expected = to_floats(phi.step(x))
+        matrix = to_floats(phi.denominator_matrix(x).entries()).reshape(system.dim, system.dim)
+        # some dozen roundings for each entry of the matrix and on the way through the elimination
+        assert abs(found - expected).max() <= 100 * 2.0**-53 * np.linalg.cond(matrix) * abs(expected).max()
+
+
+@over_members
+def test_an_orbit_in_normal_form_follows_the_exact_one(name):
+    system, form = MEMBERS[name].chosen.system, FORMS[name]
+    start = [fmpq((-1) ** k * (k + 2), 20 * (k + 1)) for k in range(system.dim)]
+    balls = [point.x for point in Orbit(KahanMap(system, "1/10", RR(2000)), start, 30)]
+    orbit = FloatOrbit(system, "1/10", start, 30, form=form, kernel="numpy")
+    # Roundings in x are magnified by the change of coordinates and back, and by the derivatives of 30 steps, which add
+    # errors of their own: along these orbits by less than 1000 in all.
+    condition = np.linalg.cond(planar_blocks(form, "1/10").into)
+    largest = 0.0
+    for (step, x), point in zip(orbit, balls, strict=True):
+        expected = np.array([float(entry.mid()) for entry in point])
+        largest = max(largest, abs(expected).max())
+        assert abs(x - expected).max() <= 1000 * 2.0**-53 * condition * largest, step
+    assert orbit.end.status == "completed"
+    back = FloatEnsemble(system, "1/10", x[None], form=form, backward=True, kernel="numpy")
+    back.advance(30)
+    assert abs(back.x - to_floats(start)).max() <= 1e5 * 2.0**-53 * condition * largest
+
+
+@over_kernels
+def test_a_block_without_h_stands_still(kernel):
+    member = FamilyMember(
+        fmpq_mat(4, 4, [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1]),
+        parse_polynomial("x1^3 + x3^3", ["x1", "x2", "x3", "x4"]),
+    )
+    orbit = FloatOrbit(
+        member.chosen.system, "1/10", ["1/3", "1/2", "1/5", "-1/7"], 50, form=normal_form(member), kernel=kernel
+    )
+    *_, (_, x) = orbit
+    assert x[[1, 3]] == pytest.approx([1 / 2, -1 / 7], rel=4 * 2.0**-53)  # in and out of the rows
+    assert abs(x[0] - 1 / 3) > 1e-3
+
+
+# The same numbers, to the last bit.
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_kernels_threads_company_portions_and_records_make_no_difference(name):
+    """Some orbits end, many are near-singular again and again."""
+    system, form = CASES[name]
+    rng = np.random.default_rng(5)
+    starts = starts_of(system.dim, 150)
+    starts[40:70] *= 10.0 ** rng.uniform(-3, 60, (30, 1))
+    starts[70:80] = np.round(8 * starts_of(system.dim, 10)) * 10.0 ** rng.integers(0, 250, (10, 1))
+
+    def taken(some, *portions, **options):
+        orbits = FloatEnsemble(system, "1/3", some, form=form, sampled=7, **options)
+        return orbits, np.concatenate([x for steps in portions for x in orbits.records(steps, 4)])
+
+    together, points = taken(starts, 60, kernel="numpy")
+    assert points.shape == (16, 150, system.dim)
+    assert np.array_equal(points[0], starts)
+    assert np.array_equal(points[-1], together.x, equal_nan=True)
+    for kernel in ("numpy", "numba")[: 1 + has_numba()]:
+        for threads in (1, 2)[: 1 + (kernel == "numba")]:
+            again, same_points = taken(starts, 3, 40, 17, kernel=kernel, threads=threads)
+            same(together, again)
+            assert np.array_equal(points, same_points, equal_nan=True)
+        for some in ([0], [45], [75], [77], list(range(60, 70)), list(range(41, 80)), [149]):
+            part, own = taken(starts[some], 60, kernel=kernel, threads=1)
+            same(together, part, some)
+            assert np.array_equal(own, points[:, some], equal_nan=True)
+
+
+@pytest.mark.parametrize("name", ["a complex pair", "real and complex", "two complex pairs", "three real roots"])
+def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
+    """In the coordinates of a block U V (U + V), w = 1 - (U^2 + U V + V^2), so U = 1, V = 0 is a pole."""
+    pytest.importorskip("numba")
+    blocks = planar_blocks(FORMS[name], "1/10")
+    starts = starts_of(blocks.rows, 300) / 5
+    lines = [row == [0, 1, 1, 0] for row in blocks.coefficients.tolist()]
+    for r, has_pole in enumerate(lines):
+        if has_pole:
+            at, size = (2 * r, 2) if r < blocks.reals else (4 * r - 2 * blocks.reals, 4)
+            rows = blocks.into @ starts[20 + r]
+            rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
+            starts[20 + r] = blocks.out @ rows
+    system, form = MEMBERS[name].chosen.system, FORMS[name]
+    one, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
+    for it in (one, other):
+        it.advance(40)
+    same(one, other)
+    assert (one.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
+
+
+@over_kernels
+def test_orbits_beyond_the_first_group_are_walked_sampled_and_recorded_as_alone(kernel):
+    starts = starts_of(2, 4200)
+    starts[4150] *= 1e200
+    system, form = CASES["normal form, one plane"]
+    together, alone = (
+        FloatEnsemble(system, "1/10", some, form=form, kernel=kernel, sampled=5) for some in (starts, starts[4097:])
+    )
+    points, own = (np.concatenate(list(it.records(20, 10))) for it in (together, alone))
+    assert np.array_equal(points[:, 4097:], own, equal_nan=True)
+    same(together, alone, slice(4097, None))
+
+
+@over_kernels
+def test_an_ensemble_goes_on_after_pickling_and_its_points_stay_as_they_were(kernel):
+    orbits = FloatEnsemble(EULER_TOP, "1/10", np.array([[1.0, 0.5, 0.25]]), kernel=kernel)
+    orbits.advance(10)
+    before, copy = orbits.x, pickle.loads(pickle.dumps(orbits))
+    kept = before.copy()
+    for it in (orbits, copy):
+        it.advance(10)
+    same(orbits, copy)
+    assert np.array_equal(before, kept)
+    assert not np.array_equal(before, orbits.x)
+
+
+# Ends.
+
+
+@over_kernels
+def test_each_way_to_end_has_its_status_and_step(kernel):
+    # x~ = x/(1 - x): 1/3, 1/2, 1, and no more; from 1 - 2^-45 the pivot is 2^-45, and the image 2^45
+    starts = np.array([[0.25], [1 / 2], [1.0], [1 - 2.0**-45], [-0.5]] + 100 * [[-0.5]])
+    orbits = FloatEnsemble(RICCATI, "1/2", starts, kernel=kernel)
+    orbits.advance(2)
+    assert orbits.status.tolist()[:5] == ["completed", "singular", "singular", "completed", "completed"]
+    assert orbits.failed_at.tolist()[:5] == [-1, 2, 1, -1, -1]
+    assert orbits.near_singular.tolist()[:5] == [0, 0, 0, 1, 0]
+    assert orbits.near_singular_at.tolist()[:5] == [-1, -1, -1, 0, -1]
+    assert np.isnan(orbits.x[1:3]).all()
+    assert (orbits.status[5:] == "completed").all()
+
+
+@over_kernels
+def test_a_zero_denominator_in_normal_form_is_singular_and_a_small_one_is_counted(kernel):
+    # 2 eps = 1, so U = x1 and V = x2 up to the choice of the two factors. On V = 0 the map is U~ = U/(1 - U).
+    member = FamilyMember(fmpq_mat(2, 2, [1, 0, 0, 1]), parse_polynomial("x1*x2*(x1 + x2)", ["x1", "x2"]))
+    starts = np.array([[1 / 2, 0.0], [1.0 - 2.0**-42, 0.0], [0.25, 0.0], [1e-3, 1e-3]])
+    orbits = FloatEnsemble(member.chosen.system, "1/2", starts, form=normal_form(member), kernel=kernel)
+    orbits.advance(2)
+    assert orbits.status.tolist() == ["singular", "completed", "completed", "completed"]
+    assert orbits.near_singular_at.tolist() == [-1, 0, -1, -1]
+    assert orbits.x[2, 0] == pytest.approx(0.5, rel=1e-15)
+    assert (orbits.end(0).status, orbits.end(0).steps) == ("singular", 1)
+
+
+@over_kernels
+def test_a_pivot_is_small_beside_its_own_row_only(kernel):
+    # I - eps f' = diag(1 - x, 1 - y/2) for eps = 1/2: large numbers in one row take no bits from another
+    system = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2/2"])
+    orbits = FloatEnsemble(system, "1/2", np.array([[2.0**60, 1.0], [2.0**60, 2 - 2.0**-45]]), kernel=kernel)
+    orbits.advance(1)
+    assert orbits.near_singular.tolist() == [0, 1]
+
+
+@over_kernels
+def test_an_overflow_ends_one_orbit_and_leaves_the_others(kernel):
+    system = QuadraticSystem.from_text(["x", "y"], ["x", "x*y"])  # x~ = 3 x for eps = 1/2
+    starts = np.array([[1e300, 0.0]] + [[1e-300, 0.5]] * 200)
+    orbits = FloatEnsemble(system, "1/2", starts, kernel=kernel)
+    orbits.advance(30)
+    # 3^17 1e300 = 1.3e308 is in the range, 3^18 1e300 is not
+    assert orbits.end(0) == OrbitEnd("overflow", 17, "step 18 leaves the range of machine floats")
+    assert (orbits.status[1:] == "completed").all()
+    assert np.isnan(orbits.x[0]).all()
+    orbits.advance(10)
+    assert orbits.failed_at[0] == 18
+
+
+@over_kernels
+def test_a_matrix_that_is_singular_everywhere_ends_all_orbits(kernel):
+    orbits = FloatEnsemble(QuadraticSystem.from_text(["x", "y"], ["x", "y^2"]), "1", np.ones((30, 2)), kernel=kernel)
+    orbits.advance(3)
+    assert set(orbits.failed_at) == {1}
+
+
+@pytest.mark.parametrize("one_by_one", [False, True])
+def test_long_steps_end_as_those_that_are_written_out(one_by_one, monkeypatch):
+    starts = np.array(
+        [[0.25, 1.0], [1 / 2, 0.0], [1.0, 3.0], [1 - 2.0**-45, 0.0], [-0.5, 1e308]] * (1 if one_by_one else 20)
+    )
+    system = QuadraticSystem.from_text(["x", "y"], ["x^2", "y"])
+
+    def ends():
+        orbits = FloatEnsemble(system, "1/2", starts, kernel="numpy")
+        orbits.advance(2)
+        return orbits.failed_at.tolist(), orbits.status.tolist(), orbits.near_singular.tolist()
+
+    expected = ends()
+    assert set(expected[1]) == {"completed", "singular", "overflow"}
+    monkeypatch.setattr(steps, "MAX_OPERATIONS", 1)
+    assert ends() == expected
+
+
+# Choices and refusals.
+
+
+def test_the_kernel_is_named():
+    assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel="numpy").kernel == "numpy generic"
+    assert FloatOrbit(EULER_TOP, "1/10", [1, 1, 1], 10).kernel == "numpy generic"  # too short to be worth compiling
+
+
+@needs_numba
+def test_machine_code_is_named_with_its_threads(monkeypatch):
+    assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), threads=2).kernel == "numba generic, 2 threads"
+    assert FloatOrbit(EULER_TOP, "1/10", [1, 1, 1], None).kernel == "numba generic, 1 thread"
+    monkeypatch.setattr(steps, "MAX_OPERATIONS", 1)
+    assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel="numba").kernel == "numpy generic"
+
+
+def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
+    monkeypatch.setattr("kahanmaps.maps.kernels.has_numba", lambda: False)
+    assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3))).kernel == "numpy generic"
+    with pytest.raises(InputError, match=r"kahanmaps\[fast\]"):
+        FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel="numba")
+
+
+@pytest.mark.parametrize(
+    ("starts", "options", "sentence"),
+    [
+        (np.ones((1, 3)), {"kernel": "fortran"}, "found the kernel 'fortran', expected numpy or numba"),
+        (np.ones((1, 3)), {"threads": 0}, "found 0 threads"),
+        (np.ones((1, 3)), {"sampled": 0}, "sample every 0 steps"),
+        (np.ones((1, 3)), {"form": FORMS["a complex pair"]}, "belongs to another system"),
+        (np.ones(3), {}, "one row for each start, with columns x1, x2, x3"),
+        (np.ones((2, 2)), {}, "one row for each start"),
+        (np.ones((0, 3)), {}, "one row for each start"),
+        ([[1, 2]], {}, "one row for each start"),
+        (np.array([[1.0, np.nan, 0.0]]), {}, "no finite number"),
+    ],
+)
+def test_wrong_use_is_refused(starts, options, sentence):
+    with pytest.raises(InputError, match=sentence):
+        FloatEnsemble(EULER_TOP, "1/10", starts, **options)
+
+
+def test_records_at_no_interval_are_refused():
+    with pytest.raises(InputError, match="every 0 steps"):
+        next(FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel="numpy").records(10, 0))
+
+
+def test_an_interrupted_ensemble_stops_between_portions_and_can_go_on():
+    orbits = FloatEnsemble(FORCED_PLANE, "1/100", starts_of(2, 30) / 10, kernel="numpy")
+    seen = []
+
+    def progress(step: int) -> None:
+        seen.append(step)
+        orbits.interrupt()
+
+    orbits.advance(10**6, progress=progress)
+    assert seen == [orbits.step]
+    assert 0 < orbits.step < 10**6
+    reached = orbits.step
+    orbits.advance(3)
+    assert orbits.step == reached + 3
+    orbits.interrupt()  # before the first portion
+    orbits.advance(10**6)
+    assert 3 < orbits.step - reached < 10**6
