@@ -70,7 +70,10 @@ class ClassicalOrbit:
             if done:
                 yield step, out[:done]
             if done < len(out):
-                self.end = _end(image is None, step)
+                self.end = OrbitEnd("overflow", step, f"step {step + 1} leaves the range of machine floats")
+                if image is None:
+                    sentence = f"step {step + 1}: Newton's method finds no solution of the midpoint equation"
+                    self.end = OrbitEnd("singular", step, sentence)
                 return
         self.end = OrbitEnd("completed", step, counted(step, "step"))
 
@@ -132,10 +135,3 @@ class VectorField:
     def _half(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         z = np.concatenate([x, np.ones_like(x[..., :1])], axis=-1)
         return z, np.moveaxis(self._S @ z.T, -1, 0) if z.ndim > 1 else self._S @ z
-
-
-def _end(no_solution: bool, step: int) -> OrbitEnd:
-    if no_solution:
-        sentence = f"step {step + 1}: Newton's method finds no solution of the midpoint equation"
-        return OrbitEnd("singular", step, sentence)
-    return OrbitEnd("overflow", step, f"step {step + 1} leaves the range of machine floats")

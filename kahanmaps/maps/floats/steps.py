@@ -301,7 +301,7 @@ class Table(NamedTuple):
 
 
 _FEW = 16  # orbits, up to which Python's own floats are faster than arrays
-_GROUP = 2048  # orbits that are taken together, so that arrays stay in the processor's cache
+_GROUP = 4096  # orbits that are taken together, so that arrays stay in the processor's cache
 
 
 def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tables: Sequence[Table]) -> None:

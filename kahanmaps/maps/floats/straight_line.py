@@ -69,88 +69,84 @@ class Code:
 
     def function(self, kind: type) -> Callable[..., tuple[Any, ...]]:
         """A Python function from the inputs to the outputs: of floats, or of arrays (`kind` is np.ndarray)."""
-        lines = [f"def step({', '.join(f'v{k}' for k in range(self.inputs))}):"]
-        for k, (name, operands) in enumerate(self.operations, self.inputs):
-            x = [_text(operand) for operand in operands]
+        last = {
+            x.number: k for k, (_, operands) in enumerate(self.operations) for x in operands if isinstance(x, Value)
+        }
+        last |= {x.number: len(self.operations) for x in self.outputs if isinstance(x, Value)}
+        names = {k: f"v{k}" for k in range(self.inputs)}
+        unused: list[str] = []  # names whose arrays can go, so that the processor's cache holds the others
+
+        def text(x: Any) -> str:
+            return names[x.number] if isinstance(x, Value) else repr(x) if isinstance(x, bool) else f"({float(x)!r})"
+
+        lines = [f"def step({', '.join(names.values())}):"]
+        for k, (name, operands) in enumerate(self.operations):
+            x = [text(operand) for operand in operands]
             if name in _SYMBOLS:
-                text = f"{x[0]} {_SYMBOLS[name]} {x[1]}"
+                right = f"{x[0]} {_SYMBOLS[name]} {x[1]}"
             elif name in ("neg", "not"):
-                text = f"-{x[0]}" if name == "neg" else f"{x[0]} ^ True"
+                right = f"-{x[0]}" if name == "neg" else f"{x[0]} ^ True"
             elif name == "select" and kind is float:
-                text = f"{x[1]} if {x[0]} else {x[2]}"
+                right = f"{x[1]} if {x[0]} else {x[2]}"
             else:
-                text = f"{name}({', '.join(x)})"
-            lines.append(f"    v{k} = {text}")
-        lines.append(f"    return ({''.join(f'{_text(x)}, ' for x in self.outputs)})")
-        names: dict[str, Any] = {"select": np.where, "max": np.maximum, "min": np.minimum}
+                right = f"{name}({', '.join(x)})"
+            numbers = {operand.number for operand in operands if isinstance(operand, Value)}
+            unused += [names[n] for n in sorted(numbers) if last[n] == k and n >= self.inputs]
+            names[self.inputs + k] = unused.pop() if unused else f"v{self.inputs + k}"
+            lines.append(f"    {names[self.inputs + k]} = {right}")
+        lines.append(f"    return ({''.join(f'{text(x)}, ' for x in self.outputs)})")
+        functions: dict[str, Any] = {"select": np.where, "max": np.maximum, "min": np.minimum}
         if kind is float:
-            names = {"max": max, "min": min}
-        exec("\n".join(lines), names)
-        found: Callable[..., tuple[Any, ...]] = names["step"]
+            functions = {"max": max, "min": min}
+        exec("\n".join(lines), functions)
+        found: Callable[..., tuple[Any, ...]] = functions["step"]
         return found
 
 
-def _text(x: Any) -> str:
-    return f"v{x.number}" if isinstance(x, Value) else repr(x) if isinstance(x, bool) else f"({float(x)!r})"
-
-
 class Value:
-    """A number, or a truth value, in a `Code`; Python's floats stand for constants."""
+    """A number, or a truth value, in a `Code`; Python's floats and bools stand for constants."""
 
     def __init__(self, code: Code, number: int) -> None:
         self.code, self.number = code, number
 
-    def _negated(self) -> Any:
-        """x where this is -x, else None."""
-        k = self.number - self.code.inputs
-        name, operands = self.code.operations[k] if k >= 0 else ("", ())
-        return operands[0] if name == "neg" else None
-
     def __neg__(self) -> Any:
-        positive = self._negated()
+        positive = _negated(self)
         return self.code.emit("neg", self) if positive is None else positive
 
     def __add__(self, other: Any) -> Any:
         if is_zero(other):
             return self
         for x, y in ((self, other), (other, self)):
-            if isinstance(y, Value) and y._negated() is not None:
-                return x - y._negated()
+            if _negated(y) is not None:
+                return x - _negated(y)
         return self.code.emit("add", self, other)
-
-    __radd__ = __add__
 
     def __sub__(self, other: Any) -> Any:
         if is_zero(other):
             return self
-        if isinstance(other, Value) and other._negated() is not None:
-            return self + other._negated()
-        return self.code.emit("sub", self, other)
+        return self.code.emit("sub", self, other) if _negated(other) is None else self + _negated(other)
 
     def __rsub__(self, other: Any) -> Any:
         if is_zero(other):
             return -self
-        positive = self._negated()
-        return self.code.emit("sub", other, self) if positive is None else other + positive
+        return self.code.emit("sub", other, self) if _negated(self) is None else other + _negated(self)
 
     def __mul__(self, other: Any) -> Any:
-        if isinstance(other, float | int) and other in (0.0, 1.0, -1.0):
+        if not isinstance(other, Value) and other in (0.0, 1.0, -1.0):
             return 0.0 if other == 0.0 else self if other == 1.0 else -self
         for x, y in ((self, other), (other, self)):
-            if isinstance(y, Value) and y._negated() is not None:
-                return -(x * y._negated())
+            if _negated(y) is not None:
+                return -(x * _negated(y))
         return self.code.emit("mul", self, other)
 
-    __rmul__ = __mul__
-
     def __truediv__(self, other: Any) -> Any:
-        return self if is_one(other) else self.code.emit("div", self, other)
+        return self if not isinstance(other, Value) and other == 1.0 else self.code.emit("div", self, other)
 
     def __rtruediv__(self, other: Any) -> Any:
         return 0.0 if is_zero(other) else self.code.emit("div", other, self)
 
     def __abs__(self) -> Any:
-        positive = self._negated()
+        positive = _negated(self)
         return self.code.emit("abs", self if positive is None else positive)
 
     def __gt__(self, other: Any) -> Any:
@@ -162,68 +158,59 @@ class Value:
     def __le__(self, other: Any) -> Any:
         return self.code.emit("le", self, other)
 
-    def is_equal(self, other: Any) -> Any:
-        return self.code.emit("eq", self, other)
-
     def __and__(self, other: Any) -> Any:
         return (self if other else False) if isinstance(other, bool) else self.code.emit("and", self, other)
-
-    __rand__ = __and__
 
     def __or__(self, other: Any) -> Any:
         return (True if other else self) if isinstance(other, bool) else self.code.emit("or", self, other)
 
-    __ror__ = __or__
-
     def __invert__(self) -> Any:
         return self.code.emit("not", self)
+
+    __radd__, __rmul__, __rand__, __ror__ = __add__, __mul__, __and__, __or__
+
+
+def _negated(x: Any) -> Any:
+    """y where x has been computed as -y, else None."""
+    if not isinstance(x, Value) or x.number < x.code.inputs:
+        return None
+    name, operands = x.code.operations[x.number - x.code.inputs]
+    return operands[0] if name == "neg" else None
 
 
 class Pair:
     """A complex number x + i y of values or floats."""
 
-    def __init__(self, x: Any, y: Any) -> None:
+    def __init__(self, x: Any, y: Any = 0.0) -> None:
         self.x, self.y = x, y
 
     def __neg__(self) -> Pair:
         return Pair(-self.x, -self.y)
 
     def __add__(self, other: Any) -> Pair:
-        other = _pair(other)
+        other = other if isinstance(other, Pair) else Pair(other)
         return Pair(self.x + other.x, self.y + other.y)
 
-    __radd__ = __add__
-
     def __sub__(self, other: Any) -> Pair:
-        other = _pair(other)
+        other = other if isinstance(other, Pair) else Pair(other)
         return Pair(self.x - other.x, self.y - other.y)
 
-    def __rsub__(self, other: Any) -> Pair:
-        return _pair(other) - self
+    def __rsub__(self, other: float) -> Pair:
+        return Pair(other) - self
 
-    def __mul__(self, other: Any) -> Pair:
-        other = _pair(other)
+    def __mul__(self, other: Pair) -> Pair:
         return Pair(self.x * other.x - self.y * other.y, self.x * other.y + self.y * other.x)
 
-    __rmul__ = __mul__
+    __radd__ = __add__
 
     def norm(self) -> Any:
         """x^2 + y^2."""
         return self.x * self.x + self.y * self.y
 
 
-def _pair(x: Any) -> Pair:
-    return x if isinstance(x, Pair) else Pair(x.real, x.imag) if isinstance(x, complex) else Pair(x, 0.0)
-
-
 def is_zero(x: Any) -> bool:
     """Whether this is the constant 0."""
     return isinstance(x, float | int) and x == 0.0
-
-
-def is_one(x: Any) -> bool:
-    """Whether this is the constant 1."""
-    return isinstance(x, float | int) and x == 1.0
 
 
 def select(condition: Any, one: Any, other: Any) -> Any:
@@ -257,18 +244,17 @@ class Findings:
         self.finite: Any = True
         self._sum: Any = 0.0
 
-    def pivot(self, pivot: Any, size: Any, zero: Any = None) -> None:
-        """A number that is divided by, and that of which it should be more than 2^-40 (`zero`: the same for 0)."""
+    def pivot(self, pivot: Any, least: Any) -> None:
+        """A number that is divided by, which is small up to `least` in absolute value."""
         if isinstance(pivot, float):  # a coefficient: 0 if the matrix is singular everywhere
             self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
             return
-        usual = abs(pivot) > size
+        usual = abs(pivot) > least
         if self.careful:
-            self.near, self.zero = self.near | ~usual, self.zero | pivot.is_equal(0.0)
-            self.number(pivot)
+            self.near, self.zero = self.near | ~usual, self.zero | pivot.code.emit("eq", pivot, 0.0)
         else:
             self.good = self.good & usual
-            self.number(pivot)
+        self.number(pivot)
 
     def number(self, x: Any) -> None:
         """A number that should be finite. A sum of all says so if it is; if not, the careful step looks at each."""
@@ -352,7 +338,7 @@ def solve_two(rows: Sequence[Sequence[Any]], asked: Findings) -> list[Any]:
     det = a * d - product
     if isinstance(det, Pair):
         norm = det.norm()
-        asked.pivot(norm, NEAR**2 + NEAR**2 * _pair(product).norm())
+        asked.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
         share = _inverse(norm)
         inverse: Any = Pair(det.x * share, -(det.y * share))
     else:
