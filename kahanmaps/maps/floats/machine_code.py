@@ -16,6 +16,7 @@ import ctypes
 import struct
 from collections.abc import Sequence
 from functools import lru_cache
+from string import Template
 from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -23,16 +24,118 @@ import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, FloatStep, Lanes, Table
 from kahanmaps.maps.floats.straight_line import Code, Value
 
-_FORMS = {
-    **{name: f"f{name} {{v}} {{0}}, {{1}}" for name in ("add", "sub", "mul", "div")},
-    **{name: f"fcmp {word} {{v}} {{0}}, {{1}}" for name, word in {"gt": "ogt", "le": "ole", "eq": "oeq"}.items()},
-    **{name: f"{name} {{m}} {{0}}, {{1}}" for name in ("and", "or")},
-    "neg": "fneg {v} {0}",
-    "abs": "call {v} @llvm.fabs.{s}({v} {0})",
-    "not": "xor {m} {0}, {true}",
-    "select": "select {m} {0}, {v} {1}, {v} {2}",
+_FORMS = {  # of operations: $v is the type of a vector of numbers, $m of truth values, $s its name in functions
+    **{name: f"f{name} $v {{0}}, {{1}}" for name in ("add", "sub", "mul", "div")},
+    **{name: f"fcmp {word} $v {{0}}, {{1}}" for name, word in {"gt": "ogt", "le": "ole", "eq": "oeq"}.items()},
+    **{name: f"{name} $m {{0}}, {{1}}" for name in ("and", "or")},
+    "neg": "fneg $v {0}",
+    "abs": "call $v @llvm.fabs.$s($v {0})",
+    "not": "xor $m {0}, $true",
+    "select": "select $m {0}, $v {1}, $v {2}",
 }
 _NEVER = 1 << 62
+
+# The loops over vectors of orbits and over steps. Orbits of a vector beyond the last one count as ended. Two tables may
+# be filled, each after so many steps (`until`), and then again and again (`every`).
+_LOOPS = Template("""
+declare $v @llvm.fabs.$s($v)
+declare i1 @llvm.vector.reduce.and.v${width}i1($m)
+declare $v @llvm.masked.load.$s.p0(ptr, i32, $m, $v)
+declare $w @llvm.masked.load.v${width}i64.p0(ptr, i32, $m, $w)
+declare void @llvm.masked.store.$s.p0($v, ptr, i32, $m)
+declare void @llvm.masked.store.v${width}i64.p0($w, ptr, i32, $m)
+define void @advance(ptr %z, ptr %statuses, ptr %failed_at, ptr %nears, ptr %near_at, i64 %n, i64 %low, i64 %high,
+    i64 %first, i64 %steps, ptr %table0, i64 %every0, i64 %until0, ptr %table1, i64 %every1, i64 %until1) {
+entry:
+  br label %vector
+vector:
+  %at = phi i64 [%low, %entry], [%at.next, %finish]
+  %at.one = insertelement $w poison, i64 %at, i32 0
+  %at.all = shufflevector $w %at.one, $w poison, <$width x i32> zeroinitializer
+  %orbit = add $w %at.all, $numbers
+  %high.one = insertelement $w poison, i64 %high, i32 0
+  %high.all = shufflevector $w %high.one, $w poison, <$width x i32> zeroinitializer
+  %there = icmp slt $w %orbit, %high.all
+  %status.p = getelementptr i64, ptr %statuses, i64 %at
+  %failed.p = getelementptr i64, ptr %failed_at, i64 %at
+  %near.p = getelementptr i64, ptr %nears, i64 %at
+  %near_at.p = getelementptr i64, ptr %near_at, i64 %at
+  %status = call $w @llvm.masked.load.v${width}i64.p0(ptr %status.p, i32 8, $m %there, $w $ones)
+  %dead.first = icmp ne $w %status, zeroinitializer
+  $load
+  br label %loop
+loop:
+  $states
+  %dead = phi $m [%dead.first, %vector], [%dead.after, %kept1]
+  %index = phi i64 [%first, %vector], [%index.next, %kept1]
+  %left = phi i64 [%steps, %vector], [%left.next, %kept1]
+  %wait0 = phi i64 [%until0, %vector], [%wait0.next, %kept1]
+  %wait1 = phi i64 [%until1, %vector], [%wait1.next, %kept1]
+  %place0 = phi i64 [%at, %vector], [%place0.next, %kept1]
+  %place1 = phi i64 [%at, %vector], [%place1.next, %kept1]
+  $fast
+  %fine = or $m $good, %dead
+  %all = call i1 @llvm.vector.reduce.and.v${width}i1($m %fine)
+  br i1 %all, label %stepped, label %careful, !prof !0
+careful:
+  $careful
+  %asked = xor $m %fine, $true
+  %zero = and $m %asked, $singular
+  %over = and $m %asked, $overflow
+  %close = and $m %asked, $near
+  %ended = or $m %zero, %over
+  %dead.more = or $m %dead, %ended
+  %code = select $m %zero, $w $codes_singular, $w $codes_overflow
+  %index.one = insertelement $w poison, i64 %index, i32 0
+  %index.all = shufflevector $w %index.one, $w poison, <$width x i32> zeroinitializer
+  %index.after = add $w %index.all, $ones
+  %near = call $w @llvm.masked.load.v${width}i64.p0(ptr %near.p, i32 8, $m %there, $w zeroinitializer)
+  %near.more = add $w %near, $ones
+  %near.none = icmp eq $w %near, zeroinitializer
+  %near.first = and $m %near.none, %close
+  call void @llvm.masked.store.v${width}i64.p0($w %code, ptr %status.p, i32 8, $m %ended)
+  call void @llvm.masked.store.v${width}i64.p0($w %index.after, ptr %failed.p, i32 8, $m %ended)
+  call void @llvm.masked.store.v${width}i64.p0($w %near.more, ptr %near.p, i32 8, $m %close)
+  call void @llvm.masked.store.v${width}i64.p0($w %index.all, ptr %near_at.p, i32 8, $m %near.first)
+  $choose
+  br label %stepped
+stepped:
+  $images
+  %dead.after = phi $m [%dead, %loop], [%dead.more, %careful]
+  %index.next = add i64 %index, 1
+  %left.next = sub i64 %left, 1
+  %wait0.less = sub i64 %wait0, 1
+  %due0 = icmp eq i64 %wait0.less, 0
+  br i1 %due0, label %keep0, label %kept0
+keep0:
+  $keep0
+  %place0.more = add i64 %place0, %record
+  br label %kept0
+kept0:
+  %wait0.next = phi i64 [%wait0.less, %stepped], [%every0, %keep0]
+  %place0.next = phi i64 [%place0, %stepped], [%place0.more, %keep0]
+  %wait1.less = sub i64 %wait1, 1
+  %due1 = icmp eq i64 %wait1.less, 0
+  br i1 %due1, label %keep1, label %kept1
+keep1:
+  $keep1
+  %place1.more = add i64 %place1, %record
+  br label %kept1
+kept1:
+  %wait1.next = phi i64 [%wait1.less, %kept0], [%every1, %keep1]
+  %place1.next = phi i64 [%place1, %kept0], [%place1.more, %keep1]
+  %more = icmp ne i64 %left.next, 0
+  br i1 %more, label %loop, label %finish
+finish:
+  $store
+  %at.next = add i64 %at, $width
+  %again = icmp slt i64 %at.next, %high
+  br i1 %again, label %vector, label %end
+end:
+  ret void
+}
+!0 = !{!"branch_weights", i32 1000000, i32 1}
+""")
 
 
 class MachineCode:
@@ -68,15 +171,10 @@ def _compiled(text: str) -> tuple[Any, Any]:
 
 
 def _text(step: FloatStep, width: int) -> str:
-    """The module in LLVM's language.
-
-    The function advance(z, status, failed_at, near, near_at, n, low, high, first, steps, table, every, until, ...) has
-    two loops, over vectors of orbits and over steps. Orbits of a vector beyond the last one count as ended.
-    """
+    """The module in LLVM's language."""
     if step.fast_code is None:
         raise ValueError("a step that is not written out has no machine code")
-    rows, v, m, w = range(step.rows), f"<{width} x double>", f"<{width} x i1>", f"<{width} x i64>"
-    s = f"v{width}f64"
+    rows = range(step.rows)
 
     def splat(kind: str, value: Any) -> str:
         return "<" + ", ".join([f"{kind} {value}"] * width) + ">"
@@ -86,21 +184,7 @@ def _text(step: FloatStep, width: int) -> str:
             return splat("i1", int(x))
         return splat("double", f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}")
 
-    def load(name: str, kind: str, element: str, place: str, other: str) -> list[str]:
-        of = f"v{width}{'f64' if element == 'double' else 'i64'}"
-        return [
-            f"%{name}.p = getelementptr {element}, ptr {place}",
-            f"%{name} = call {kind} @llvm.masked.load.{of}.p0(ptr %{name}.p, i32 8, {m} %there, {kind} {other})",
-        ]
-
-    def store(name: str, kind: str, element: str, place: str, value: str, mask: str) -> list[str]:
-        of = f"v{width}{'f64' if element == 'double' else 'i64'}"
-        return [
-            f"%{name}.p = getelementptr {element}, ptr {place}",
-            f"call void @llvm.masked.store.{of}.p0({kind} {value}, ptr %{name}.p, i32 8, {m} {mask})",
-        ]
-
-    def body(code: Code, prefix: str) -> tuple[list[str], list[str]]:
+    def body(code: Code, prefix: str) -> tuple[str, list[str]]:
         """The operations, and the names of the outputs."""
 
         def name(x: Any) -> str:
@@ -112,122 +196,50 @@ def _text(step: FloatStep, width: int) -> str:
         for k, (operation, operands) in enumerate(code.operations, code.inputs):
             x = [name(operand) for operand in operands]
             if operation in ("max", "min"):
-                lines.append(f"%{prefix}{k}.c = fcmp {'ogt' if operation == 'max' else 'olt'} {v} {x[0]}, {x[1]}")
+                lines.append(f"%{prefix}{k}.c = fcmp {'ogt' if operation == 'max' else 'olt'} $v {x[0]}, {x[1]}")
                 x, operation = [f"%{prefix}{k}.c", *x], "select"
-            lines.append(f"%{prefix}{k} = {_FORMS[operation].format(*x, v=v, m=m, s=s, true=splat('i1', 1))}")
-        return lines, [name(x) for x in code.outputs]
+            lines.append(f"%{prefix}{k} = {_FORMS[operation].format(*x)}")
+        return "\n".join(lines), [name(x) for x in code.outputs]
+
+    def of_rows(*lines: str) -> str:
+        """Lines for each row, with its number, and the names of its image by the fast and the careful step."""
+        return "\n".join(line.format(i=i, fast=image[i], careful=again[i]) for i in rows for line in lines)
+
+    def stored(name: str, table: str, place: str, value: str) -> str:
+        return of_rows(
+            f"%{name}{{i}}.r = mul i64 %n, {{i}}",
+            f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {place}",
+            f"%{name}{{i}}.p = getelementptr double, ptr {table}, i64 %{name}{{i}}.o",
+            f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
+        )
 
     fast, (*image, good) = body(step.fast_code, "f")
     careful, (*again, near, singular, overflow) = body(step.careful_code, "c")
-    arrays = ("status", "failed", "near", "nearat")
-    parameters = ["ptr %z", *(f"ptr %{name}.a" for name in arrays)]
-    parameters += [f"i64 %{name}" for name in ("n", "low", "high", "first", "steps")]
-    parameters += [
-        f"{kind} %{name}{t}" for t in (0, 1) for kind, name in (("ptr", "table"), ("i64", "every"), ("i64", "until"))
-    ]
-    lines = [
-        f"declare {v} @llvm.fabs.{s}({v})",
-        f"declare i1 @llvm.vector.reduce.and.v{width}i1({m})",
-        *(f"declare {k} @llvm.masked.load.{t}.p0(ptr, i32, {m}, {k})" for k, t in ((v, s), (w, f"v{width}i64"))),
-        *(f"declare void @llvm.masked.store.{t}.p0({k}, ptr, i32, {m})" for k, t in ((v, s), (w, f"v{width}i64"))),
-        f"define void @advance({', '.join(parameters)}) {{",
-        "entry: br label %vector",
-        "vector:",
-        "%at = phi i64 [%low, %entry], [%at.next, %finish]",
-        f"%at.one = insertelement {w} poison, i64 %at, i32 0",
-        f"%at.all = shufflevector {w} %at.one, {w} poison, <{width} x i32> zeroinitializer",
-        f"%lane = add {w} %at.all, <{', '.join(f'i64 {k}' for k in range(width))}>",
-        f"%high.one = insertelement {w} poison, i64 %high, i32 0",
-        f"%high.all = shufflevector {w} %high.one, {w} poison, <{width} x i32> zeroinitializer",
-        f"%there = icmp slt {w} %lane, %high.all",
-        *load("status", w, "i64", "%status.a, i64 %at", splat("i64", 1)),
-        f"%dead.start = icmp ne {w} %status, zeroinitializer",
-    ]
-    for i in rows:
-        lines += [f"%z{i}.r = mul i64 %n, {i}", f"%z{i}.o = add i64 %z{i}.r, %at"]
-        lines += load(f"z{i}", v, "double", f"%z, i64 %z{i}.o", "zeroinitializer")
-    lines += ["br label %loop", "loop:"]
-    lines += [f"%x{i} = phi {v} [%z{i}, %vector], [%y{i}, %next]" for i in rows]
-    lines += [
-        f"%dead = phi {m} [%dead.start, %vector], [%dead.after, %next]",
-        "%index = phi i64 [%first, %vector], [%index.next, %next]",
-        "%left = phi i64 [%steps, %vector], [%left.next, %next]",
-    ]
-    for t in (0, 1):
-        lines.append(f"%wait{t} = phi i64 [%until{t}, %vector], [%wait{t}.next, %next]")
-        lines.append(f"%place{t} = phi i64 [%at, %vector], [%place{t}.next, %next]")
-    lines += [
-        *fast,
-        f"%fine = or {m} {good}, %dead",
-        f"%all = call i1 @llvm.vector.reduce.and.v{width}i1({m} %fine)",
-        "br i1 %all, label %stepped, label %careful, !prof !0",
-        "careful:",
-        *careful,
-        f"%asked = xor {m} %fine, {splat('i1', 1)}",
-        f"%zero = and {m} %asked, {singular}",
-        f"%over = and {m} %asked, {overflow}",
-        f"%ended = or {m} %zero, %over",
-        f"%close = and {m} %asked, {near}",
-        "%index.one = insertelement " + f"{w} poison, i64 %index, i32 0",
-        f"%index.all = shufflevector {w} %index.one, {w} poison, <{width} x i32> zeroinitializer",
-        f"%index.after = add {w} %index.all, {splat('i64', 1)}",
-        f"%code = select {m} %zero, {w} {splat('i64', SINGULAR)}, {w} {splat('i64', OVERFLOW)}",
-        *store("status.s", w, "i64", "%status.a, i64 %at", "%code", "%ended"),
-        *store("failed.s", w, "i64", "%failed.a, i64 %at", "%index.after", "%ended"),
-        *load("near", w, "i64", "%near.a, i64 %at", "zeroinitializer"),
-        f"%near.more = add {w} %near, {splat('i64', 1)}",
-        *store("near.s", w, "i64", "%near.a, i64 %at", "%near.more", "%close"),
-        f"%near.none = icmp eq {w} %near, zeroinitializer",
-        f"%near.first = and {m} %near.none, %close",
-        *store("nearat.s", w, "i64", "%nearat.a, i64 %at", "%index.all", "%near.first"),
-        f"%dead.more = or {m} %dead, %ended",
-    ]
-    for i in rows:
-        lines.append(f"%k{i} = select {m} %fine, {v} {image[i]}, {v} {again[i]}")
-        lines.append(f"%e{i} = select {m} %ended, {v} zeroinitializer, {v} %k{i}")
-    lines += ["br label %stepped", "stepped:"]
-    lines += [f"%y{i} = phi {v} [{image[i]}, %loop], [%e{i}, %careful]" for i in rows]
-    lines += [
-        f"%dead.after = phi {m} [%dead, %loop], [%dead.more, %careful]",
-        "%index.next = add i64 %index, 1",
-        "%left.next = sub i64 %left, 1",
-        "br label %ask0",
-    ]
-    for t in (0, 1):
-        lines += [
-            f"ask{t}:",
-            f"%wait{t}.less = sub i64 %wait{t}, 1",
-            f"%due{t} = icmp eq i64 %wait{t}.less, 0",
-            f"br i1 %due{t}, label %keep{t}, label %kept{t}",
-            f"keep{t}:",
-        ]
-        for i in rows:
-            lines += [f"%s{t}.{i}.r = mul i64 %n, {i}", f"%s{t}.{i}.o = add i64 %s{t}.{i}.r, %place{t}"]
-            lines += store(f"s{t}.{i}", v, "double", f"%table{t}, i64 %s{t}.{i}.o", f"%y{i}", "%there")
-        lines += [
-            f"%record{t} = mul i64 %n, {len(rows)}",
-            f"%place{t}.far = add i64 %place{t}, %record{t}",
-            f"br label %kept{t}",
-            f"kept{t}:",
-            f"%wait{t}.next = phi i64 [%wait{t}.less, %ask{t}], [%every{t}, %keep{t}]",
-            f"%place{t}.next = phi i64 [%place{t}, %ask{t}], [%place{t}.far, %keep{t}]",
-            f"br label %{'ask1' if t == 0 else 'next'}",
-        ]
-    lines += [
-        "next:",
-        "%more = icmp ne i64 %left.next, 0",
-        "br i1 %more, label %loop, label %finish",
-        "finish:",
-    ]
-    for i in rows:
-        lines.append(f"%r{i} = select {m} %dead.after, {v} zeroinitializer, {v} %y{i}")
-        lines += store(f"r{i}.s", v, "double", f"%z, i64 %z{i}.o", f"%r{i}", "%there")
-    lines += [
-        f"%at.next = add i64 %at, {width}",
-        "%again = icmp slt i64 %at.next, %high",
-        "br i1 %again, label %vector, label %end",
-        "end: ret void",
-        "}",
-        '!0 = !{!"branch_weights", i32 1000000, i32 1}',
-    ]
-    return "\n".join(lines)
+    parts = {
+        "load": f"%record = mul i64 %n, {step.rows}\n"
+        + of_rows(
+            "%z{i}.r = mul i64 %n, {i}",
+            "%z{i}.o = add i64 %z{i}.r, %at",
+            "%z{i}.p = getelementptr double, ptr %z, i64 %z{i}.o",
+            "%z{i} = call $v @llvm.masked.load.$s.p0(ptr %z{i}.p, i32 8, $m %there, $v zeroinitializer)",
+        ),
+        "states": of_rows("%x{i} = phi $v [%z{i}, %vector], [%y{i}, %kept1]"),
+        "fast": fast,
+        "careful": careful,
+        "choose": of_rows(
+            "%k{i} = select $m %fine, $v {fast}, $v {careful}",
+            "%e{i} = select $m %ended, $v zeroinitializer, $v %k{i}",
+        ),
+        "images": of_rows("%y{i} = phi $v [{fast}, %loop], [%e{i}, %careful]"),
+        "keep0": stored("s", "%table0", "%place0", "%y{i}"),
+        "keep1": stored("t", "%table1", "%place1", "%y{i}"),
+        "store": of_rows("%r{i} = select $m %dead.after, $v zeroinitializer, $v %y{i}")
+        + "\n"
+        + stored("u", "%z", "%at", "%r{i}"),
+    }
+    words = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
+    words |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
+    words |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
+    words |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
+    words |= {"singular": singular, "overflow": overflow}
+    return Template(_LOOPS.safe_substitute(parts)).substitute(words)
