@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 # Bytes of addresses that each takes while it is loaded and works, measured, and half as much again.
-_ROOM = {"numpy": 300 << 20, "matplotlib": 200 << 20, "numba": 300 << 20}
+_ROOM = {"numpy": 300 << 20, "matplotlib": 200 << 20, "numba": 300 << 20, "llvmlite": 300 << 20}
 
 
 class _Room:
