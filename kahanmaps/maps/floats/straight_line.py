@@ -81,6 +81,8 @@ class Code:
 
         lines = [f"def step({', '.join(names.values())}):"]
         for k, (name, operands) in enumerate(self.operations):
+            if self.inputs + k not in last:
+                continue
             x = [text(operand) for operand in operands]
             if name in _SYMBOLS:
                 right = f"{x[0]} {_SYMBOLS[name]} {x[1]}"
@@ -90,8 +92,20 @@ class Code:
                 right = f"{x[1]} if {x[0]} else {x[2]}"
             else:
                 right = f"{name}({', '.join(x)})"
-            numbers = {operand.number for operand in operands if isinstance(operand, Value)}
-            unused += [names[n] for n in sorted(numbers) if last[n] == k and n >= self.inputs]
+            dying = {
+                v.number for v in operands if isinstance(v, Value) and last[v.number] == k and v.number >= self.inputs
+            }
+            places = [names[number] for number in sorted(dying)]
+            if kind is not float and name in ("add", "sub", "mul", "div") and isinstance(operands[0], Value):
+                if name in ("add", "mul") and operands[0].number not in dying:
+                    x.reverse()
+                if x[0] in places:  # in place
+                    places.remove(x[0])
+                    names[self.inputs + k] = x[0]
+                    lines.append(f"    {x[0]} {_SYMBOLS[name]}= {x[1]}")
+                    unused += places
+                    continue
+            unused += places
             names[self.inputs + k] = unused.pop() if unused else f"v{self.inputs + k}"
             lines.append(f"    {names[self.inputs + k]} = {right}")
         lines.append(f"    return ({''.join(f'{text(x)}, ' for x in self.outputs)})")
