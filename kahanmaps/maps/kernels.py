@@ -16,6 +16,17 @@ def has_numba() -> bool:
     return find_spec("numba") is not None
 
 
+@cache
+def has_llvm() -> bool:
+    """Whether the compiler of numba is there, in a version that reads our code: llvmlite 0.45 (numba 0.62) or later."""
+    from importlib.metadata import PackageNotFoundError, version  # takes longer to load than the rest of this file
+
+    try:
+        return tuple(map(int, version("llvmlite").split(".")[:2])) >= (0, 45)
+    except (PackageNotFoundError, ValueError):
+        return False
+
+
 def choose_kernel(wish: str | None, long: bool) -> str:
     """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
 

@@ -32,7 +32,7 @@ from kahanmaps.maps.floats.steps import (
 )
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.maps.kernels import choose_kernel
+from kahanmaps.maps.kernels import choose_kernel, has_llvm
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -112,7 +112,7 @@ class FloatEnsemble:
         self._starts = _points(starts, self.system)
         if to_float(epsilon) == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        compiled = choose_kernel(kernel, long=True) == "numba"
+        compiled = choose_kernel(kernel, long=True) == "numba" and has_llvm()
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = self.system.rounded
