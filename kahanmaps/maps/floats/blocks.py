@@ -204,10 +204,16 @@ class _Blocks:
         kappa = 1 / (24 * self.eps**3 * det * scale_U * scale_V)
         step = 2 * self.eps
         into = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
-        lagrange = _lagrange(self.form.chi, root)
+        # Lagrange's polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at the others.
+        slope, carry, lagrange = _value(self.form.chi.derivative(), root), acb(0), []
+        for coefficient in reversed(self.form.chi.coeffs()[1:]):
+            carry = carry * root + arb(coefficient)
+            lagrange.insert(0, carry / slope)
         m, S = self.form.m, self.form.S.tolist()
-        x_u = [_dot(row[:m], lagrange) for row in S]
-        x_v = [_dot(row[m:], lagrange) for row in S]
+        x_u, x_v = (
+            [sum((arb(s) * l for s, l in zip(row[half], lagrange, strict=True)), acb(0)) for row in S]
+            for half in (slice(0, m), slice(m, None))
+        )
         back = _inverse(frame)
         out = [[(x * back[0][k] + y * back[1][k]) / step for x, y in zip(x_u, x_v, strict=True)] for k in (0, 1)]
         return numbers, kappa, into, out
@@ -266,17 +272,9 @@ def _factors(form: list[acb]) -> list[list[acb]]:
 
 def _transformed(form: list[acb], matrix: Frame) -> list[acb]:
     """The binary form with (u, v) = matrix (u', v')."""
-    degree = len(form) - 1
-    total = [acb(0)] * (degree + 1)
-    for k, coefficient in enumerate(form):
-        product = [coefficient]  # of degree - k factors u and k factors v
-        for first, second in [matrix[0]] * (degree - k) + [matrix[1]] * k:
-            raised = [*(entry * first for entry in product), acb(0)]
-            for i, entry in enumerate(product):
-                raised[i + 1] += entry * second
-            product = raised
-        total = [t + entry for t, entry in zip(total, product, strict=True)]
-    return total
+    degree, (u, v) = len(form) - 1, (acb_poly(row) for row in matrix)  # with u' = 1
+    total = sum((u ** (degree - k) * v**k * coefficient for k, coefficient in enumerate(form)), acb_poly([]))
+    return [total[k] for k in range(degree + 1)]
 
 
 def _inverse(frame: Frame) -> Frame:
@@ -305,26 +303,8 @@ def _cube_root(number: arb) -> arb:
     return root if number > 0 else -root
 
 
-def _lagrange(chi: fmpq_poly, root: acb) -> list[acb]:
-    """The coefficients of chi(t)/((t - root) chi'(root)): 1 at this root, 0 at the others."""
-    quotient: list[acb] = []
-    carry = acb(0)
-    for coefficient in reversed(chi.coeffs()):
-        carry = carry * root + arb(coefficient)
-        quotient.append(carry)
-    slope = _value(chi.derivative(), root)
-    return [entry / slope for entry in reversed(quotient[:-1])]
-
-
 def _value(polynomial: fmpq_poly, at: acb) -> acb:
-    total = acb(0)
-    for coefficient in reversed(polynomial.coeffs()):
-        total = total * at + arb(coefficient)
-    return total
-
-
-def _dot(row: Sequence[fmpq], column: Sequence[acb]) -> acb:
-    return sum((arb(entry) * other for entry, other in zip(row, column, strict=True)), acb(0))
+    return acb_poly(polynomial)(at)
 
 
 def _doubles(row: Sequence[arb]) -> list[float]:
