@@ -86,11 +86,15 @@ def same(one: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
 # Right numbers.
 
 
-@pytest.mark.parametrize("kernel", [*KERNELS, "in arrays"])
+# Operations that may be written out: of the chain of variables 237 in a fast step, 1167 in a careful one.
+NONE_WRITTEN, FAST_WRITTEN = 1, 300
+
+
+@pytest.mark.parametrize("kernel", [*KERNELS, NONE_WRITTEN, FAST_WRITTEN])
 @pytest.mark.parametrize("system", GENERIC.values(), ids=GENERIC)
 def test_a_step_of_an_ensemble_is_that_of_the_exact_map(system, kernel, monkeypatch):
-    if kernel == "in arrays":
-        monkeypatch.setattr(steps, "MAX_OPERATIONS", 1)
+    if isinstance(kernel, int):
+        monkeypatch.setattr(steps, "MAX_OPERATIONS", kernel)
         kernel = "numpy"
     starts = starts_of(system.dim, 20) / 4
     orbits = FloatEnsemble(system, "1/50", starts, kernel=kernel)
@@ -276,21 +280,23 @@ def test_a_matrix_that_is_singular_everywhere_ends_all_orbits(kernel):
     assert set(orbits.failed_at) == {1}
 
 
-@pytest.mark.parametrize("one_by_one", [False, True])
-def test_long_steps_end_as_those_that_are_written_out(one_by_one, monkeypatch):
-    starts = np.array(
-        [[0.25, 1.0], [1 / 2, 0.0], [1.0, 3.0], [1 - 2.0**-45, 0.0], [-0.5, 1e308]] * (1 if one_by_one else 20)
-    )
-    system = QuadraticSystem.from_text(["x", "y"], ["x^2", "y"])
+@pytest.mark.parametrize("count", [1, 20], ids=["one by one", "in arrays"])
+@pytest.mark.parametrize("most", [NONE_WRITTEN, FAST_WRITTEN])
+def test_long_steps_end_as_those_that_are_written_out(count, most, monkeypatch):
+    """The chain beside x' = x^2, eps = 1/2: x~ = x/(1 - x)."""
+    system = QuadraticSystem.from_text([*CHAIN.variables, "x"], [*map(str, CHAIN.rhs), "x^2"])
+    starts = np.zeros((5 * count, 9))
+    starts[:, 8] = [0.25, 1 / 2, 1.0, 1 - 2.0**-45, -0.5] * count
+    starts[4::5, :8] = 1e300 * np.arange(1, 9)
 
     def ends():
         orbits = FloatEnsemble(system, "1/2", starts, kernel="numpy")
         orbits.advance(2)
-        return orbits.failed_at.tolist(), orbits.status.tolist(), orbits.near_singular.tolist()
+        return orbits.failed_at.tolist(), orbits.status.tolist(), orbits.near_singular[:4].tolist()
 
     expected = ends()
     assert set(expected[1]) == {"completed", "singular", "overflow"}
-    monkeypatch.setattr(steps, "MAX_OPERATIONS", 1)
+    monkeypatch.setattr(steps, "MAX_OPERATIONS", most)
     assert ends() == expected
 
 

@@ -205,7 +205,8 @@ class _Blocks:
         step = 2 * self.eps
         into = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
         # Lagrange's polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at the others.
-        slope, carry, lagrange = _value(self.form.chi.derivative(), root), acb(0), []
+        slope, carry = _value(self.form.chi.derivative(), root), acb(0)
+        lagrange: list[acb] = []
         for coefficient in reversed(self.form.chi.coeffs()[1:]):
             carry = carry * root + arb(coefficient)
             lagrange.insert(0, carry / slope)

@@ -129,7 +129,7 @@ class FloatEnsemble:
         self._factors = (map_over.inverse if backward else map_over).factors
         self._write_step()
         self._lanes = Lanes.of(state)
-        compiled = compiled and self._step.fast_code is not None
+        compiled = compiled and self._step.careful_code is not None
         self._threads = (threads or processors()) if compiled else 1
         method = "generic" if form is None else "normal form"
         #: What computes: "numba normal form, 2 threads".

@@ -172,7 +172,7 @@ def _compiled(text: str) -> tuple[Any, Any]:
 
 def _text(step: FloatStep, width: int) -> str:
     """The module in LLVM's language."""
-    if step.fast_code is None:
+    if step.fast_code is None or step.careful_code is None:
         raise ValueError("a step that is not written out has no machine code")
     rows = range(step.rows)
 

@@ -13,7 +13,7 @@ two, in one piece or in portions.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,42 +51,47 @@ class FloatStep:
     """A step of states with so many rows: `write` gives the image of a state, and asks `Findings` about the numbers.
 
     `careful` takes the rows of a state, arrays, to those of its image and three more, which tell in which orbits the
-    step is near-singular, singular, or an overflow. `fast` has one more, which tells in which orbits it is right.
-    Raises TooLong for a step with more operations than are worth being written out.
+    step is near-singular, singular, or an overflow. `fast` has one more, which tells in which orbits it is right. Where
+    the fast step has too many operations to be written out it is left out, where the careful one has too many
+    (eliminations with exchanges keep few zeros), `in_arrays` takes its place; without both there is no machine code.
     """
 
-    def __init__(self, rows: int, write: Write) -> None:
-        self.rows, self._write = rows, write
-        self.fast_code: Code | None = self._code(careful=False)
-        self.operations = len(self.fast_code.operations)
-        self.fast_on_floats = self.fast_code.function(float)
-        self.fast = self.fast_code.function(np.ndarray)
+    def __init__(self, rows: int, write: Write, in_arrays: Callable[..., tuple[Any, ...]] | None = None) -> None:
+        self.rows, self._write, self._in_arrays = rows, write, in_arrays
+        self.fast_code = self._code(careful=False)
+        self.operations = rows**3
+        if self.fast_code is not None:
+            self.operations = len(self.fast_code.operations)
+            self.fast_on_floats, self.fast = self.fast_code.function(float), self.fast_code.function(np.ndarray)
 
     @cached_property
-    def careful_code(self) -> Code:
+    def careful_code(self) -> Code | None:
         """Written when it is needed, which is seldom."""
-        return self._code(careful=True)
+        return None if self.fast_code is None else self._code(careful=True)
+
+    @cached_property
+    def careful(self) -> Callable[..., tuple[Any, ...]]:
+        """The image, and what happened."""
+        found = self._in_arrays if self.careful_code is None else self.careful_code.function(np.ndarray)
+        if found is None:
+            raise AssertionError("a step has no careful version")
+        return found
 
     @cached_property
     def careful_on_floats(self) -> Callable[..., tuple[Any, ...]]:
-        """The same of a single state."""
-        return self.careful_code.function(float)
+        """The same of a single state, if it is written out."""
+        return self.careful if self.careful_code is None else self.careful_code.function(float)
 
-    @cached_property
-    def _careful(self) -> Callable[..., tuple[Any, ...]]:
-        return self.careful_code.function(np.ndarray)
-
-    def careful(self, *x: FloatArray) -> tuple[Any, ...]:
-        """The image, and what happened."""
-        return self._careful(*x)
-
-    def _code(self, careful: bool) -> Code:
-        limit = 4 * MAX_OPERATIONS if careful else MAX_OPERATIONS
+    def _code(self, careful: bool) -> Code | None:
+        limit = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
         code, asked = Code(self.rows, limit), Findings(careful)
-        image = self._write(code.arguments, asked)
-        for x in image:
-            asked.number(x)
-        code.outputs = [*image, *asked.outputs()]
+        try:
+            image = self._write(code.arguments, asked)
+            for x in image:
+                asked.number(x)
+            code.outputs = [*image, *asked.outputs()]
+        except TooLong:
+            return None
         return code
 
 
@@ -120,11 +125,7 @@ def map_step(factors: Sequence[StepOver]) -> FloatStep:
             x = equation.image(x, asked)
         return x
 
-    rows = factors[0].dim
-    try:
-        return FloatStep(rows, write)
-    except TooLong:
-        return LargeStep(rows, equations)
+    return FloatStep(factors[0].dim, write, partial(_step_in_arrays, equations))
 
 
 class FloatEquation(NamedTuple):
@@ -210,33 +211,25 @@ def float_equation(map_over: StepOver) -> FloatEquation:
     return FloatEquation(all_constants, all_terms, products)
 
 
-class LargeStep(FloatStep):
-    """A step in whole arrays, with exchanges of rows as LAPACK does them, for maps of many variables."""
-
-    def __init__(self, rows: int, equations: Sequence[FloatEquation]) -> None:
-        self.rows, self.operations, self.fast_code = rows, len(equations) * rows**3, None
-        self._equations = equations
-
-    def careful(self, *x: FloatArray) -> tuple[Any, ...]:
-        near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
-        image: Any = np.array(x)
-        for equation in self._equations:
-            n, y = self.rows, equation.monomials(image)
-            M = np.zeros((n, n + 2, len(near)))
-            M[:, :-1] = np.array(equation.constants)[:, :, None]
-            for i, entries in enumerate(equation.terms):
-                for j, terms in enumerate(entries):
-                    for k, c in terms:
-                        M[i, j] += c * y[k]
-            M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # sizes of the rows
-            pivots = eliminate(M, n, 1)
-            near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
-            singular |= finite & (pivots == 0.0).any(axis=0)
-            finite &= (pivots <= LARGEST).all(axis=0)
-            image = M[:, n]
-            finite &= (np.abs(image) <= LARGEST).all(axis=0)
-        overflow = ~finite & ~singular
-        return *image, near & finite & ~singular, singular, overflow
+def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple[Any, ...]:
+    """A careful step with partial pivoting in whole arrays, for maps of many variables."""
+    near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
+    image: Any = np.array(x)
+    for equation in equations:
+        n, y = len(x), equation.monomials(image)
+        M = np.zeros((n, n + 2, len(near)))
+        M[:, :-1] = np.array(equation.constants)[:, :, None]
+        for i, entries in enumerate(equation.terms):
+            for j, terms in enumerate(entries):
+                for k, c in terms:
+                    M[i, j] += c * y[k]
+        M[:, n + 1] = np.fmax(np.abs(M[:, :n]).max(axis=1), 1.0)  # sizes of the rows
+        pivots = eliminate(M, n, 1)
+        near |= ~(pivots > NEAR * M[:, n + 1]).all(axis=0)
+        singular |= finite & (pivots == 0.0).any(axis=0)
+        image = M[:, n]
+        finite &= (pivots <= LARGEST).all(axis=0) & (np.abs(image) <= LARGEST).all(axis=0)
+    return *image, near & finite & ~singular, singular, ~finite & ~singular
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
@@ -320,7 +313,7 @@ def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tabl
                         image, good = x, False
                     elif single:
                         *image, good = step.fast_on_floats(*x)
-                        if not good:
+                        if not good and step.careful_code is not None:
                             *image, near, singular, overflow = step.careful_on_floats(*x)
                             good = not (near or singular or overflow)
                     else:

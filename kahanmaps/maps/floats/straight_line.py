@@ -48,7 +48,7 @@ class Code:
     2
     """
 
-    def __init__(self, inputs: int, limit: int = MAX_OPERATIONS) -> None:
+    def __init__(self, inputs: int, limit: int | None = None) -> None:
         self.inputs = inputs
         self.operations: list[tuple[str, tuple[Any, ...]]] = []
         self.outputs: Sequence[Any] = ()
@@ -61,7 +61,7 @@ class Code:
         keys = tuple(x.number if isinstance(x, Value) else ("constant", float(x)) for x in operands)
         key = (name, tuple(sorted(keys, key=repr)) if name in ("add", "mul", "and", "or") else keys)
         if key not in self._known:
-            if len(self.operations) >= self._limit:
+            if self._limit is not None and len(self.operations) >= self._limit:
                 raise TooLong
             self._known[key] = Value(self, self.inputs + len(self.operations))
             self.operations.append((name, operands))
