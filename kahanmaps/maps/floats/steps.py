@@ -306,6 +306,7 @@ def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tabl
         for low in range(0, n, width):
             part = slice(low, min(n, low + width))
             dead = lanes.status[part] != RUNNING
+            path: list[list[Any]] = [[] for _ in tables]
             x: Any = lanes.z[:, low].tolist() if single else list(lanes.z[:, part])
             for index in range(first, first + steps):
                 try:
@@ -332,11 +333,16 @@ def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tabl
                     dead[again] |= ended
                     image = after[:, 0].tolist() if single else list(after)
                 x = image
-                for every, states in tables:
-                    if (index + 1) % every == 0:
+                for kept, (every, states) in zip(path, tables, strict=True):
+                    if (index + 1) % every == 0 and single:
+                        kept.append(x)
+                    elif (index + 1) % every == 0:
                         for row, values in zip(states[(index + 1) // every - first // every - 1], x, strict=True):
                             row[part] = values
                 if single and dead[0]:
                     break
+            for kept, (_, states) in zip(path, tables, strict=True):
+                if kept:
+                    states[: len(kept), :, low] = kept
             for row, values in zip(lanes.z, x, strict=True):
                 row[part] = np.where(dead, 0.0, values)
