@@ -163,13 +163,16 @@ def lyapunov_exponents(
         sound = np.isfinite(logs).all(axis=0) & (norms < _LARGEST_NORM).all(axis=0)
         alive[alive] = sound
         maps, logs, norms, Q = maps[:, sound], logs[:, sound], norms[:, sound], frames[alive]
-        # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|.
-        condition = (np.log(2.0) + n * (norms - np.log(n) / 2) - logs).max(initial=1.0)
-        length = max(1, min(count, int(_CONDITION / condition), int(_LARGEST_NORM / norms.max(initial=1.0))))
         volumes[alive] += logs.sum(axis=0)
-        for first in range(0, count, length):
-            Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first : first + length], Q))
-            sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
+        # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, that of a product at most the product.
+        conditions = np.maximum(np.log(2.0) + n * (norms - np.log(n) / 2) - logs, norms * _CONDITION / _LARGEST_NORM)
+        first, total = 0, 0.0
+        for k, condition in enumerate([*conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
+            if k and total + condition > _CONDITION:
+                Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first:k], Q))
+                sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
+                first, total = k, 0.0
+            total += condition
         frames = np.zeros((len(x), n, n))
         frames[alive] = Q
         if orbits.step == transient:
