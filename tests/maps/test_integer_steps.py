@@ -16,14 +16,13 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.substitution import _product, _row, _sum, substitution
+from kahanmaps.maps.orbits.substitution import substitution
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
@@ -200,59 +199,7 @@ def test_where_a_coordinate_that_divides_a_whole_row_is_0_there_is_no_value():
     assert twice.step(IntegerPoint.from_rationals((fmpq(0),))) is None
 
 
-# a side, a coefficient of the unknown; the resultant of what they are in the one variable that is left, and factors
-ALONE = [
-    ("y", "1", 1, {1: 1}),
-    ("-2*y", "2", 2, {1: 1}),
-    ("-2*y + 1", "2", 4, {}),
-    ("2*y + 1", "3*y - 5", 13, {}),
-    ("y^2 + 1", "y^2 - 3", 16, {}),
-    ("y^3*x^2", "y + 2", 8, {0: 2}),  # p^3 and (p + 2 q) q^2
-    ("x*y + x", "x^3*z", 1, {0: -2, 2: -1}),
-    ("y + 1", "y^2 - 1", 0, {}),  # a common factor: a gcd is needed
-    ("x*y^13", "y + 1", 0, {0: 1}),  # of too high a degree
-    ("x + y", "x - 2*y", 0, {}),
-    ("1 + y + x", "z", 0, {}),
-    ("0", "y", 0, {}),
-    ("3", "6*x", 3, {0: -1}),
-]
-
-
-@pytest.mark.parametrize(("side", "below", "resultant", "factors"), ALONE)
-@given(point=st.tuples(small, small, small))
-def test_a_fraction_of_monomials_but_in_one_variable_is_in_lowest_terms_without_a_long_gcd(
-    side, below, resultant, factors, point
-):
-    numerator, denominator = (parse_polynomial(text, ["x", "y", "z"]) for text in (side, below))
-    row = one_row(numerator, denominator)
-    assert (row.resultant, dict(row.factors)) == (resultant, factors)
-    value = row.solved([(entry.p, entry.q) for entry in point], [])
-    if denominator(*point) == 0:
-        assert value is None
-    else:
-        expected = numerator(*point) / denominator(*point)
-        assert value == (expected.p, expected.q)
-
-
-def one_row(numerator, denominator):
-    """The row for the unknown x of denominator x~ = numerator."""
-    exponents = sorted({*numerator.monoms(), *denominator.monoms()})
-    entries = [[fmpz(0)] * len(exponents) for _ in range(4)]
-    for entry, polynomial in ((entries[0], denominator), (entries[3], numerator)):
-        for exponent, coefficient in polynomial.terms():
-            entry[exponents.index(exponent)] = fmpq(coefficient).p
-    return _row(entries, 0, (), exponents)
-
-
 def test_in_dimension_1_a_side_that_is_0_gives_0():
     nothing = integer_steps.IntegerSteps([(1, 0)], [[((0, fmpq(1)),), ()]])  # x x~ = 0
     assert nothing.step(IntegerPoint.from_rationals((fmpq(3, 7),))) == IntegerPoint.from_rationals((fmpq(0),))
     assert nothing.step(IntegerPoint.from_rationals((fmpq(0),))) is None
-
-
-@given(a=small, b=small)
-def test_sums_and_products_of_fractions_are_in_lowest_terms(a, b):
-    pairs = (a.p, a.q), (b.p, b.q)
-    assert _sum(*pairs) == ((a + b).p, (a + b).q)
-    assert _product(*pairs) == ((a * b).p, (a * b).q)
-    assert _sum((fmpz(1), fmpz(6)), (fmpz(1), fmpz(3))) == (1, 2)

@@ -26,7 +26,6 @@ from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, pivots
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.implicit import MapOver
-from kahanmaps.maps.orbits.elimination import ExactDivisor
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
@@ -61,7 +60,7 @@ class BilinearForms:
         X, Y, behind = ([*last[k].numerators, last[k].denominator] for k in (-1, -self.lag, -1 - self.lag))
         column = fmpz_mat(len(self.products), 1, [X[i] * Y[j] for i, j in self.products])
         values: list[fmpz] = (self.coefficients * column).entries()
-        divided = ExactDivisor(behind[-1]).into([self._multiple * value for value in values])
+        divided = [self._multiple * value // behind[-1] for value in values]
         image = lowest(divided[:-1], divided[-1])
         if image is not None and self._steps.is_image(last[-1], image):
             return image
