@@ -11,7 +11,7 @@ from flint import fmpq, fmpq_mat, fmpz_mat, nmod
 
 import kahanmaps.maps.orbits.relations.elliptic_search as search
 from kahanmaps.maps.orbits.relations.forms import _of_multiples, common_primes, forms
-from kahanmaps.maps.orbits.relations.somos import around, first_terms
+from kahanmaps.maps.somos import around, first_terms
 
 P = 2**61 - 1
 WARD = tuple(first_terms(fmpq(2), fmpq(3), fmpq(5)))

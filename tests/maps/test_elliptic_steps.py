@@ -18,7 +18,7 @@ from orbit_helpers import START, begin, over, single_steps, walked
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
-import kahanmaps.maps.orbits.relations.somos as somos
+import kahanmaps.maps.somos as somos
 from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
@@ -167,7 +167,8 @@ def test_the_degree_is_that_of_the_equation_between_two_curves():
         for d in (3, 1)
     ]
     search = SimpleNamespace(stride=2, groups=[(0,)], degree=lambda k, g: (2, 5)[k], factors=factors, first=6)
-    assert elliptic._is_proved("x", search, SimpleNamespace(at=lambda n: asked.append(n) or "x"))
+    W = SimpleNamespace(integer=lambda n: 1)
+    assert elliptic._is_proved("x", search, SimpleNamespace(at=lambda n: asked.append(n) or "x", multiples=W))
     assert asked[0] == 6
     assert asked[-1] - 6 >= 2 * (3 * 2 + 5 + 1)
 
@@ -291,7 +292,7 @@ def test_memory_does_not_grow_with_what_is_behind():
     for number in range(1, 121):
         last.append(steps.step(last[-3:], number) or map_over.integer_step(last[-1]))
     ((coordinates,),) = steps._places
-    kept = [n for n in coordinates._U._integers if n > 12]
+    kept = [n for n in coordinates._U._terms if n > 12]
     assert len(kept) < 75
     assert len(steps._known) < 9
     assert last[-1] == single_steps(map_over, begin(map_over), 120)[-1]
@@ -377,7 +378,7 @@ def test_no_term_is_found_twice(monkeypatch):
         assert steps.step([], number) is not None
     assert len(calls) <= 2 * 101
     ((coordinates,),) = steps._places
-    assert all(len(terms._pairs) < 20 for terms in (coordinates._U, coordinates._W))
+    assert all(len(terms._pairs) < 20 for terms in (coordinates._U, coordinates.W))
 
 
 def coordinates(degree, rows, primes):
@@ -385,8 +386,9 @@ def coordinates(degree, rows, primes):
     base = fmpz(1)
     for term in (*W, *U):
         base = base.lcm(term.p).lcm(term.q)
-    multiples = somos.Terms(W, base)
-    return elliptic_steps.Coordinates(degree, fmpz_mat(rows), multiples, somos.Terms(U, base, multiples), primes)
+    numbers = somos.Integers(base)
+    multiples = somos.Terms(W, numbers)
+    return elliptic_steps.Coordinates(degree, fmpz_mat(rows), multiples, somos.Terms(U, numbers, multiples), primes)
 
 
 def test_high_powers_of_common_primes_are_taken_out_and_a_denominator_0_is_told():

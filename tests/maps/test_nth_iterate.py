@@ -19,7 +19,7 @@ from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import iterate, rational_iterate, tau_table
+from kahanmaps.maps.normal_form import iterate, rational_iterate, tau
 from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
@@ -233,8 +233,8 @@ def test_what_would_be_too_long_is_refused_with_the_first_step_that_is_too_long(
 def test_a_wrong_doubling_is_noticed(monkeypatch):
     # Every iterate over Q is compared with the orbit modulo a random prime.
     normal_form, _ = structure_and_system("m = 2")
-    iterate = tau_table.iterate
-    monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
+    iterate = tau.iterate
+    monkeypatch.setattr(tau, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
         NthIterate(normal_form, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
 

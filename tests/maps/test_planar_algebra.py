@@ -17,7 +17,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.family.draw import draw_with_chi, parse_chi
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import planar_algebra, rational_iterate, tau_table
+from kahanmaps.maps.normal_form import planar_algebra, rational_iterate, tau
 from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
@@ -66,7 +66,7 @@ def member_of(text: str, seed: int = 5):
 @given(seed=st.integers(0, 10**6))
 def test_the_points_are_those_of_steps_in_the_field(name, seed):
     block = random_block(name, seed)
-    stepped, found = (list(islice(points, 11)) for points in (block.triples(), tau_table.triples(block)))
+    stepped, found = (list(islice(points, 11)) for points in (block.triples(), tau.triples(block)))
     assert len(found) == len(stepped)
     assert all(same_point(P, Q) for P, Q in zip(found, stepped, strict=True))
 
@@ -76,7 +76,7 @@ def test_an_entry_is_as_long_as_the_heights_ask_for(name):
     block = random_block(name, 2)
     assert block.level is not None
     assert not block.is_degenerate
-    P = next(islice(tau_table.triples(block), 40, None))
+    P = next(islice(tau.triples(block), 40, None))
     above, below, _ = block.fraction(P)
     height = max(e.p.bit_length() + e.q.bit_length() for e in (fmpq(entry, below) for entry in above)) / 2
     # some per cent, for ideals that no element generates
@@ -143,8 +143,8 @@ def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):
 
 def test_a_wrong_iterate_does_not_pass(monkeypatch):
     normal_form, system = member_of("t^2 - 10")
-    iterate = tau_table.iterate
-    monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
+    iterate = tau.iterate
+    monkeypatch.setattr(tau, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
         NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 100)
 

@@ -1,7 +1,7 @@
 """The n-th iterate of a Kahan map directly, without the iterates before it, for members of the family.
 
 In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over
-Q in integers (`tau_table`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
+Q in integers (`tau`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
 passed over, except over Q, where none goes unnoticed.
 """
 

@@ -19,8 +19,9 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical, taken_apart, without
+from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical, without
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
+from kahanmaps.maps.somos import Integers
 
 IntegerTriple = tuple[fmpz, fmpz, fmpz]
 
@@ -87,9 +88,9 @@ class IntegerBlock(LevelBlock):
         return self.bad**3
 
     @cached_property
-    def numbers(self) -> Integers:
+    def numbers(self) -> PlaneIntegers:
         """How values of tau functions are kept."""
-        return Integers(self.power)
+        return PlaneIntegers(self.power)
 
     @property
     def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
@@ -166,28 +167,8 @@ class IntegerBlock(LevelBlock):
             previous, point = point, image
 
 
-class Integers:
-    """Values of tau functions over Q: integers prime to the primes of `power`, each times a rational scale."""
-
-    def __init__(self, power: fmpz) -> None:
-        self._power = power
-
-    def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """A value that is integral but for `bad`, not zero: integer and scale."""
-        integer, part = taken_apart(value.p, self._power)
-        return integer, fmpq(part, value.q)
-
-    def divisor(self, value: fmpz) -> fmpz:
-        """What `difference` and `combined` take for a division by this integer."""
-        return value
-
-    def difference(self, s: fmpq, left: fmpz, t: fmpq, right: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
-        """s left - t right, over the divisor, which divides it but for bad primes: integer and scale."""
-        raw = (s.p * t.q) * left - (t.p * s.q) * right
-        if divisor is not None:
-            raw = divide_exactly([raw], divisor)[0]
-        value, part = taken_apart(raw, self._power)
-        return value, fmpq(part, s.q * t.q)
+class PlaneIntegers(Integers):
+    """Terms of tau functions over Q, and how points are put together from them."""
 
     def lifts(self, points: Sequence[Triple]) -> list[IntegerTriple]:
         """Triples of rational numbers, times one integer."""
@@ -202,7 +183,7 @@ class Integers:
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
-        return strip(raw, self._power, divisor)
+        return strip(raw, self.power, divisor)
 
 
 def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:

@@ -24,7 +24,7 @@ from flint import fmpq, fmpz
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.system_normal_form import SystemNormalForm
-from kahanmaps.maps.normal_form import tau_table, translation
+from kahanmaps.maps.normal_form import tau, translation
 from kahanmaps.maps.normal_form.periods import Kind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
@@ -234,7 +234,7 @@ class _Planes:
         while True:
             step = _halved(n, step)
             bits = [
-                tau_table.most_bits(block, plane.reduced(step))
+                tau.most_bits(block, plane.reduced(step))
                 for block, plane in zip(self.blocks, self._planes, strict=True)
             ]
             total = sum(known or 0 for known in bits) + self._assembly.excess
@@ -278,11 +278,11 @@ _NO_POLE = "the orbit modulo many primes met a pole that it has not: please repo
 def _reached(block: Block, n: int) -> Triple:
     """P_n; poles on the way are passed over, unless it has to be stepped. Raises SingularStep then."""
     if n <= _SHORT or block.is_constant or block.level is None:
-        points = list(islice(tau_table.triples(block), n + 1))
+        points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
             raise _no_value(len(points) - 1)
         return points[n]
-    found = tau_table.iterate(block, n)
+    found = tau.iterate(block, n)
     if found is not None:
         return found
     over_field, (U, V, W), _ = block.lifts

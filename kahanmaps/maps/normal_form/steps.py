@@ -13,7 +13,7 @@ from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Assembly, Block, PlanesPoint
 from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.maps.normal_form.tau_table import triples
+from kahanmaps.maps.normal_form.tau import triples
 
 
 class NormalSteps:

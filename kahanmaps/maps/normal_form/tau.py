@@ -1,4 +1,4 @@
-"""Tau functions: the points of an orbit in a plane as products of two integer sequences a third of their length.
+"""Tau functions: the points of an orbit in a plane as products of two Somos sequences a third of their length.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -15,133 +15,150 @@ and for a + b and a - b everything is bilinear (phi is psi or chi; there are no 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
 psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
-gamma = 1 - delta. The cube roots are taken out: psi_n and chi_n are what is written here times gamma^(1/3) where 3
-divides n, and then the one square on the right whose index alone is divisible by 3 has to be multiplied by gamma. So
-all values follow from those of half the index (`tau_table`); here are the first ones, and how a point is put together.
-
-Over Q the numbers would grow by powers of the bad primes like everything else, with exponents quadratic in n. So a
-value is kept as an integer prime to the bad primes times a scale s_n that is never formed: only
-t_n = s_{n+1} s_{n-1} / s_n^2 is needed, a small rational number. docs/mathematics.md has the proofs.
-Source: ward-1948, for such sequences.
+gamma = 1 - delta. The cube roots are taken out where 3 divides n. These are the sequences W and U of `somos`, whose
+terms follow from those of half the index: over Q integers prime to the bad primes, with scales that are never formed,
+since the numbers would grow by powers of the bad primes like everything else, with exponents quadratic in n.
+docs/mathematics.md has the proofs. Source: ward-1948, for such sequences.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import count, islice
 from typing import Any
 
-from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, determinant
+from kahanmaps.maps.normal_form.planar_block import Triple, determinant
+from kahanmaps.maps.somos import Terms
 
 _BASES = 3
+_FIRST = 2  # below it psi_{n-1} would be zero
+_SHARED = 8  # so many points are taken from one table, which holds some ten times the digits of a point then
 
 
-@dataclass(frozen=True)
-class Window:
-    """Values of psi or chi from index `first` on: integers prime to the bad primes, and their scales s_n."""
+def triples(block: Any) -> Iterator[Triple]:
+    """P_0, P_1, ... as `IntegerBlock.triples` gives them, up to signs, three times as fast.
 
-    first: int
-    values: list[Any]
-    scales: list[Any]
-
-    def t(self, n: int) -> Any:
-        """s_{n+1} s_{n-1} / s_n^2."""
-        k = n - self.first
-        return self.scales[k + 1] * self.scales[k - 1] / (self.scales[k] * self.scales[k])
-
-    def __getitem__(self, n: int) -> Any:
-        return self.values[n - self.first]
-
-    def scale(self, n: int) -> Any:
-        """s_n."""
-        return self.scales[n - self.first]
-
-
-class TauStart:
-    """psi_1, ..., psi_4, chi_{-2}, ..., chi_2 and the natural lifts P_{-1}, P_0, P_1 around a base point of an orbit.
-
-    `lifts` are P_{-2}, ..., P_2 over the field, `numbers` says how numbers of it are split and combined. `usable` is
-    False where a value is zero that would have to be divided by: T of small order, or three of the points on a line.
-    Then another base point may do.
+    What has to be remembered is less than the points between n/2 and n themselves.
     """
-
-    def __init__(self, numbers: Any, gamma: Any, lifts: Sequence[Triple], base: int) -> None:
-        self.base, self.numbers, self.gamma = base, numbers, gamma
-        P = dict(zip(range(-2, 3), lifts, strict=True))
-        chi = first_chi(P)
-        self.usable = all(value != 0 for value in chi.values())
-        if not self.usable:
-            return
-        one = gamma * 0 + 1
-        self.psi = _window(1, [one * n for n in (1, 2, 3, 4)], numbers)
-        self.chi = _window(-2, [chi[n] for n in range(-2, 3)], numbers)
-        # The three points that span all others, times what the formula multiplies them by.
-        self._lifts = numbers.lifts([tuple(-2 * entry for entry in P[0]), P[1], P[-1]])
-        self._divisor = numbers.divisor(self.chi[0])
-        self._one = one
-
-    @property
-    def lift_bits(self) -> int:
-        """The bit length of the longest entry of the three points, over Q."""
-        return max(int(entry.bit_length()) for lift in self._lifts for entry in lift)
-
-    def point(self, chi: Sequence[Any], products: Sequence[Any], ratio: Any, next_ratio: Any) -> Triple:
-        """P_n, primitive over Q, from chi at n-1, n, n+1 and products of psi.
-
-        `products` are psi_{n-1} psi_{n+1}, psi_n psi_{n+1} and psi_{n-1} psi_n; `ratio` is (s_n/s_{n-1} of psi) over
-        (that of chi), `next_ratio` the same for n + 1.
-        """
-        terms = [products[0] * chi[1], products[1] * chi[0], products[2] * chi[2]]
-        found: Triple = self.numbers.combined([self._one, ratio, 1 / next_ratio], terms, self._lifts, self._divisor)
-        return found
+    table = table_near(block)
+    if table is None:
+        yield from block.triples()
+        return
+    yield from islice(block.triples(), table.base + _FIRST)
+    yield from table.points()
 
 
-def first_chi(P: Mapping[int, Triple]) -> dict[int, Any]:
-    """chi_{-2}, ..., chi_2 from natural lifts of P_{-2}, ..., P_2."""
-    return {
-        0: 3 * determinant(P[-1], P[0], P[1]),
-        1: determinant(P[-1], P[0], P[2]),
-        -1: determinant(P[-2], P[0], P[1]),
-        2: determinant(P[-1], P[1], P[2]),
-        -2: determinant(P[-2], P[-1], P[1]),
-    }
+def iterate(block: Any, n: int) -> Triple | None:
+    """P_n, primitive, up to sign, for n >= 0; None where the sequences do not apply, so that one has to step.
 
-
-def _window(first: int, values: Sequence[Any], numbers: Any) -> Window:
-    found = [numbers.split(value) for value in values]
-    return Window(first, [value for value, _ in found], [scale for _, scale in found])
-
-
-def start_near(block: Any) -> TauStart | None:
-    """A base point P_0, P_1 or P_2 around which no value is zero; None where there is none, or a pole is near.
-
-    chi_n can vanish for one n only, unless T is a torsion point; `block` must not be constant nor degenerate.
+    That is where the cubic is singular, T has small order, or n is small. Poles on the way are passed over.
     """
-    over_field, zero, one = block.lifts
-    lifts = _natural_lifts(over_field, zero, one, _BASES + 3)
+    if block.is_constant:
+        at_rest: Triple = block.start
+        return at_rest
+    table = _shared_table(block)
+    if table is None or n - table.base < _FIRST:
+        return None
+    table.points_taken += 1
+    return table.point(n - table.base)
+
+
+def most_bits(block: Any, n: int) -> int | None:
+    """A number of bits that no entry of P_n over Q has more of, from what P_n is made of; None as for `iterate`."""
+    table = None if block.is_constant else _shared_table(block)
+    return None if table is None or n - table.base < _FIRST else table.most_bits(n - table.base)
+
+
+def _shared_table(block: Any) -> TauTable | None:
+    if block.table is None or block.table.points_taken >= _SHARED:
+        block.table = table_near(block)
+    table: TauTable | None = block.table
+    return table
+
+
+def table_near(block: Any) -> TauTable | None:
+    """The table for a base point P_0, P_1 or P_2 around which no value is zero; None where there is none.
+
+    chi_n can vanish for one n only, unless T is a torsion point. Near a pole there are no natural lifts.
+    """
+    if block.is_constant or block.level is None or block.is_degenerate:
+        return None
+    over_field, P0, P1 = block.lifts
+    lifts = {0: P0, 1: P1}
+    for k in range(1, _BASES + 2):
+        if lifts[k - 1][2] == 0 or lifts[k][2] == 0:
+            break
+        lifts[k + 1] = _over(over_field.image(lifts[k]), lifts[k - 1][2])
+    if P1[2] != 0:
+        lifts[-1] = _over(over_field.preimage(P0), P1[2])
     for base in range(_BASES):
-        if base - 3 in lifts and base + 3 in lifts:
-            around = [lifts[k] for k in range(base - 2, base + 3)]
-            start = TauStart(block.numbers, 1 - block.delta, around, base)
-            if start.usable:
-                return start
+        if all(k in lifts and lifts[k][2] != 0 for k in range(base - 1, base + 4)):
+            P = {k: lifts[base + k] for k in range(-1, 4)}
+            chi = first_chi(P, range(5))
+            if all(value != 0 for value in chi.values()):
+                return TauTable(block, base, P, chi)
     return None
-
-
-def _natural_lifts(block: PlanarBlock, zero: Triple, one: Triple, until: int) -> dict[int, Triple]:
-    """P_{-3}, P_{-2}, ... up to a pole, from those of P_0 and P_1."""
-    P = {0: zero, 1: one}
-    for k in range(1, until):
-        if P[k - 1][2] == 0 or P[k][2] == 0:
-            break
-        P[k + 1] = _over(block.image(P[k]), P[k - 1][2])
-    for k in range(0, -3, -1):
-        if P[k + 1][2] == 0:
-            break
-        P[k - 1] = _over(block.preimage(P[k]), P[k + 1][2])
-    return {k: lift for k, lift in P.items() if k <= 0 or lift[2] != 0}
 
 
 def _over(triple: Triple, below: Any) -> Triple:
     U, V, W = triple
     return U / below, V / below, W / below
+
+
+def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]:
+    """chi_n for some n from -2 to 4, from natural lifts of the points around P_0."""
+    rows = {-2: (-2, -1, 1), -1: (-2, 0, 1), 0: (-1, 0, 1), 1: (-1, 0, 2), 2: (-1, 1, 2), 3: (0, 1, 2), 4: (0, 1, 3)}
+    values = {n: determinant(*(P[k] for k in rows[n])) for n in indices}
+    return {n: value if n % 3 else 3 * value for n, value in values.items()}
+
+
+class TauTable:
+    """psi_n, chi_n and the points P_n, n >= 2, relative to a base point of an orbit in a plane.
+
+    `P` are natural lifts around it, `chi` the values chi_0, ..., chi_4.
+    """
+
+    def __init__(self, block: Any, base: int, P: Mapping[int, Triple], chi: Mapping[int, Any]) -> None:
+        self.base, self.points_taken = base, 0
+        self._numbers, gamma = block.numbers, 1 - block.delta
+        self._one = gamma * 0 + 1
+        self.psi = Terms([self._one * n for n in (1, 2, 3, 4)], self._numbers, gamma=gamma)
+        self.chi = Terms([chi[n] for n in (1, 2, 3, 4)], self._numbers, self.psi, gamma)
+        # The three points that span all others, times what the formula multiplies them by.
+        self._lifts = self._numbers.lifts([tuple(-2 * entry for entry in P[0]), P[1], P[-1]])
+        self._divisor = self._numbers.divisor(self._numbers.split(chi[0])[0])
+        self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n of the next point
+
+    def points(self) -> Iterator[Triple]:
+        """P_2, P_3, ..., primitive, as long as the map has a value."""
+        for n in count(_FIRST):
+            point = self.point(n)
+            if point[2] == 0:
+                return
+            yield point
+            self.psi.forget(n // 2 - 4)
+            self.chi.forget(n // 2 - 4)
+
+    def point(self, n: int) -> Triple:
+        """P_n for n >= 2, primitive over Q."""
+        psi, chi = self.psi, self.chi
+        before, here, after = (psi.integer(n + k) for k in (-1, 0, 1))
+        behind = self._product[1] if self._product[0] == n else before * here
+        self._product = n + 1, here * after
+        ahead = self._product[1]
+        terms = [before * after * chi.integer(n), ahead * chi.integer(n - 1), behind * chi.integer(n + 1)]
+        found: Triple = self._numbers.combined([self._one, *self._ratios(n)], terms, self._lifts, self._divisor)
+        return found
+
+    def _ratios(self, n: int) -> tuple[Any, Any]:
+        """The scales of the second and of the third term over that of the first."""
+        ratio = self.chi.ratio(n)
+        return self.chi.part(n) / ratio, ratio / self.psi.part(n)
+
+    def most_bits(self, n: int) -> int:
+        """What the terms of P_n may have at most, over Q."""
+        psi, chi = ([table.integer(n + k).bit_length() for k in (-1, 0, 1)] for table in (self.psi, self.chi))
+        scales = sum(scale.p.bit_length() + scale.q.bit_length() for scale in self._ratios(n))
+        terms = max(sum(psi) - one + other for one, other in zip(psi, chi, strict=True))
+        lifts = max(entry.bit_length() for lift in self._lifts for entry in lift)
+        return int(terms + scales + lifts + 2)

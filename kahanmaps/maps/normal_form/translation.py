@@ -164,8 +164,8 @@ def _power_applied(matrix: tuple[Any, Any, Any, Any], n: int) -> tuple[Any, Any]
 def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
     """P_n relative to the third of five consecutive points, n > 0; None where a value vanishes that should not."""
     P = dict(zip(range(-2, 3), points, strict=False))
-    chi = first_chi(P)
-    if any(is_zero(chi[k]) for k in (-1, 0, 1, 2)):
+    chi = first_chi(P, range(-1, 3))
+    if any(is_zero(value) for value in chi.values()):
         return None
     Q = _multiple_of_T(gamma, n, is_zero)
     if Q is None:
@@ -251,7 +251,7 @@ def _small_values(
         below = P[k - 1][2]
         U, V, W = block.image(P[k])
         P[k + 1] = (U / below, V / below, W / below)
-    chi = first_chi(P)
+    chi = first_chi(P, range(-2, 3))
     if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
         return None
     return chi, (P[-1], P[0], P[1])

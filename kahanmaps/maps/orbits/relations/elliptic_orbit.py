@@ -28,7 +28,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
 from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps, image_modulo, residue
 from kahanmaps.maps.orbits.relations.forms import common_primes
-from kahanmaps.maps.orbits.relations.somos import Terms, around, first_terms
+from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
 _MOST_PRIMES = 100
 _BITS_FOR_A_PRIME = 100  # of points: numbers are to be shorter
@@ -222,7 +222,8 @@ def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bo
         if image is None:
             return False
         point = image
-    return True
+    # Otherwise the steps would not be at different multiples of T.
+    return all(steps.multiples.integer(n) != 0 for n in range(1, search.first // stride + most + 2))
 
 
 class _Exact:
@@ -253,11 +254,11 @@ class _Exact:
 
     def steps(self, map_over: MapOver, left_out: int = 0) -> EllipticSteps:
         """The steps; the numbers are those of the orbit without its first points, so many."""
-        primes, sections = self._primes, self._search.sections
-        W = Terms(self._W, primes)
+        numbers, sections = Integers(self._primes), self._search.sections
+        W = Terms(self._W, numbers)
         new = {
             place: Coordinates(
-                sections[place].degree, self._tables[place], W, Terms(U, primes, W), self._all_primes[place]
+                sections[place].degree, self._tables[place], W, Terms(U, numbers, W), self._all_primes[place]
             )
             for place, U in self._U.items()
         }

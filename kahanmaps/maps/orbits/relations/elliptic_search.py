@@ -27,7 +27,7 @@ from flint import nmod
 
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, pivots
 from kahanmaps.maps.orbits.relations.forms import forms
-from kahanmaps.maps.orbits.relations.somos import around, first_terms
+from kahanmaps.maps.somos import around, first_terms
 
 Rows = list[list[int]]
 

@@ -16,7 +16,7 @@ from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.forms import exponents
-from kahanmaps.maps.orbits.relations.somos import Terms
+from kahanmaps.maps.somos import Terms
 
 _PRIME = 2**61 - 1
 
@@ -36,6 +36,11 @@ class EllipticSteps:
         self._map, self._places, self._first, self._left_out = map_over, places, first, left_out
         self._residue: list[int] | None = None
         self._known: dict[tuple[int, int], list[fmpz]] = {}
+
+    @property
+    def multiples(self) -> Terms:
+        """The sequence W of the multiples of T."""
+        return next(one.W for row in self._places for one in row if isinstance(one, Coordinates))
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """The point with this number, that before being done or skipped; None where the forms do not give it."""
@@ -88,15 +93,15 @@ class Coordinates:
     """A group of coordinates on one curve: `forms` has a row for each of them, the last one for their denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
-        self._degree, self._W, self._U, self._primes = degree, W, U, primes
+        self.W, self._degree, self._U, self._primes = W, degree, U, primes
         self._exponents = exponents(degree)
         # What the entries of a column have in common would be multiplied once for each row, by longer numbers.
         self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
         self._forms = fmpz_mat([[c // g for c, g in zip(row, self._common, strict=True)] for row in forms.tolist()])
 
     def at(self, n: int) -> list[fmpz]:
-        """Numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError where it or a term is 0."""
-        W, U = self._W, self._U
+        """Numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError where it is 0."""
+        W, U = self.W, self._U
         ratio, part = U.ratio(n), W.part(n)
         weights = primitive_integers(
             tuple(g * ratio**k * part**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
@@ -119,7 +124,7 @@ class Coordinates:
 
     def forget(self, n: int) -> None:
         """Keep no long terms of numbers below n."""
-        self._W.forget(n)
+        self.W.forget(n)
         self._U.forget(n)
 
 

@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, pivots
-from kahanmaps.maps.orbits.relations.somos import around
+from kahanmaps.maps.somos import around
 
 _PRIME = 2**61 - 1
 

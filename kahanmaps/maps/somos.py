@@ -13,7 +13,7 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.integers import taken_apart
+from kahanmaps.algebra.integers import divide_exactly, taken_apart
 
 _DIRECT = 8  # up to here quotients of s(n) are found from s(n) itself, then from those at n/2
 
@@ -52,75 +52,112 @@ def _next(terms: Sequence[Any], H: Any) -> Any:
     return (H**2 * c * a - H**3 * b * b) / before
 
 
+class Integers:
+    """Rational terms as integers prime to the primes of `power`, each times a rational scale."""
+
+    def __init__(self, power: fmpz) -> None:
+        self.power = power
+
+    def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
+        """Integer and scale of a value, not zero, that is integral but for the primes. Raises ArithmeticError."""
+        if taken_apart(value.q, self.power)[0] != 1:
+            raise ArithmeticError("a term has a denominator outside the set of primes")
+        integer, part = taken_apart(value.p, self.power)
+        return integer, fmpq(part, value.q)
+
+    def divisor(self, value: fmpz) -> fmpz:
+        """What `difference` takes for a division by this integer."""
+        return value
+
+    def difference(self, s: fmpq, left: fmpz, t: fmpq, right: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
+        """Integer and scale of s left - t right, over the divisor, which divides it but for the primes."""
+        below = s.q.lcm(t.q)
+        total = s.p * (below // s.q) * left - t.p * (below // t.q) * right
+        if divisor is not None:
+            total = divide_exactly([total], divisor)[0]
+        value, part = taken_apart(total, self.power)
+        return value, fmpq(part, below)
+
+
 class Terms:
-    """W or another sequence U over Q, without the primes of a set: t(n) = s(n) w(n), w(n) integers prime to `primes`.
+    """W or another sequence U without the primes of a set: t(n) = s(n) w(n), w(n) integers prime to them, s(n) scales.
 
     Outside a finite set of primes terms have no factors but those that the theory gives them: w(n) is as short as it
-    can be. The terms near n are found from those near n/2, of both sequences, with products and no division:
+    can be. The terms near n are found from those near n/2, of both sequences, with products and divisions by w(1), w(2)
+    alone:
 
         t(i + j) t(i - j) = t(i + 1) t(i - 1) W(j)^2 - t(i)^2 W(j + 1) W(j - 1),      i - j = 1 or 2.
 
     Of s(n), which would make terms longer, quotients are known that stay short: `part(n)` is s(n + 1) s(n - 1)/s(n)^2,
     and with the s of W, denoted by S, `ratio(n)` is S(n - 1) s(n + 1)/(S(n) s(n)).
+
+    `numbers` (Integers, or what does the same over a number field) splits terms. With a number `gamma` all terms whose
+    index 3 divides are without a factor gamma^(1/3): the square above whose index alone 3 divides is multiplied by it.
     """
 
-    def __init__(self, first: Sequence[fmpq], primes: fmpz, multiples: Terms | None = None) -> None:
-        """From t(1) = 1 to t(4), products of powers of the primes, and W, for all sequences but itself."""
+    def __init__(self, first: Sequence[Any], numbers: Any, multiples: Terms | None = None, gamma: Any = None) -> None:
+        """From t(1) to t(4), and W, for all sequences but itself; W(1) = 1, and W(2) a number of the primes."""
         self._W = self if multiples is None else multiples
-        self._primes, self._second = primes, first[1]
-        self._integers: dict[int, fmpz] = {}
-        self._scales: dict[int, fmpq] = {}  # s(n)/(s(i) S(j))^2 for n above 4
-        self._first: dict[int, fmpq] = {}  # s(n), as long as it is short
-        self._pairs: dict[int, tuple[fmpz, fmpz]] = {}
+        self._numbers, self._gamma = numbers, gamma
+        self._terms: dict[int, Any] = {}
+        self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n above 4
+        self._first: dict[int, Any] = {}  # s(n), as long as it is short
+        self._pairs: dict[int, tuple[Any, Any]] = {}
         self._order = deque[int]()  # in which terms were found, but for the first ones
-        self._parts: dict[int, fmpq] = {}
-        self._ratios: dict[int, fmpq] = {}
+        self._parts: dict[int, Any] = {}
+        self._ratios: dict[int, Any] = {}
         for n, term in enumerate(first, start=1):
-            if term == 0 or taken_apart(term.q, primes)[0] != 1:
-                raise ArithmeticError("the first terms are to have inverses outside the set of primes")
-            self._integers[n], part = taken_apart(term.p, primes)
-            self._first[n] = fmpq(part, term.q)
+            if term == 0:
+                raise ArithmeticError("one of the first terms is 0")
+            self._terms[n], self._first[n] = numbers.split(term)
+        # By t(i - j) is divided: by the numbers 1 and W(2) in the scale, otherwise by w, which divides exactly.
+        is_by_scale = multiples is None or first[0] == first[1] == 1
+        self._low = {
+            low: (None, first[low - 1]) if is_by_scale else (numbers.divisor(self._terms[low]), self._first[low])
+            for low in (1, 2)
+        }
 
-    def integer(self, n: int) -> fmpz:
-        """w(n), for n >= 1. Raises ArithmeticError where it is 0."""
-        if n not in self._integers:
+    def integer(self, n: int) -> Any:
+        """w(n), for n >= 1."""
+        if n not in self._terms:
             if n < 5:
                 raise ArithmeticError("a term before the first")
             low = 2 - n % 2
             i, j = (n + low) // 2, (n - low) // 2
             a, b = self.part(i), self._W.part(j)
-            below = a.q.lcm(b.q)
+            if self._gamma is not None and (i % 3 == 0) != (j % 3 == 0):
+                a, b = (a * self._gamma, b) if j % 3 == 0 else (a, b * self._gamma)
             (square, outer), (W_square, W_outer) = self.pair(i), self._W.pair(j)
-            total = a.p * (below // a.q) * outer * W_square - b.p * (below // b.q) * square * W_outer
-            if total == 0:
-                raise ArithmeticError("a term is 0")
-            self._integers[n], part = taken_apart(total, self._primes)
-            self._scales[n] = fmpq(part, below) if low == 1 else fmpq(part, below) / self._second
+            divisor, scale = self._low[low]
+            self._terms[n], part = self._numbers.difference(a, outer * W_square, b, square * W_outer, divisor)
+            self._scales[n] = part / scale
             if n > _DIRECT + 1:
                 self._order.append(n)
             else:
-                self._first[n] = self._scales[n] * (self._first[i] * self._W._first[j]) ** 2
-        return self._integers[n]
+                known = self._first[i] * self._W._first[j]
+                self._first[n] = self._scales[n] * known * known
+        return self._terms[n]
 
-    def pair(self, n: int) -> tuple[fmpz, fmpz]:
+    def pair(self, n: int) -> tuple[Any, Any]:
         """w(n)^2 and w(n + 1) w(n - 1), for n >= 2."""
         if n not in self._pairs:
             here = self.integer(n)
             self._pairs[n] = here * here, self.integer(n + 1) * self.integer(n - 1)
         return self._pairs[n]
 
-    def part(self, n: int) -> fmpq:
+    def part(self, n: int) -> Any:
         """s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
         if n not in self._parts:
             before, here, ahead = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
-            found = ahead * before / here**2
+            found = ahead * before / (here * here)
             if n > _DIRECT:
                 k = n // 2
-                found *= (self.ratio(k + 1) * self._W.part(k) if n % 2 else 1 / self.ratio(k)) ** 2
+                root = self.ratio(k + 1) * self._W.part(k) if n % 2 else 1 / self.ratio(k)
+                found = found * root * root
             self._parts[n] = found
         return self._parts[n]
 
-    def ratio(self, n: int) -> fmpq:
+    def ratio(self, n: int) -> Any:
         """S(n - 1) s(n + 1)/(S(n) s(n)), for n >= 2."""
         if self is self._W:
             return self.part(n)
@@ -128,10 +165,11 @@ class Terms:
             W = self._W
             is_first = n <= _DIRECT
             found = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
-            found /= W._scale(n, is_first) * self._scale(n, is_first)
+            found = found / (W._scale(n, is_first) * self._scale(n, is_first))
             if n > _DIRECT:
                 k = n // 2
-                found *= (self.ratio(k + 1) * W.part(k) if n % 2 else 1 / W.part(k)) ** 2
+                root = self.ratio(k + 1) * W.part(k) if n % 2 else 1 / W.part(k)
+                found = found * root * root
             self._ratios[n] = found
         return self._ratios[n]
 
@@ -141,11 +179,11 @@ class Terms:
         Products of numbers above are made again when the time comes, in a fifth of the time that they took.
         """
         while self._order and self._order[0] < n:
-            self._integers.pop(self._order.popleft(), None)
+            self._terms.pop(self._order.popleft(), None)
         for k in [k for k in self._pairs if not (n <= k <= n + 12 or k >= 2 * n + 7)]:
             del self._pairs[k]
 
-    def _scale(self, n: int, is_first: bool) -> fmpq:
+    def _scale(self, n: int, is_first: bool) -> Any:
         table = self._first if is_first else self._scales
         if n not in table:
             self.integer(n)
