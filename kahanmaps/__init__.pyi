@@ -121,7 +121,6 @@ from kahanmaps.maps.normal_form.periods import period as _period
 from kahanmaps.maps.normal_form.periods import period_over_rationals as period_over_rationals
 from kahanmaps.maps.normal_form.steps import NormalSteps as NormalSteps
 from kahanmaps.maps.orbits.arithmetic import Arithmetic as Arithmetic
-from kahanmaps.maps.orbits.iteration import Iterates as Iterates
 from kahanmaps.maps.orbits.iteration import Orbit as Orbit
 from kahanmaps.maps.orbits.orbit import orbit as _orbit
 from kahanmaps.maps.polarised import polarised_map as polarised_map

@@ -52,7 +52,7 @@ from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
+from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 
 FEWEST_HEIGHTS = 9  # for a decision; exponential growth is plain from fewer, and a budget leaves no more of it
@@ -236,7 +236,7 @@ def height_growth(
     normal_form = _NOT_GIVEN if normal_form is None else normal_form
     method = choose_method(None, "exact", normal_form, None if every == 1 else at).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
-        iterates = Iterates(kahan_map, start, at, normal_form=normal_form, max_digits=max_digits)
+        iterates = Orbit(kahan_map, start, at=at, normal_form=normal_form, max_digits=max_digits)
         heights, end = _reached(iterates, deadline)
     else:
         form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
@@ -258,7 +258,7 @@ def decimal_text(value: Fraction, digits: int = 6) -> str:
     return format(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)), "f")
 
 
-def _in_time(orbit: Orbit | Iterates, deadline: float | None) -> Iterator[OrbitPoint]:
+def _in_time(orbit: Orbit, deadline: float | None) -> Iterator[OrbitPoint]:
     """The points, until the time is over."""
     for point in orbit:
         yield point
@@ -266,7 +266,7 @@ def _in_time(orbit: Orbit | Iterates, deadline: float | None) -> Iterator[OrbitP
             orbit.interrupt()
 
 
-def _reached(iterates: Iterates, deadline: float | None) -> tuple[list[int], OrbitEnd]:
+def _reached(iterates: Orbit, deadline: float | None) -> tuple[list[int], OrbitEnd]:
     """Heights of iterates that are reached directly, the start among them; a return to the start is noticed here."""
     heights: list[int] = []
     first, back = None, None

@@ -21,7 +21,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from operator import mul
 from typing import Any
 
@@ -113,17 +113,14 @@ class MapOver(ABC):
     def __pow__(self, power: int) -> MapOver:
         """So many steps as one map, of the inverse for a negative number, the identity for 0."""
         power = integer(power, "the power")
-        if power == 0:
-            return self._at_rest()
-        return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
-
-    def _at_rest(self) -> EquationMap:
+        if power:
+            return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
         n, one = self.dim, self.field.one
         units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
         rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # 1 x~ - x
-        found = EquationMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, variables=self.variables)
-        found.flow = self.flow and (self.flow[0], self.field.zero)
-        return found
+        identity = StepOver(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, variables=self.variables)
+        identity.flow = self.flow and (self.flow[0], self.field.zero)
+        return identity
 
     def __eq__(self, other: object) -> bool:
         """Whether the equations of the steps are the same, one after the other."""
@@ -238,31 +235,67 @@ class ComposedMapOver(MapOver):
 
 
 class StepOver(MapOver):
-    """A map over a field with an equation M(x) x~ = r(x).
+    """The map of an equation M(x) x~ = r(x) over a field; `backward` gives the equation of its inverse when asked for.
 
-    It has to give `linear_system`, `denominator_matrix`, `numerator_matrix`, `inverse` and `equation`.
+    Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse. A map that knows
+    a faster way to its matrices (KahanMapOver) overrides them.
     """
+
+    def __init__(
+        self,
+        equation: Equation,
+        eps: Any,
+        backward: Callable[[], Equation] | None = None,
+        variables: tuple[str, ...] = (),
+    ) -> None:
+        self.field, self.dim, self.eps, self.variables = equation.over, equation.dim, eps, variables
+        self._equation, self._backward = equation, backward
 
     @property
     def factors(self) -> tuple[StepOver, ...]:
         return (self,)
 
-    @abstractmethod
-    def denominator_matrix(self, point: Sequence[Any]) -> Any:
-        """The matrix M(x)."""
-
-    @abstractmethod
-    def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
-        """M(x), and r(x) as a column."""
-
-    @abstractmethod
-    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
-        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~, with dPhi(x) = M(x)^{-1} N(x, x~)."""
-
     @property
-    @abstractmethod
     def equation(self) -> Equation:
         """The equation of a step."""
+        return self._equation
+
+    @cached_property
+    def inverse(self) -> StepOver:
+        """The inverse map. Raises InputError where it is not known."""
+        backward = self._equation.transposed() if self._backward is None else self._backward()
+        return StepOver(backward, self.eps, lambda: self._equation, self.variables)
+
+    def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
+        """M(x), and r(x) as a column."""
+        n = self.dim
+        with self.field.working():
+            rows = self._equation.rows(self._equation.monomials([*x, self.field.one]), self.field.zero)
+        matrix = self.field.matrix(n, n, [entry for row in rows for entry in row[:n]])
+        return matrix, self.field.column([-row[-1] for row in rows])
+
+    def denominator_matrix(self, point: Sequence[Any]) -> Any:
+        """The matrix M(x)."""
+        return self.linear_system(self.point(point))[0]
+
+    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
+        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~, with dPhi(x) = M(x)^{-1} N(x, x~)."""
+        one, zero, n = self.field.one, self.field.zero, self.dim
+        X, after = [*point, one], [*image, one]
+        columns = []
+        with self.field.working():
+            for k in range(n):
+                slopes = []  # of the monomials, by X_k
+                for exponent in self._equation.exponents:
+                    slope = self.field.convert(exponent[k])
+                    if exponent[k]:
+                        for i, (entry, e) in enumerate(zip(X, exponent, strict=True)):
+                            for _ in range(e - (i == k)):
+                                slope = slope * entry
+                    slopes.append(slope)
+                L = self._equation.rows(slopes, zero)
+                columns.append([-sum((a * b for a, b in zip(row, after, strict=True)), zero) for row in L])
+            return self.field.matrix(n, n, [columns[k][i] for i in range(n) for k in range(n)])
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """det M(x), the denominator of the map."""
@@ -284,6 +317,9 @@ class StepOver(MapOver):
         equation = self.equation
         return IntegerSteps(equation.exponents, equation.terms)
 
+    def __repr__(self) -> str:
+        return f"StepOver({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
+
 
 def det_of(name: str) -> str:
     """The determinant of a matrix with this name, in words.
@@ -292,74 +328,6 @@ def det_of(name: str) -> str:
     ('det M(x)', "det(I - eps f'(x))")
     """
     return f"det({name})" if " " in name else f"det {name}"
-
-
-class EquationMap(StepOver):
-    """The map of an equation over a field; `backward` gives the equation of its inverse when that is asked for.
-
-    Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse.
-    """
-
-    def __init__(
-        self,
-        equation: Equation,
-        eps: Any,
-        backward: Callable[[], Equation] | None = None,
-        variables: tuple[str, ...] = (),
-    ) -> None:
-        self.field, self.dim, self.eps, self.variables = equation.over, equation.dim, eps, variables
-        self._equation, self._backward = equation, backward
-
-    @property
-    def equation(self) -> Equation:
-        return self._equation
-
-    @cached_property
-    def inverse(self) -> EquationMap:
-        """The inverse map. Raises InputError where it is not known."""
-        backward = self._equation.transposed() if self._backward is None else self._backward()
-        return EquationMap(backward, self.eps, lambda: self._equation, self.variables)
-
-    def _at(self, x: Sequence[Any]) -> list[list[Any]]:
-        with self.field.working():
-            return self._equation.rows(self._equation.monomials([*x, self.field.one]), self.field.zero)
-
-    def denominator_matrix(self, point: Sequence[Any]) -> Any:
-        """The matrix M(x)."""
-        return self.linear_system(self.point(point))[0]
-
-    def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
-        rows, n = self._at(x), self.dim
-        matrix = self.field.matrix(n, n, [entry for row in rows for entry in row[:n]])
-        return matrix, self.field.column([-row[-1] for row in rows])
-
-    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
-        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~."""
-        one, zero, n = self.field.one, self.field.zero, self.dim
-        after = [*image, one]
-        columns = []
-        with self.field.working():
-            for k in range(n):
-                slopes = self._slopes([*point, one], k)
-                L = self._equation.rows(slopes, zero)
-                columns.append([-sum((a * b for a, b in zip(row, after, strict=True)), zero) for row in L])
-            return self.field.matrix(n, n, [columns[k][i] for i in range(n) for k in range(n)])
-
-    def _slopes(self, X: Sequence[Any], k: int) -> list[Any]:
-        """The derivatives of the monomials by X_k."""
-        exponents = self._equation.exponents
-        found = []
-        for exponent in exponents:
-            total = self.field.convert(exponent[k])
-            if exponent[k]:
-                for i, (entry, e) in enumerate(zip(X, exponent, strict=True)):
-                    for _ in range(e - (i == k)):
-                        total = total * entry
-            found.append(total)
-        return found
-
-    def __repr__(self) -> str:
-        return f"EquationMap({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
 
 
 class BirationalMap(DisplayedAsFormula, ABC):
@@ -472,7 +440,7 @@ class ImplicitMap(BirationalMap):
     time_steps: int = 0
     backward: Rows | None = None
     of_field: PolynomialField | None = None
-    _last: list[tuple[Field, Any, EquationMap]] = field(default_factory=list, init=False, repr=False)
+    _last: list[tuple[Field, Any, StepOver]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, names = len(self.variables), self.names
@@ -538,7 +506,7 @@ class ImplicitMap(BirationalMap):
     def digits(self) -> int:
         return digits_of(entry for row in self.rows for entry in row)
 
-    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> EquationMap:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> StepOver:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for known, at, found in self._last:
@@ -546,15 +514,11 @@ class ImplicitMap(BirationalMap):
                 return found
         point = (*values, element)
         equation = equation_of(self.rows, over, point)
-        backward = None
-        if self.backward is not None or equation.degree > 1:
-            backward = partial(self._backward, over, point)
-        found = EquationMap(equation, element, backward, self.variables)
+        is_needed = self.backward is not None or equation.degree > 1
+        backward = (lambda: equation_of(self.inverse_rows, over, point)) if is_needed else None
+        found = StepOver(equation, element, backward, self.variables)
         self._last[:] = [] if values else [(over, element, found)]  # a map with symbols is not kept
         return found
-
-    def _backward(self, over: Field, point: Sequence[Any]) -> Equation:
-        return equation_of(self.inverse_rows, over, point)
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"

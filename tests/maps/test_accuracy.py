@@ -12,9 +12,8 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
-from kahanmaps.maps.orbits.iteration import Iterates, Orbit
-from kahanmaps.maps.orbits.orbit import orbit
+from kahanmaps.maps.orbits.iteration import Orbit
+from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for, orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
@@ -45,7 +44,7 @@ def test_jumps_are_as_accurate_as_asked_for(at, digits):
     normal_form = system_normal_form(system, member=NEAR)
 
     def orbit_with(bits):
-        return Iterates(KahanMap(system, "1/20", RR(bits)), START, at, normal_form=normal_form)
+        return Orbit(KahanMap(system, "1/20", RR(bits)), START, at=at, normal_form=normal_form)
 
     orbit = orbit_with(bits_for(orbit_with, digits))
     assert all(worst(point.x) <= 10.0**-digits for point in orbit)

@@ -30,7 +30,7 @@ from kahanmaps.algebra.written.text import parse_number
 from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps
-from kahanmaps.maps.orbits.iteration import Iterates, Orbit, OrbitEnd
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
@@ -281,14 +281,14 @@ def test_balls_with_a_structure_enclose_the_orbit_and_stay_narrow(name, backward
 
 def test_iterates_given_up_within_the_first_jump_end_after_step_0(monkeypatch):
     normal_form, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [30, 60], normal_form=normal_form)
+    iterates = Orbit(KahanMap(system, "1/10"), [1, 2, 3, 4], at=[30, 60], normal_form=normal_form)
 
-    def points():
+    def points(at):
         iterates._busy_in = get_ident()
         iterates.interrupt()  # as a signal does in the middle of a far iterate
         yield
 
-    monkeypatch.setattr(iterates, "_points", points)
+    monkeypatch.setattr(iterates, "_iterates", points)
     assert list(iterates) == []
     assert iterates.end == OrbitEnd("interrupted", 0, "interrupted after step 0")
 
@@ -299,22 +299,22 @@ def test_iterates_are_points_of_the_orbit(name, field, backward):
     normal_form, system = structure_and_system(name)
     phi, start = KahanMap(system, "1/10", field), random_point(system.dim, 3, height=3)
     points = [point.text for point in Orbit(phi, start, 27, backward=backward)]
-    iterates = Iterates(phi, start, [27, 0, 3, 26, 3], normal_form=normal_form, backward=backward)
+    iterates = Orbit(phi, start, at=[27, 0, 3, 26, 3], normal_form=normal_form, backward=backward)
     assert [(point.step, point.text) for point in iterates] == [(n, points[n]) for n in (0, 3, 26, 27)]
     assert iterates.end == OrbitEnd("completed", 27, "4 iterates reached directly")
 
 
 def test_iterates_stop_at_a_pole_on_the_way_over_q():
     system, normal_form, start = side_by_side("a pole at step 3", "level 0")
-    iterates = Iterates(KahanMap(system, "1/2"), start, [0, 2, 30, 40], normal_form=normal_form)
+    iterates = Orbit(KahanMap(system, "1/2"), start, at=[0, 2, 30, 40], normal_form=normal_form)
     assert [point.step for point in iterates] == [0, 2]
     assert iterates.end == OrbitEnd("singular", 2, "step 30 cannot be reached: the map has no value at step 2")
 
 
 def test_iterates_stop_where_numbers_would_be_too_long():
     normal_form, system = structure_and_system("m = 2")
-    iterates = Iterates(
-        KahanMap(system, "1/10"), [1, 2, 3, 4], [5, 10**5, 10**6], normal_form=normal_form, max_digits=1000
+    iterates = Orbit(
+        KahanMap(system, "1/10"), [1, 2, 3, 4], at=[5, 10**5, 10**6], normal_form=normal_form, max_digits=1000
     )
     assert [point.step for point in iterates] == [5]
     assert (iterates.end.status, iterates.end.steps) == ("budget", 5)
@@ -324,14 +324,14 @@ def test_iterates_stop_where_numbers_would_be_too_long():
 
 def test_iterates_of_balls_too_wide_say_so():
     normal_form, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10", RR(10)), [1, "1/3", 3, "1/7"], [1, 10**12], normal_form=normal_form)
+    iterates = Orbit(KahanMap(system, "1/10", RR(10)), [1, "1/3", 3, "1/7"], at=[1, 10**12], normal_form=normal_form)
     assert [point.step for point in iterates] == [1]
     assert (iterates.end.status, iterates.end.steps) == ("precision", 1)
 
 
 def test_iterates_are_interrupted_between_two():
     normal_form, system = structure_and_system("m = 2")
-    iterates = Iterates(KahanMap(system, "1/10", GF(101)), [1, 2, 3, 4], [1, 2, 3], normal_form=normal_form)
+    iterates = Orbit(KahanMap(system, "1/10", GF(101)), [1, 2, 3, 4], at=[1, 2, 3], normal_form=normal_form)
     for point in iterates:
         if point.step == 2:
             iterates.interrupt()
@@ -341,12 +341,12 @@ def test_iterates_are_interrupted_between_two():
 def test_iterates_before_the_start_are_refused():
     normal_form, system = structure_and_system("m = 2")
     with pytest.raises(InputError, match="found -3 steps"):
-        Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [1, -3], normal_form=normal_form)
+        Orbit(KahanMap(system, "1/10"), [1, 2, 3, 4], at=[1, -3], normal_form=normal_form)
 
 
 def test_an_iterate_in_flight_is_given_up_when_a_signal_asks_for_it():
     normal_form, system = structure_and_system("m = 2")
-    orbit = Iterates(KahanMap(system, "1/10"), random_point(4, 3), [5, 3000], normal_form=normal_form, max_digits=10**9)
+    orbit = Orbit(KahanMap(system, "1/10"), random_point(4, 3), at=[5, 3000], normal_form=normal_form, max_digits=10**9)
     seen = []
 
     def handler(signum, frame):

@@ -16,7 +16,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import NthIterate
-from kahanmaps.maps.orbits.iteration import Iterates, Orbit, OrbitEnd
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 # Roots: three rational, one rational (in other coordinates), none rational, double, triple.
@@ -42,7 +42,7 @@ def event(system, normal_form, eps, start, steps, digits):
     kahan = KahanMap(system, eps)
     walks = [ended(Orbit(kahan, start, steps, normal_form=known, max_digits=digits)) for known in (None, normal_form)]
     assert walks[0] == walks[-1]
-    far = ended(Iterates(kahan, start, [steps], normal_form=normal_form, max_digits=digits))
+    far = ended(Orbit(kahan, start, at=[steps], normal_form=normal_form, max_digits=digits))
     walk = walks[0]
     if walk.is_whole:
         assert (far.status, far.steps) == ("completed", steps)
@@ -63,7 +63,7 @@ def seen_from(cubic, eps, sixths, runs):
         for steps, digits in runs:
             walk = event(system, normal_form, eps, [u, v], steps, digits)
             seen.append(walk.status)
-            far = ended(Iterates(KahanMap(system, eps), [u, v], [FAR], normal_form=normal_form, max_digits=digits))
+            far = ended(Orbit(KahanMap(system, eps), [u, v], at=[FAR], normal_form=normal_form, max_digits=digits))
             if not walk.is_whole:
                 assert far.status == walk.status
     return seen
@@ -86,7 +86,7 @@ def test_a_pole_comes_before_a_budget_that_is_exceeded_far_behind_it():
     system = QuadraticSystem.from_text(["u", "v"], ["6*u*v-12*v^2", "-3*u^2-3*v^2"])
     normal_form, kahan = found_structure(system), KahanMap(system, "1/2")
     for n in (100, 1_000_002, 10**26):
-        end = ended(Iterates(kahan, ["-1/3", 0], [n], normal_form=normal_form))
+        end = ended(Orbit(kahan, ["-1/3", 0], at=[n], normal_form=normal_form))
         assert end == OrbitEnd("singular", 0, f"step {n} cannot be reached: the map has no value at step 1")
 
 
@@ -116,7 +116,7 @@ def test_a_plane_over_its_budget_comes_before_a_pole_far_behind_in_another():
     for sign, far in product((1, -1), (40, 1000)):
         point = [fmpq(sign * x, far * direction[1] ** 2) for x in direction]
         alone = ended(Orbit(KahanMap(single, "1/2"), point, 2000, max_digits=50))
-        both = ended(Iterates(KahanMap(system, "1/2"), [point[0], u, point[1], v], [FAR], normal_form=normal_form))
+        both = ended(Orbit(KahanMap(system, "1/2"), [point[0], u, point[1], v], at=[FAR], normal_form=normal_form))
         walk = ended(Orbit(KahanMap(system, "1/2"), [point[0], u, point[1], v], 60, normal_form=normal_form))
         assert both.status == ("singular" if alone.status == "singular" and alone.steps < 60 else "budget")
         assert walk.status == ("singular" if both.status == "singular" else "completed")

@@ -21,14 +21,7 @@ from enum import StrEnum
 from math import lcm
 from typing import Any
 
-from flint import (
-    fmpq,
-    fmpz,
-    fmpz_mod_ctx,
-    fmpz_mod_poly_ctx,
-    fq_default_ctx,
-    fq_default_poly_ctx,
-)
+from flint import fmpq, fmpq_mat, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.written.plain import all_fields
@@ -38,7 +31,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.splitting import Plane, Splitting
+from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
@@ -107,20 +100,18 @@ class OrbitPeriod(Printed):
     @property
     def text(self) -> str:
         """A sentence, and a line for each plane."""
-        lines = [self._sentence(), *(plane.text for plane in self.planes)]
-        return "\n".join(lines)
-
-    def _sentence(self) -> str:
         if self.period is None:
-            return {
+            sentence = {
                 "aperiodic": "the orbit has no period",
                 "undefined": "the orbit comes to a point where the map has no value and cannot be continued",
             }.get(self.status, "the period was not found")
-        if self.meets_pole is False:
-            return f"the orbit has period {self.period} and meets no pole of the map"
-        if self.meets_pole:
-            return f"continued through its poles the orbit has period {self.period}; the map itself stops at a pole"
-        return f"continued through its poles, if it meets any, the orbit has period {self.period}"
+        elif self.meets_pole is False:
+            sentence = f"the orbit has period {self.period} and meets no pole of the map"
+        elif self.meets_pole:
+            sentence = f"continued through its poles the orbit has period {self.period}; the map itself stops at a pole"
+        else:
+            sentence = f"continued through its poles, if it meets any, the orbit has period {self.period}"
+        return "\n".join([sentence, *(plane.text for plane in self.planes)])
 
 
 def orbit_period(
@@ -138,35 +129,44 @@ def orbit_period(
     >>> found.period, found.meets_pole
     (85400488827489215, True)
     """
-    field = GF(prime)
-    splitting = Splitting(form, field, eps)
-    triples = splitting.triples([field.convert(value) for value in start])
-    return _joined(
-        [
-            plane_period(plane.block, triple, prime, _context(plane, prime), name=plane.name, largest=largest)
-            for plane, triple in zip(splitting.planes, triples, strict=True)
-        ]
+    return _orbit_period(form, None, eps, start, prime, largest)
+
+
+def _orbit_period(
+    form: NormalForm,
+    T: fmpq_mat | None,
+    eps: Any,
+    start: Sequence[Any],
+    prime: int | None,
+    largest: int = LARGEST_FIELD,
+) -> OrbitPeriod:
+    """The period of a start in the coordinates x = T y, modulo a prime or over Q."""
+    field = QQ if prime is None else GF(prime)
+    splitting = Splitting(form, field, eps, T)
+    planes = []
+    for plane, triple in zip(splitting.planes, splitting.triples([field.convert(x) for x in start]), strict=True):
+        if prime is None:
+            planes.append(plane_period_over_rationals(plane.block, triple, name=plane.name))
+        else:
+            planes.append(plane_period(plane.block, triple, prime, plane.context, name=plane.name, largest=largest))
+    # Of the planes, the worst speaks.
+    statuses, poles_met = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
+    worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
+    return OrbitPeriod(
+        lcm(*(plane.period or 1 for plane in planes)) if worst == "periodic" else None,
+        worst,
+        True if True in poles_met else None if None in poles_met else False,
+        tuple(planes),
     )
 
 
-def _context(plane: Plane, prime: int) -> fq_default_ctx | None:
-    """The field of a plane over GF(p), for degree > 1: FLINT's elements do not tell it, but t^degree does."""
-    if plane.degree == 1:
-        return None
-    t = plane.residue([0, 1])
-    ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
-    modulus = [-int(c) for c in (t**plane.degree).to_list()]
-    return fq_default_ctx(modulus=ring([*modulus, *([0] * (plane.degree - len(modulus))), 1]))
-
-
-def _joined(planes: list[PlanePeriod]) -> OrbitPeriod:
-    """The verdict for the orbit; of the planes, the worst speaks."""
-    statuses = [plane.status for plane in planes]
-    worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
-    period = lcm(*(plane.period or 1 for plane in planes)) if worst == "periodic" else None
-    poles = [plane.meets_pole for plane in planes]
-    meets = True if True in poles else (None if None in poles else False)
-    return OrbitPeriod(period, worst, meets, tuple(planes))
+# Of the kinds for which neither depends on the field: status, period, and whether a pole is met.
+_KNOWN = {
+    Kind.FIXED: ("periodic", 1, False),
+    Kind.NO_VALUE: ("undefined", None, True),
+    Kind.AT_POLE: ("periodic", 4, True),
+    Kind.VERTEX: ("periodic", 3, False),
+}
 
 
 def plane_period(
@@ -189,32 +189,21 @@ def plane_period(
     if prime <= 3:
         return _by_walking(block, point, q, name)
     kind, gamma = _classify(block, point)
-
-    def found(period: int | None, meets_pole: bool | None, reason: str = "", status: str = "periodic") -> PlanePeriod:
-        return PlanePeriod(name, q, kind, status, period, meets_pole, reason)
-
-    if kind is Kind.FIXED:
-        return found(1, False)
-    if kind is Kind.NO_VALUE:
-        return found(None, True, status="undefined")
-    if kind is Kind.AT_POLE:
-        return found(4, True)
+    if kind in _KNOWN:
+        return PlanePeriod(name, q, kind, *_KNOWN[kind])
     if kind is Kind.ADDITIVE:
-        return found(prime, _parabolic_meets_pole(block, point, prime))
-    if kind is Kind.VERTEX:
-        return found(3, False)
+        return PlanePeriod(name, q, kind, "periodic", prime, _parabolic_meets_pole(block, point, prime))
+    at_infinity = poles(block, prime, context)
     if kind is Kind.TRIANGLE:
         period = 3 * _multiplicative_order(-8, prime)
-        return found(period, _walk_meets_pole(block, point, period) if poles(block, prime, context) else False)
+        meets_pole = _walk_meets_pole(block, point, period) if at_infinity else False
+        return PlanePeriod(name, q, kind, "periodic", period, meets_pole)
     if q > largest:
-        reason = f"its field has {_size(q)} elements, more than {_size(largest)}"
-        return found(None, None if poles(block, prime, context) else False, reason, status="undecided")
+        size, most = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
+        reason = f"its field has {size} elements, more than {most}"
+        return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
     order = translation_order(gamma, q, context)
-    return found(order, _smooth_meets_pole(block, point, order, q, poles(block, prime, context)))
-
-
-def _size(q: int) -> str:
-    return str(q) if q < 10**6 else f"about 2^{q.bit_length() - 1}"
+    return PlanePeriod(name, q, kind, "periodic", order, _smooth_meets_pole(block, point, order, q, at_infinity))
 
 
 def _classify(block: PlanarBlock, point: Triple) -> tuple[Kind, Any]:
@@ -275,17 +264,13 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
 def _smooth_meets_pole(block: PlanarBlock, point: Triple, order: int, q: int, at_infinity: list[Triple]) -> bool | None:
     """Whether one of the poles is an image of the point, on a smooth level where Psi has this order."""
     above, below = block.level(point)
-    unknown = False
+    # With a pole as zero of the group, T is its image, and the question is whether the point is a multiple.
+    answers: list[bool | None] = []
     for pole in at_infinity:
-        # With the pole as zero of the group, T is its image, and the question is whether the point is a multiple.
-        cubic = LevelCubic(block, above, below, pole)
-        answer = cubic.is_multiple(point, block.image(pole), order, q)
-        if answer:
+        answers.append(LevelCubic(block, above, below, pole).is_multiple(point, block.image(pole), order, q))
+        if answers[-1]:
             return True
-        unknown = unknown or answer is None
-    if unknown:
-        return _walk_meets_pole(block, point, order)
-    return False
+    return _walk_meets_pole(block, point, order) if None in answers else False
 
 
 def _parabolic_meets_pole(block: PlanarBlock, point: Triple, prime: int) -> bool:
@@ -337,14 +322,7 @@ def period_of(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], pri
     >>> period_of(normal_form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
-    field = QQ if prime is None else GF(prime)
-    point = [field.convert(entry) for entry in start]
-    if normal_form.T is not None:  # x = T y with y the coordinates of the normal form
-        field.convert_matrix(normal_form.T)  # the prime may divide neither denominator
-        point = (field.convert_matrix(normal_form.T.inv()) * field.column(point)).entries()
-    if prime is None:
-        return period_over_rationals(normal_form.form, eps, point)
-    return orbit_period(normal_form.form, eps, point, prime)
+    return _orbit_period(normal_form.form, normal_form.T, eps, start, prime)
 
 
 def period(system: QuadraticSystem, start: Sequence[Any], eps: Any, prime: int | None = None) -> OrbitPeriod:
@@ -374,14 +352,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     >>> period_over_rationals(form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
-    splitting = Splitting(form, QQ, eps)
-    triples = splitting.triples([QQ.convert(value) for value in start])
-    return _joined(
-        [
-            plane_period_over_rationals(plane.block, triple, name=plane.name)
-            for plane, triple in zip(splitting.planes, triples, strict=True)
-        ]
-    )
+    return _orbit_period(form, None, eps, start, None)
 
 
 def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str = "the plane") -> PlanePeriod:
@@ -392,24 +363,15 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
     'the plane: period 5 (a smooth level cubic; 5 T = 0)'
     """
     kind, gamma = _classify(block, point)
-
-    def found(status: str, period: int | None = None, meets_pole: bool | None = None, reason: str = "") -> PlanePeriod:
-        return PlanePeriod(name, 0, kind, status, period, meets_pole, reason)
-
-    if kind is Kind.FIXED:
-        return found("periodic", 1, False)
-    if kind is Kind.NO_VALUE:
-        return found("undefined", None, True)
-    if kind is Kind.AT_POLE:
-        return found("periodic", 4, True)
-    if kind is Kind.VERTEX:
-        return found("periodic", 3, False)
+    if kind in _KNOWN:
+        return PlanePeriod(name, 0, kind, *_KNOWN[kind])
     if kind is not Kind.SMOOTH:
-        return found("aperiodic", reason="a parabolic map" if kind is Kind.ADDITIVE else "-8 is no root of unity")
+        reason = "a parabolic map" if kind is Kind.ADDITIVE else "-8 is no root of unity"
+        return PlanePeriod(name, 0, kind, "aperiodic", None, None, reason)
     order, reason = torsion_order(gamma)
     if order is None:
-        return found("aperiodic", reason=reason)
-    return found("periodic", order, _walk_meets_pole(block, point, order), reason)
+        return PlanePeriod(name, 0, kind, "aperiodic", None, None, reason)
+    return PlanePeriod(name, 0, kind, "periodic", order, _walk_meets_pole(block, point, order), reason)
 
 
 def torsion_order(gamma: Any) -> tuple[int | None, str]:

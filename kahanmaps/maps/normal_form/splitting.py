@@ -27,7 +27,8 @@ class Plane:
     """One plane: `name` says at which root or factor of chi, `degree` is that of its field over the field of x.
 
     `residue` takes the coefficients of an element of K (elements of the field of x) to its value in the plane, and
-    `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair).
+    `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair). `context`
+    is FLINT's field of the plane where that is an extension of GF(p), since elements do not tell it.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Plane:
     block: PlanarBlock
     residue: Any
     coefficients: Any
+    context: fq_default_ctx | None = None
 
 
 class Splitting:
@@ -55,7 +57,15 @@ class Splitting:
             if self.eps == 0:
                 raise BadPrime(f"eps = 0 in {field}: take another prime", field.characteristic)
             self._inverse = field.convert_matrix(S.inv())
-            planes, lifts = _planes(form, field)
+            # The planes, and for each the coefficients in K of the elements that its own coefficients stand for.
+            if field is QQ:
+                planes, lifts = _over_rationals(form)
+            elif isinstance(field, PrimeField):
+                planes, lifts = _modulo(form, field)
+            elif isinstance(field, BallField):
+                planes, lifts = _over_balls(form, field)
+            else:
+                raise InputError(f"found the field {field}, expected QQ, GF(p) or real balls")
             self.planes: tuple[Plane, ...] = tuple(planes)
             rows = field.convert_matrix(S).tolist()
             m = form.m
@@ -65,7 +75,8 @@ class Splitting:
                 columns = []
                 for half in (0, m):
                     for column in lift:
-                        columns.append([_dot(row[half : half + m], column, field) for row in rows])
+                        pairs = [zip(row[half : half + m], column, strict=True) for row in rows]
+                        columns.append([sum((a * b for a, b in pair), field.zero) for pair in pairs])
                 self._matrices.append(columns)
 
     @property
@@ -102,21 +113,6 @@ class Splitting:
                 for column, value in zip(columns, values, strict=True):
                     total = [entry + factor * value for entry, factor in zip(total, column, strict=True)]
             return tuple(entry / self._scale for entry in total)
-
-
-def _dot(row: Sequence[Any], column: Sequence[Any], field: Field) -> Any:
-    return sum((a * b for a, b in zip(row, column, strict=True)), field.zero)
-
-
-def _planes(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
-    """The planes, and for each the coefficients in K of the elements that its own coefficients stand for."""
-    if field is QQ:
-        return _over_rationals(form)
-    if isinstance(field, PrimeField):
-        return _modulo(form, field)
-    if isinstance(field, BallField):
-        return _over_balls(form, field)
-    raise InputError(f"found the field {field}, expected QQ, GF(p) or real balls")
 
 
 def _over_rationals(form: NormalForm) -> tuple[list[Plane], list[list[list[Any]]]]:
@@ -194,7 +190,8 @@ def _modulo(form: NormalForm, field: PrimeField) -> tuple[list[Plane], list[list
                 return known + [field.zero] * (degree - len(known))
 
             block = PlanarBlock(*(residue_class(e.coeffs()) for e in elements))
-            plane = Plane(f"a factor of degree {degree} of chi mod {p}", degree, block, residue_class, coefficients)
+            name = f"a factor of degree {degree} of chi mod {p}"
+            plane = Plane(name, degree, block, residue_class, coefficients, extension)
         planes.append(plane)
         others = chi // factor
         _, inverse, _ = others.xgcd(factor)

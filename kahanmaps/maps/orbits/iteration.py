@@ -27,6 +27,7 @@ from kahanmaps.maps.orbits.relations.rational_orbit import RationalOrbit
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
 if TYPE_CHECKING:
     from kahanmaps.family.system_normal_form import SystemNormalForm
+    from kahanmaps.maps.normal_form.iterate import NthIterate
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 DEFAULT_MAX_DIGITS = 200_000
@@ -101,15 +102,20 @@ class OrbitPoint:
     __hash__ = None  # type: ignore[assignment]  # residues have no hash
 
 
+class _GivenUp(Exception):
+    """Raised by `Orbit.interrupt` in the thread that computes an iterate directly."""
+
+
 class Orbit(Displayed):
-    """The orbit of `start` under a Kahan map: iterate over it once, then look at `end`.
+    """The orbit of `start` under a map, or some iterates of it: iterate over it once, then look at `end`.
 
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
     back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
     denominator (over Q). With a `normal_form` (family.system_normal_form) the orbit is walked in normal form: over
     Q plane by plane; over balls every point directly, so that balls do not widen from step to step. Points that are not
-    `wanted` are left out where that saves time. `first` and `last` are the first points and the last one that were
-    delivered so far.
+    `wanted` are left out where that saves time. With a normal form and the steps `at`, each of these iterates is
+    reached directly, not by way of those before it; poles on the way are passed over then, except over Q. `first` and
+    `last` are the first points and the last one that were delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -118,20 +124,30 @@ class Orbit(Displayed):
     [['1/5'], ['1/4'], ['1/3'], ['1/2']]
     >>> orbit.end.status
     'completed'
+    >>> from kahanmaps.algebra.fields import GF
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.system_normal_form import system_normal_form
+    >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
+    >>> phi, normal_form = KahanMap(system, "1/10", GF(10007)), system_normal_form(system)
+    >>> [point.text for point in Orbit(phi, [1, 2, 3, 4, 5, 6], at=[10**30], normal_form=normal_form)]
+    [['5212', '9799', '6471', '5788', '2175', '9896']]
     """
 
     def __init__(
         self,
         kahan_map: MapOver,
         start: Sequence[Any],
-        steps: int | None,
+        steps: int | None = None,
         *,
+        at: Iterable[int] | None = None,
         backward: bool = False,
         max_digits: int | None = DEFAULT_MAX_DIGITS,
         normal_form: SystemNormalForm | None = None,
         wanted: Callable[[int], bool] | None = None,
     ) -> None:
-        require_steps(steps)
+        self.at = None if at is None else sorted(set(at))
+        for number in [steps] if self.at is None else self.at:
+            require_steps(number)
         if max_digits is not None and max_digits < 1:
             raise InputError(f"found a budget of {max_digits} digits, expected at least 1")
         self.map = kahan_map.inverse if backward else kahan_map
@@ -141,10 +157,18 @@ class Orbit(Displayed):
         self.max_digits = max_digits
         self.normal_form = normal_form
         self._wanted = wanted
+        self._jump: NthIterate | None = None
+        if normal_form is not None and (at is not None or isinstance(self.map.field, BallField)):
+            from kahanmaps.maps.normal_form.iterate import NthIterate
+
+            self._jump = NthIterate(normal_form, self.map.eps, self.map.field)
+        elif at is not None:
+            raise InputError("found at= without a normal form: only there iterates are reached directly")
         self.end: OrbitEnd | None = None
         self.first: list[OrbitPoint] = []  # up to FIRST_POINTS of them
         self.last: OrbitPoint | None = None
         self._interrupted = False
+        self._busy_in: int | None = None  # the thread that computes an iterate directly
         self._walk: RationalOrbit | None = None
 
     @property
@@ -154,16 +178,29 @@ class Orbit(Displayed):
         return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
 
     def interrupt(self) -> None:
-        """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
+        """Ask a running orbit to end after the step in flight (safe to call from a signal handler).
+
+        An iterate that is being reached directly, which may be a long one, is given up.
+        """
         self._interrupted = True
+        if self._busy_in == get_ident():
+            raise _GivenUp
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         self.first, self.last = [], None
-        for point in self._points():
-            if point.step < FIRST_POINTS:
-                self.first.append(point)
-            self.last = point
-            yield point
+        try:
+            for point in self._points() if self.at is None else self._iterates(self.at):
+                if point.step < FIRST_POINTS:
+                    self.first.append(point)
+                self.last = point
+                yield point
+        except _GivenUp:
+            self._end_interrupted(0 if self.last is None else self.last.step)
+        finally:
+            self._busy_in = None
+
+    def _end_interrupted(self, step: int, period: int | None = None) -> None:
+        self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}", period)
 
     def _points(self) -> Iterator[OrbitPoint]:
         field = self.map.field
@@ -176,7 +213,7 @@ class Orbit(Displayed):
             return
         while self.steps is None or step < self.steps:
             if self._interrupted:
-                self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}", period)
+                self._end_interrupted(step, period)
                 return
             try:
                 value = next(images)
@@ -209,15 +246,12 @@ class Orbit(Displayed):
             from kahanmaps.maps.normal_form.steps import NormalSteps
 
             yield from NormalSteps(self.normal_form, self.map.eps).points(self.start)
-        elif self.normal_form is not None and isinstance(field, BallField):
-            from kahanmaps.maps.normal_form.iterate import NthIterate
-
-            iterates = NthIterate(self.normal_form, self.map.eps, field)
+        elif self._jump is not None:
             value: Any = self.start
             yield value
             for step in count(1):
                 try:
-                    value = iterates.value(self.start, step)
+                    value = self._jump.value(self.start, step)
                 except PrecisionLost:  # for tiny eps a step from the last point may need fewer bits
                     value = self.map.step(value)
                 yield value
@@ -234,82 +268,29 @@ class Orbit(Displayed):
     def _excess(self, value: Any) -> int:
         """The bits of a value that is beyond the budget, otherwise 0."""
         limit = _bits(self.max_digits)
-        if isinstance(value, tuple):
-            bits = _bits_of(value) if isinstance(self.map.field, EtaleAlgebra) else 0
-            return bits if limit is not None and bits > limit else 0
-        return 0 if limit is None else value.exceeding(limit)
+        if limit is None:
+            return 0
+        if not isinstance(value, tuple):
+            return int(value.exceeding(limit))
+        if not isinstance(self.map.field, EtaleAlgebra):
+            return 0
+        numbers = [number for entry in value for number in entry.coefficients]
+        bits = max((max(x.p.bit_length(), x.q.bit_length()) for x in numbers), default=0)
+        return bits if bits > limit else 0
 
-
-class _GivenUp(Exception):
-    """Raised by `Iterates.interrupt` in the thread that computes."""
-
-
-class Iterates:
-    """Some iterates of a start, each reached directly, not by way of those before it: iterate once, then look at `end`.
-
-    `at` are the steps wanted, in increasing order; the rest is as for `Orbit`. Poles on the way are passed over,
-    except over Q.
-
-    >>> from kahanmaps.algebra.fields import GF
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> from kahanmaps.family.system_normal_form import system_normal_form
-    >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
-    >>> from kahanmaps.maps.kahan import KahanMap
-    >>> kahan = KahanMap(system, "1/10", GF(10007))
-    >>> [point.text for point in Iterates(kahan, [1, 2, 3, 4, 5, 6], [10**30], normal_form=system_normal_form(system))]
-    [['5212', '9799', '6471', '5788', '2175', '9896']]
-    """
-
-    def __init__(
-        self,
-        kahan_map: MapOver,
-        start: Sequence[Any],
-        at: Iterable[int],
-        *,
-        normal_form: SystemNormalForm,
-        backward: bool = False,
-        max_digits: int | None = DEFAULT_MAX_DIGITS,
-    ) -> None:
-        self.map = kahan_map.inverse if backward else kahan_map
-        self.start = kahan_map.point(start)
-        self.at = sorted(set(at))
-        for step in self.at:
-            require_steps(step)
-        self.max_digits = max_digits
-        self.end: OrbitEnd | None = None
-        from kahanmaps.maps.normal_form.iterate import NthIterate
-
-        self._jump = NthIterate(normal_form, self.map.eps, self.map.field)
-        self._interrupted = False
-        self._busy_in: int | None = None
-
-    def interrupt(self) -> None:
-        """Ask to end; from a signal handler also the iterate in flight is given up, which may be a long one."""
-        self._interrupted = True
-        if self._busy_in == get_ident():
-            raise _GivenUp
-
-    def __iter__(self) -> Iterator[OrbitPoint]:
-        self._done = 0
-        try:
-            yield from self._points()
-        except _GivenUp:
-            self.end = OrbitEnd("interrupted", self._done, f"interrupted after step {self._done}")
-        finally:
-            self._busy_in = None
-
-    def _points(self) -> Iterator[OrbitPoint]:
+    def _iterates(self, at: Sequence[int]) -> Iterator[OrbitPoint]:
+        """Each of these iterates directly."""
         from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 
+        assert self._jump is not None
         done = 0
-        max_bits = _bits(self.max_digits)
-        for step in self.at:
+        for step in at:
             if self._interrupted:
-                self.end = OrbitEnd("interrupted", done, f"interrupted after step {done}")
+                self._end_interrupted(done)
                 return
             try:
                 self._busy_in = get_ident()
-                value = self._jump.value(self.start, step, max_bits)
+                value = self._jump.value(self.start, step, _bits(self.max_digits))
             except SingularStep as error:
                 self.end = OrbitEnd("singular", done, f"step {step} cannot be reached: {error}")
                 return
@@ -321,9 +302,9 @@ class Iterates:
                 return
             finally:
                 self._busy_in = None
-            self._done = done = step
+            done = step
             yield OrbitPoint(step, self.map.field, value)
-        self.end = OrbitEnd("completed", done, f"{counted(len(self.at), 'iterate')} reached directly")
+        self.end = OrbitEnd("completed", done, f"{counted(len(at), 'iterate')} reached directly")
 
 
 def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | None) -> None:
@@ -344,12 +325,6 @@ def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | Non
 def _bits(max_digits: int | None) -> int | None:
     """A budget of digits in bits."""
     return None if max_digits is None else max_digits * 100_000 // 30103
-
-
-def _bits_of(point: tuple[Any, ...]) -> int:
-    """Those of the longest integer in the coordinates of a point over a number field."""
-    numbers = [number for entry in point for number in entry.coefficients]
-    return max((max(x.p.bit_length(), x.q.bit_length()) for x in numbers), default=0)
 
 
 def _budget_text(step: int, bits: int | None, max_digits: int | None, wanted: int | None = None) -> str:

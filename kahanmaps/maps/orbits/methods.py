@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kahanmaps.algebra.fields import Field
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 
 METHODS = ("generic", "normal-form", "doubling")
@@ -65,14 +64,3 @@ def choose_method(
     if arithmetic == "mod":
         return Method("generic", "few steps modulo P")
     return Method("normal-form", normal_form.text)
-
-
-def why_no_reduction(normal_form: SystemNormalForm, field: Field, eps: object) -> str:
-    """Empty where iterates can be reached by doublings over the field, otherwise the reason (a bad prime)."""
-    from kahanmaps.maps.normal_form.iterate import NthIterate
-
-    try:
-        NthIterate(normal_form, eps, field)
-    except BadPrime as error:
-        return str(error)
-    return ""

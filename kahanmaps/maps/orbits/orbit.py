@@ -10,30 +10,28 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 
-from flint import fmpq
+from flint import arb, fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
-from kahanmaps.algebra.fields import GF, Field, integer, rational
+from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
 from kahanmaps.algebra.written.plain import json_float
 from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.displayed import data_frame
-from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.errors import BadPrime, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.convention import eps_record
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
-from kahanmaps.maps.orbits.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.iteration import (
     DEFAULT_MAX_DIGITS,
-    Iterates,
     Orbit,
     OrbitEnd,
     OrbitPoint,
     require_short,
     require_steps,
 )
-from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method, why_no_reduction
+from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -48,6 +46,7 @@ _FEW_STEPS = 3  # for which looking for a normal form does not pay
 _LONG_INPUT = 4000  # bits of start and eps, from which on setting up a normal form pays later
 _LARGE_DIMENSION = 16
 _BITS_AT_LEAST = 4096  # where no precision is enough
+_BITS_PER_DIGIT = 3.3219281
 
 
 def orbit(
@@ -114,9 +113,9 @@ def orbit(
     wanted = None if at is None else frozenset(integer(step, "a step of at") for step in at)
     far = max(wanted, default=0) if wanted is not None else (steps or 0)
     require_steps(far)
-    asked = _Asked(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
+    request = OrbitRequest(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
     if isinstance(given, MapOver):
-        return _orbit_at_one_eps(asked, field)
+        return _orbit_at_one_eps(request, field)
     map_ = as_map(given)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
@@ -124,13 +123,13 @@ def orbit(
         if at is not None or method not in (None, "generic"):
             raise InputError(f"over {field} orbits go step by step: found at= or method=, expected steps alone")
         phi = map_.at(1 if eps is None else eps, field)
-        return _orbit_at_one_eps(asked._replace(map=phi, eps=None), field)
-    asked = asked._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
+        return _orbit_at_one_eps(request._replace(map=phi, eps=None), field)
+    request = request._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
     if arithmetic.kind == "exact":
         numbers = [entry for entry in start if not isinstance(entry, EtaleElement)]
-        require_short(asked.eps, [rational(entry) for entry in numbers], max_digits)
+        require_short(request.eps, [rational(entry) for entry in numbers], max_digits)
     if normal_form is None:
-        normal_form = _normal_form(asked, method, arithmetic, hamiltonian, member)
+        normal_form = _normal_form(request, method, arithmetic, hamiltonian, member)
     chosen = choose_method(method, arithmetic.kind, normal_form, at)
     if chosen.name != "doubling" and far > _TOO_FAR:
         raise InputError(
@@ -141,14 +140,14 @@ def orbit(
     remark = ""
     if arithmetic == Arithmetic("ball"):
         try:
-            bits = bits_for(lambda bits: asked.by(chosen.name, used, Arithmetic("ball", bits)), accuracy, progress)
+            bits = bits_for(lambda bits: request.by(chosen.name, used, Arithmetic("ball", bits)), accuracy, progress)
         except NotAccurate as error:
             bits, remark = _BITS_AT_LEAST, str(error)
         arithmetic = Arithmetic("ball", bits)
-    return Trajectory(asked.by(chosen.name, used, arithmetic), asked, arithmetic, chosen, remark)
+    return Trajectory(request.by(chosen.name, used, arithmetic), request, arithmetic, chosen, remark)
 
 
-class _Asked(NamedTuple):
+class OrbitRequest(NamedTuple):
     """Which points of which orbit are wanted; `steps` is the last one."""
 
     map: Any
@@ -177,7 +176,7 @@ class _Asked(NamedTuple):
         over = self.map.at(self.eps, numbers.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
-            return Iterates(over, self.start, self.at or (), normal_form=normal_form, **limits)
+            return Orbit(over, self.start, at=self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
         wanted = self.wants if self.at is not None or self.every > 1 else None
         return Orbit(over, self.start, self.steps, normal_form=normal, wanted=wanted, **limits)
@@ -195,13 +194,15 @@ class Trajectory:
     (4, (1/2,), {'step': 0, 'x': '1/5'})
     """
 
-    def __init__(self, orbit: Any, asked: _Asked, arithmetic: Arithmetic, chosen: Method, remark: str = "") -> None:
+    def __init__(
+        self, orbit: Any, request: OrbitRequest, arithmetic: Arithmetic, chosen: Method, remark: str = ""
+    ) -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
         self.method, self._why = chosen.name, chosen.text
-        self.variables: tuple[str, ...] = asked.map.variables
+        self.variables: tuple[str, ...] = request.map.variables
         self.integrals: Mapping[str, Any] = {}
-        self._asked, self._remark = asked, remark
+        self._request, self._remark = request, remark
 
     def __repr__(self) -> str:
         return f"Trajectory({', '.join(self.variables)}; {self.arithmetic}, {self.method})"
@@ -227,7 +228,7 @@ class Trajectory:
     @cached_property
     def points(self) -> list[OrbitPoint]:
         """All points that were asked for."""
-        return [point for point in self._computed() if self._asked.wants(point.step)]
+        return [point for point in self._computed() if self._request.wants(point.step)]
 
     def __len__(self) -> int:
         return len(self.points)
@@ -254,15 +255,15 @@ class Trajectory:
 
     def values(self, point: OrbitPoint) -> list[str | None]:
         """Those of the integrals, as text; None where one is not defined."""
-        return [self._value(function, point) for function in self.integrals.values()]
-
-    def _value(self, function: Any, point: OrbitPoint) -> str | None:
-        try:  # eps itself, also where the orbit steps by -eps: integrals are those of the map
-            found = function.value(point.field, self._asked.eps, point.x)
-        except (KahanmapsError, ArithmeticError):  # not defined where the map is not, or beyond the range of floats
-            return None
-        is_defined = found is not None and not (isinstance(found, float) and not math.isfinite(found))
-        return point.field.format(found) if is_defined else None
+        values: list[str | None] = []
+        for function in self.integrals.values():
+            try:  # eps itself, also where the orbit steps by -eps: integrals are those of the map
+                value = function.value(point.field, self._request.eps, point.x)
+            except (KahanmapsError, ArithmeticError):  # not defined where the map is not, or beyond the range of floats
+                value = None
+            is_defined = value is not None and not (isinstance(value, float) and not math.isfinite(value))
+            values.append(point.field.format(value) if is_defined else None)
+        return values
 
     def to_pandas(self) -> Any:
         """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
@@ -306,7 +307,7 @@ class Trajectory:
                 raise InputError("npy grows in a file: found a stream, expected a path")
             if self.arithmetic.kind != "float":
                 raise InputError("npy is for float orbits: take npz, or jsonl, which holds numbers of any length")
-            if self._asked.at is not None or self.integrals:
+            if self._request.at is not None or self.integrals:
                 raise InputError("npy holds the points of steps= and every=: for at= or integrals take npz")
             return self._ended(stream_orbit(self.orbit, to, progress=told))[0]
         columns = (self.variables, list(self.integrals))
@@ -315,7 +316,7 @@ class Trajectory:
             try:
                 for point in self._known():
                     told(point.step)
-                    if self._asked.wants(point.step):
+                    if self._request.wants(point.step):
                         writer.point(point.step, point.text, self.values(point))
                 end = self.end
             except OutputFull as full:
@@ -326,17 +327,17 @@ class Trajectory:
 
     def header(self, name: str = "") -> dict[str, Any]:
         """What the orbit can be made again from, as plain data; `name` is that of the system."""
-        asked = self._asked
+        request = self._request
         header = {
             "system": name,
             "variables": list(self.variables),
-            **asked.map.written(),
-            **({} if isinstance(asked.map, MapOver) else eps_record(asked.eps, asked.map)),
+            **request.map.written(),
+            **({} if isinstance(request.map, MapOver) else eps_record(request.eps, request.map)),
             "arithmetic": str(self.arithmetic),
             "method": self.method,
-            "start": [str(entry) for entry in asked.start],
-            "direction": "backward" if asked.backward else "forward",
-            "steps": asked.steps,
+            "start": [str(entry) for entry in request.start],
+            "direction": "backward" if request.backward else "forward",
+            "steps": request.steps,
             "seed": None,
             "version": __version__,
         }
@@ -397,7 +398,7 @@ class Trajectory:
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # `list` asks for the length between here and the first point
-        yield from (point for point in self._known() if self._asked.wants(point.step))
+        yield from (point for point in self._known() if self._request.wants(point.step))
 
     def _known(self) -> Iterator[OrbitPoint]:
         """The points that are kept, or all that are computed now, of which not all need be asked for."""
@@ -411,6 +412,41 @@ class Trajectory:
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+class NotAccurate(Exception):
+    """No precision was enough."""
+
+
+def bits_for(orbit_with: Callable[[int], Orbit], digits: int, told: Callable[[str], None] | None = None) -> int:
+    """The bits with which every point has `digits` correct digits of its largest coordinate; doubled in every trial.
+
+    `orbit_with` makes the orbit over RR(bits). An orbit that ends for another reason than precision is taken as it
+    is. `told` hears of every trial. Raises NotAccurate where not even the largest precision will do.
+
+    >>> from kahanmaps.algebra.fields import RR
+    >>> from kahanmaps.maps.kahan import KahanMap
+    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
+    >>> bits_for(lambda bits: Orbit(KahanMap(system, "1/10", RR(bits)), [1, 2], 50), 15)
+    128
+    """
+    bits = 64
+    while bits < digits * _BITS_PER_DIGIT + 32:
+        bits *= 2
+    while bits < MAX_BALL_BITS:
+        orbit = orbit_with(bits)
+        if told is not None:
+            told(f"balls of {bits} bits")
+        # The largest coordinate counts, for one may be zero; the first point that is not accurate ends the trial.
+        enough = all(
+            entry.is_exact() or entry.rad() * arb(10) ** digits <= max(abs(other.mid()) for other in point.x)
+            for point in orbit
+            for entry in point.x
+        )
+        if enough and orbit.end is not None and orbit.end.status != "precision":
+            return bits
+        bits *= 2
+    raise NotAccurate(f"not even balls of {bits // 2} bits give {digits} digits at every point")
 
 
 def _held(x: Any, kind: Any, limits: Any) -> int:
@@ -433,67 +469,61 @@ def _numbers(start: Any, arithmetic: Arithmetic) -> Sequence[Any]:
     if not hasattr(start, "__len__"):
         raise InputError(f"found the start {start!r}, expected a sequence of numbers")
     if arithmetic.kind == "float":
-        start = [_exactly(x) if isinstance(x, float) else x for x in start]
+        for x in start:
+            if isinstance(x, float) and not math.isfinite(x):
+                raise InputError(f"found {x} in the start, expected finite numbers")
+        start = [fmpq(*x.as_integer_ratio()) if isinstance(x, float) else x for x in start]
     numbers: Sequence[Any] = start
     return numbers
 
 
-def _exactly(value: float) -> fmpq:
-    if not math.isfinite(value):
-        raise InputError(f"found {value} in the start, expected finite numbers")
-    return fmpq(*value.as_integer_ratio())
-
-
-def _orbit_at_one_eps(asked: _Asked, numbers: Any) -> Trajectory:
+def _orbit_at_one_eps(request: OrbitRequest, numbers: Any) -> Trajectory:
     """The orbit of a map that has its eps and its field, which `numbers` may name."""
-    phi, exact = asked.map, Arithmetic("exact")
-    if asked.eps is not None or asked.at is not None or numbers not in ("exact", exact, phi.field):
+    phi, exact = request.map, Arithmetic("exact")
+    if request.eps is not None or request.at is not None or numbers not in ("exact", exact, phi.field):
         raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
     p, bits = phi.field.characteristic, getattr(phi.field, "bits", 0)
     kind = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact
-    points = Orbit(phi, asked.start, asked.steps, backward=asked.backward, max_digits=asked.max_digits)
-    asked = asked._replace(start=points.start, eps=phi.eps)
-    return Trajectory(points, asked, kind, Method("generic", "it is a map at one eps"))
+    points = Orbit(phi, request.start, request.steps, backward=request.backward, max_digits=request.max_digits)
+    request = request._replace(start=points.start, eps=phi.eps)
+    return Trajectory(points, request, kind, Method("generic", "it is a map at one eps"))
 
 
 def _normal_form(
-    asked: _Asked,
+    request: OrbitRequest,
     method: str | None,
     arithmetic: Arithmetic,
     hamiltonian: CubicHamiltonian | None,
     member: FamilyMember | None,
 ) -> SystemNormalForm | NoNormalForm:
     """The normal form, where it may be of use."""
-    map_, eps = asked.map, asked.eps
+    map_, eps = request.map, request.eps
     if method == "generic":
         return NoNormalForm("not looked for")
     if not isinstance(map_, Kahan) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
-    if method is None and (reason := _why_not_to_look(asked, arithmetic, member)):
-        return NoNormalForm(reason)
+    if method is None:  # where looking for a normal form would cost more than it can save
+        few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
+        numbers = [eps, *(rational(entry) for entry in request.start)]
+        if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
+            few = max(few, 24)
+        if request.steps <= few:
+            return NoNormalForm("not looked for, for so few steps")
+        if member is None and map_.dim > _LARGE_DIMENSION:
+            return NoNormalForm(f"not looked for in dimension {map_.dim}")
     normal_form = system_normal_form(map_.system, hamiltonian, member)
     if isinstance(normal_form, NoNormalForm):
         return normal_form
     if arithmetic.kind == "float" and normal_form.T is not None and method is None:
         return NoNormalForm("in machine numbers only J = [[0, I], [-I, 0]] has one")
-    reason = ""
-    if arithmetic.kind == "ball":
-        from kahanmaps.maps.normal_form.iterate import special_start
+    if arithmetic.kind in ("ball", "mod"):
+        from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 
-        reason = special_start(normal_form, eps, asked.start)
-    if arithmetic.kind == "mod":
-        reason = why_no_reduction(normal_form, GF(arithmetic.number), eps)
-    return NoNormalForm(reason) if reason else normal_form
-
-
-def _why_not_to_look(asked: _Asked, arithmetic: Arithmetic, member: FamilyMember | None) -> str:
-    """Empty, or why looking for a normal form would cost more than it can save."""
-    few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
-    numbers = [asked.eps, *(rational(entry) for entry in asked.start)]
-    if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
-        few = max(few, 24)
-    if asked.steps <= few:
-        return "not looked for, for so few steps"
-    if member is None and asked.map.dim > _LARGE_DIMENSION:
-        return f"not looked for in dimension {asked.map.dim}"
-    return ""
+        if arithmetic.kind == "ball" and (reason := special_start(normal_form, eps, request.start)):
+            return NoNormalForm(reason)
+        try:
+            if arithmetic.kind == "mod":
+                NthIterate(normal_form, eps, GF(arithmetic.number))
+        except BadPrime as error:
+            return NoNormalForm(str(error))
+    return normal_form
