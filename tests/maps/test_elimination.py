@@ -10,7 +10,7 @@ import pytest
 from flint import fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.maps.orbits import elimination
-from kahanmaps.maps.orbits.elimination import eliminated
+from kahanmaps.maps.orbits.elimination import solve_fraction_free
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 
@@ -19,7 +19,7 @@ def random_integers(rows: int, columns: int, rng: random.Random, bits: int) -> f
 
 
 def divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
-    return eliminated(matrix, right, likely) or by_flint(matrix, right)
+    return solve_fraction_free(matrix, right, likely) or by_flint(matrix, right)
 
 
 def by_flint(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:

@@ -22,7 +22,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.substitution import substitution
+from kahanmaps.maps.orbits.substitution import forward_substitution
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
@@ -104,9 +104,9 @@ def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, thre
 def test_for_the_family_the_elimination_itself_finds_every_step(name, monkeypatch):
     # It relies on rank 2 modulo the denominator; were that wrong, FLINT's solver would silently do all the work.
     found: list[IntegerPoint | None] = []
-    eliminate = integer_steps.eliminated
+    eliminate = integer_steps.solve_fraction_free
     monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", 0)
-    monkeypatch.setattr(integer_steps, "eliminated", lambda *a: found.append(eliminate(*a)) or found[-1])
+    monkeypatch.setattr(integer_steps, "solve_fraction_free", lambda *a: found.append(eliminate(*a)) or found[-1])
     assert walk(FAMILY[name], "1/10", 12)[1:] == found
 
 
@@ -183,7 +183,9 @@ def test_a_step_of_a_map_is_that_of_fractions_and_so_is_its_determinant(name, da
 
 def equations(uses: list[list[bool]]):
     n = len(uses)
-    return substitution([(0,) * n + (1,)], fmpz_mat([[entry] for row in uses for entry in [*map(int, row), 1]]), n)
+    return forward_substitution(
+        [(0,) * n + (1,)], fmpz_mat([[entry] for row in uses for entry in [*map(int, row), 1]]), n
+    )
 
 
 def test_rows_and_unknowns_are_put_in_order():

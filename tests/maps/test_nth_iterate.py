@@ -306,9 +306,9 @@ def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     normal_form, _ = structure_and_system("m = 2")
     start = [1, 2, 3, fmpq(1, 4)]
     wanted = coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30))
-    steps_modulo, random_prime = rational_iterate._steps_modulo, rational_iterate._random_prime
+    steps_modulo, random_prime = rational_iterate._steps_modulo, rational_iterate.random_prime
     drawn = [1000003, 1000033, 1000037]  # with a pole at step 2, as if these divided W there
-    monkeypatch.setattr(rational_iterate, "_random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
+    monkeypatch.setattr(rational_iterate, "random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
     monkeypatch.setattr(
         rational_iterate, "_steps_modulo", lambda *at: (2, (1, 1, 0)) if at[2] < 2**20 else steps_modulo(*at)
     )

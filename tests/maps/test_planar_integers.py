@@ -1,8 +1,7 @@
-"""A plane in homogeneous coordinates, and over Q in integers, with the common factor known beforehand.
+"""A plane in homogeneous coordinates, and over Q in integers.
 
 Specified here: the image is the Kahan map of u' = h_v, v' = -h_u for 2 eps (u, v) = (U/W, V/W), whatever eps is; the
-level is conserved; over Q the points are those that plain gcds give, for every kind of cubic and of start; with a wrong
-W, or with the bad primes forgotten, this fails; a division with a remainder raises.
+level is conserved; over Q the points are those that gcds of Python's integers give, for every kind of cubic and start.
 """
 
 from itertools import islice
@@ -17,11 +16,8 @@ from planar_helpers import STARTS, by_gcds, integer_block, over_starts, planar_s
 
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import planar_integers
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
-
-GENERAL = integer_block(*STARTS["three real roots, irrational"])
 
 
 def walked(block: IntegerBlock, steps: int) -> list[tuple[int, int, int]]:
@@ -74,29 +70,6 @@ def test_the_points_of_any_small_plane_are_those_of_plain_gcds(cubic, start):
     block = integer_block(cubic, start)
     assert walked(block, 7) == by_gcds(block, 7)
 
-
-def test_an_orbit_goes_on_from_any_point_of_it_and_the_one_before():
-    first, second, *rest = islice(GENERAL.triples(), 8)
-    assert [reduced(P) for P in islice(GENERAL.triples_from(second, first), 7)] == [*map(reduced, (second, *rest))]
-
-
-# That the tests can fail.
-
-
-def test_a_wrong_point_before_is_noticed():
-    orbit = list(islice(GENERAL.triples(), 6))
-    with pytest.raises(ArithmeticError, match="left a remainder"):
-        list(islice(GENERAL.triples_from(orbit[4], orbit[2]), 3))
-
-
-@pytest.mark.parametrize("name", ["three real roots, irrational", "one real root, irrational", "large coefficients"])
-def test_without_the_bad_primes_triples_are_not_primitive(name, monkeypatch):
-    monkeypatch.setattr(planar_integers, "strip", lambda triple, bad: tuple(triple))
-    block = integer_block(*STARTS[name])
-    assert any(gcd(*map(int, triple)) > 1 for triple in islice(block.triples(), 12))
-
-
-# The parts.
 
 # The plane itself, over any numbers.
 

@@ -61,14 +61,15 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
     file = load_system(system, {**options, "quiet": quiet})
-    if not file.is_quadratic:
-        raise lib.InputError(f"no period of {file.name} can be computed: {_normal_form(file)}. {_WALK}")
+    no_period, normal_form = f"no period of {file.name} can be computed", file.normal_form
+    if not file.is_quadratic and isinstance(normal_form, lib.NoNormalForm):
+        raise lib.InputError(f"{no_period}: {normal_form.reason}. {_WALK}")
     eps = the_eps(options["eps"], options["time_step"])
-    _require_point(file, eps, options["start"], kind, prime)
-    normal_form = _normal_form(file)
-    if isinstance(normal_form, str):
+    # The same demands on eps, prime and start as orbits make, in the same words.
+    file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(options["start"])
+    if isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(
-            f"no period of {file.name} can be computed: {normal_form}. Looked for a matrix A that makes it a member of "
+            f"{no_period}: {normal_form.reason}. Looked for a matrix A that makes it a member of "
             f"the commuting family with distinct roots of chi, and so a translation. {_WALK}"
         )
     if not quiet:
@@ -77,13 +78,38 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
             say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
     found = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
+    message, status = found.text.splitlines()[0], _STATUS.get(found.status, 3)
     if as_json:
-        print_json(_record(file, normal_form, eps, options, found))
+        # Numbers are text: periods exceed what readers of JSON hold exactly.
+        planes = [
+            {
+                **lib.attributes(plane, "name", "status", "meets_pole", "reason"),
+                "period": None if plane.period is None else str(plane.period),
+                "kind": plane.kind.name.lower(),
+                "kind_text": str(plane.kind),
+                "field_size": str(plane.q) if plane.q else None,
+            }
+            for plane in found.planes
+        ]
+        record = record_of(
+            "period",
+            file,
+            str(options["arithmetic"]),
+            seed=None,
+            structure=normal_form.text,
+            **lib.eps_record(eps, file.map),
+            start=lib.plain(options["start"]),
+            **lib.attributes(found, "status", "meets_pole"),
+            period=None if found.period is None else str(found.period),
+            planes=planes,
+            message=message,
+        )
+        print_json(record)
+        if status and not quiet:
+            say(f"{found.status}: {message}")
     else:
-        _print(file, eps, str(options["arithmetic"]), found)
-    status = _STATUS.get(found.status, 3)
-    if status and not quiet and as_json:
-        say(f"{found.status}: {_message(found)}")
+        tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
+        tell(str(found))
     return status
 
 
@@ -99,9 +125,10 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     }
     if system is not None or options["rhs"]:
         file = load_system(system, options)
-        normal_form = _normal_form(file) if file.is_quadratic else "it is no Kahan map"
-        if isinstance(normal_form, str):
-            raise lib.InputError(f"no levels of {file.name} can be computed: {normal_form}")
+        normal_form = file.normal_form
+        if isinstance(normal_form, lib.NoNormalForm):
+            reason = normal_form.reason if file.is_quadratic else "it is no Kahan map"
+            raise lib.InputError(f"no levels of {file.name} can be computed: {reason}")
         eps = the_eps(options["eps"], options["time_step"])
         data |= {
             "system": file.name,
@@ -133,55 +160,3 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         if plane["disc"] == "0":  # 1 is no root of any psi_N
             tell("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0
-
-
-def _require_point(file: lib.SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
-    """The same demands on eps, prime and start as orbits make, in the same words."""
-    file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(start)
-
-
-def _normal_form(file: lib.SystemFile) -> lib.SystemNormalForm | str:
-    """The normal form, or why there is none."""
-    normal_form = file.normal_form
-    return normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form
-
-
-def _message(found: lib.OrbitPeriod) -> str:
-    return found.text.splitlines()[0]
-
-
-def _print(file: lib.SystemFile, eps: Any, arithmetic: str, found: lib.OrbitPeriod) -> None:
-    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {arithmetic} arithmetic")
-    tell(str(found))
-
-
-def _text(number: int | None) -> str | None:
-    return None if number is None else str(number)
-
-
-def _record(
-    file: lib.SystemFile, normal_form: lib.SystemNormalForm, eps: Any, options: dict[str, Any], found: lib.OrbitPeriod
-) -> dict[str, Any]:
-    """Numbers are text: periods exceed what readers of JSON hold exactly."""
-    return record_of(
-        "period",
-        file,
-        str(options["arithmetic"]),
-        seed=None,
-        structure=normal_form.text,
-        **lib.eps_record(eps, file.map),
-        start=lib.plain(options["start"]),
-        **lib.attributes(found, "status", "meets_pole"),
-        period=_text(found.period),
-        planes=[
-            {
-                **lib.attributes(plane, "name", "status", "meets_pole", "reason"),
-                "period": _text(plane.period),
-                "kind": plane.kind.name.lower(),
-                "kind_text": str(plane.kind),
-                "field_size": _text(plane.q or None),
-            }
-            for plane in found.planes
-        ],
-        message=_message(found),
-    )

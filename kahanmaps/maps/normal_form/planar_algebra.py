@@ -11,7 +11,7 @@ A point (U : V : W) comes back to rational numbers as U W'/N and V W'/N with N =
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache, reduce
 from itertools import combinations, product
 from typing import Any
@@ -57,19 +57,6 @@ class AlgebraBlock(LevelBlock):
     def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
         """The cubic, and lifts of the start and its image; their contents are in `bad`."""
         return self.block, self.start, self.block.image(self.start)
-
-    def triples(self) -> Iterator[Triple]:
-        """P_0, P_1, ... with W = 1, as long as there is a value."""
-        U, V, W = self.start
-        one = W
-        while True:
-            yield U, V, one
-            if self.is_constant:
-                continue
-            U, V, W = self.block.image((U, V, one))
-            if W == 0:
-                return
-            U, V = U / W, V / W
 
     @property
     def primes(self) -> list[fmpz]:
@@ -124,10 +111,12 @@ class AlgebraBlock(LevelBlock):
         return norm.p * norm.q
 
     @staticmethod
-    def integral(triple: Triple) -> Triple:
-        """A triple over K with W = 1."""
+    def shortest(triple: Triple) -> Triple:
+        """The triple with W = 1."""
         U, V, W = triple
         return triple if W == 0 else (U / W, V / W, W / W)
+
+    integral = shortest  # of a triple over K
 
     def residue_map(self, prime: int) -> Callable[[EtaleElement], int] | None:
         """A homomorphism to the residues modulo a prime, None where g has no root there."""

@@ -1,17 +1,16 @@
-"""A plane over Q in integers: primitive triples, and steps whose common factor is known beforehand.
+"""A plane over Q in integers: primitive triples, and what the bad primes are.
 
 h and the start are scaled such that h is a primitive integer form and (U, V, W) integers without a common factor; eps
 is in that scale. Psi(P_k) is quadratic in the triple P_k, and its content has to go, or the numbers would double
-their length with every step. **Content rule.** For primes that do not divide 6 disc(h) den(level) the content of
-Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (docs/mathematics.md proves it). So one divides by
-W_{k-1}, which is exact, and then strips the few bad primes, by residues: no gcd of large numbers. A division that
-leaves a remainder would be a mistake of ours; the lowest 64 bits are multiplied back each time.
-
-For disc(h) = 0 the rule says nothing, but there numbers hardly grow, and gcds are cheap.
+their length with every step. For primes that do not divide 6 disc(h) den(level) the content of Psi(P_k) is W_{k-1}, the
+last coordinate of the point before P_k (docs/mathematics.md proves it): these are the natural lifts of `tau`. Single
+steps take their content out by gcds: long orbits do not go by them, but those on singular cubics, whose numbers hardly
+grow.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain, islice
@@ -19,14 +18,14 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical, without
+from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.somos import Integers
 
 IntegerTriple = tuple[fmpz, fmpz, fmpz]
 
 
-class LevelBlock:
+class LevelBlock(ABC):
     """One plane with a start in it: what its level is, and whether that is special."""
 
     block: PlanarBlock
@@ -54,6 +53,22 @@ class LevelBlock:
     def is_degenerate(self) -> bool:
         """Whether the level cubic is singular (delta is 0 or 1): heights grow no faster than linearly then."""
         return bool(self.delta == 0 or self.delta == 1)
+
+    def triples(self) -> Iterator[Triple]:
+        """P_0, P_1, ... in the shortest form, as long as there is a value."""
+        point = self.start
+        while True:
+            yield point
+            if not self.is_constant:
+                image = self.block.image(point)
+                if image[2] == 0:
+                    return
+                point = self.shortest(image)
+
+    @staticmethod
+    @abstractmethod
+    def shortest(triple: Triple) -> Triple:
+        """The triple of the same point that is kept."""
 
 
 class IntegerBlock(LevelBlock):
@@ -140,31 +155,10 @@ class IntegerBlock(LevelBlock):
         """How integers are reduced modulo a prime."""
         return lambda entry: int(entry % prime)
 
-    def triples(self, previous: IntegerTriple | None = None) -> Iterator[IntegerTriple]:
-        """P_0, P_1, ..., primitive, as long as there is a value; by the content rule, or by gcds where it is silent."""
-        if self.is_constant:
-            while True:
-                yield self.start
-        if self.level is None:
-            yield self.start
-            return
-        if previous is None:
-            previous = primitive(self.block.preimage(self.start))
-        yield from self.triples_from(self.start, previous)
-
-    def triples_from(self, point: IntegerTriple, previous: IntegerTriple) -> Iterator[IntegerTriple]:
-        """The orbit of `point`, whose predecessor on the cubic is `previous` (both primitive)."""
-        by_rule = self.block.discriminant != 0
-        while True:
-            yield point
-            raw = self.block.image(point)
-            if raw[2] == 0:
-                return
-            if by_rule and previous[2] != 0:
-                image = strip(divide_exactly(raw, without(previous[2], self.power)), self.power)
-            else:  # after a pole the previous point is at infinity
-                image = primitive(raw)
-            previous, point = point, image
+    @staticmethod
+    def shortest(triple: IntegerTriple) -> IntegerTriple:
+        """The triple over its content."""
+        return primitive(triple)
 
 
 class PlaneIntegers(Integers):
@@ -183,7 +177,9 @@ class PlaneIntegers(Integers):
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
-        return strip(raw, self.power, divisor)
+        # The divisor has none of the bad primes.
+        U, V, W = divide_exactly(raw, common_part(raw[::-1], self.power) * divisor)
+        return U, V, W
 
 
 def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
@@ -196,12 +192,3 @@ def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
     common = content(triple)
     U, V, W = triple
     return (U, V, W) if common <= 1 else (U // common, V // common, W // common)
-
-
-def strip(triple: Sequence[fmpz], power: fmpz, divisor: fmpz | int = 1) -> IntegerTriple:
-    """The triple without the common factors that its entries have in the primes of `power`; and divided by `divisor`.
-
-    The divisor has to divide all entries and to have none of these primes.
-    """
-    U, V, W = divide_exactly(triple, common_part(triple[::-1], power) * divisor)
-    return U, V, W

@@ -19,9 +19,10 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any
 
-from flint import fmpq, fmpz
+from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form import tau, translation
@@ -157,7 +158,10 @@ class _Plane:
         if found.kind is Kind.NO_VALUE:
             self.pole = 1
         elif found.kind is Kind.ADDITIVE:
-            self.pole = _parabolic_pole(block, start)
+            r = translation.parabolic_ratio(block, start)
+            if not (r is None or isinstance(r, fmpq)):  # an element of a number field: is it rational?
+                r = r.coefficients[0] if not any(entry != 0 for entry in r.coefficients[1:]) else None
+            self.pole = int(r.p) if r is not None and r.q == 1 and r > 0 else None
         elif found.period is not None and found.meets_pole is not False:
             try:
                 stepped_over(block, start, found.period)
@@ -175,16 +179,6 @@ class _Pole(SingularStep):
     def __init__(self, step: int) -> None:
         self.step = step
         super().__init__(f"the map has no value at step {step - 1}")
-
-
-def _parabolic_pole(block: PlanarBlock, start: Triple) -> int | None:
-    """The first step without a value on a level with delta = 0, None for none."""
-    r = translation.parabolic_ratio(block, start)
-    if not (r is None or isinstance(r, fmpq)):
-        r, *others = r.coefficients
-        if any(entry != 0 for entry in others):
-            return None
-    return int(r.p) if r is not None and r.q == 1 and r > 0 else None
 
 
 def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
@@ -249,7 +243,13 @@ class _Planes:
         busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
         generator = random.Random()
         for _ in range(_PRIMES):
-            residues = {i: _residues(self.blocks[i], generator) for i in busy}
+            residues = {}
+            for i in busy:  # a random prime and a homomorphism to the residues modulo it, for each plane
+                residue = None
+                while residue is None:
+                    prime = random_prime(generator)
+                    residue = self.blocks[i].residue_map(prime)
+                residues[i] = prime, residue
             found = {i: _steps_modulo(self.blocks[i], n, *residues[i]) for i in busy}
             poles = {i: pole for i, (pole, _) in found.items() if pole is not None}
             if not all(self._is_pole(self.blocks[i], pole) for i, pole in poles.items()):
@@ -294,15 +294,6 @@ def _reached(block: Block, n: int) -> Triple:
     return block.integral(triple)
 
 
-def _residues(block: Block, generator: random.Random) -> tuple[int, Callable[[Any], int]]:
-    """A random prime of 61 bits, and a homomorphism to the residues modulo it."""
-    while True:
-        prime = _random_prime(generator)
-        residue = block.residue_map(prime)
-        if residue is not None:
-            return prime, residue
-
-
 def _steps_modulo(
     block: Block, n: int, prime: int, residue: Callable[[Any], int]
 ) -> tuple[int | None, tuple[int, int, int]]:
@@ -322,10 +313,3 @@ def _steps_modulo(
         if W == 0:
             return k, (U, V, W)
     return None, (U, V, W)
-
-
-def _random_prime(generator: random.Random) -> int:
-    while True:
-        candidate = generator.getrandbits(61) | (1 << 60) | 1
-        if fmpz(candidate).is_prime():
-            return candidate

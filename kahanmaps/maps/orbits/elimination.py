@@ -11,12 +11,12 @@ _USEFUL_BITS = 64
 _PRIME = 2**61 - 1
 
 
-def eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
-    """The solution of matrix x = right; `likely` is an integer whose powers may divide the minors. None if in doubt.
+def solve_fraction_free(matrix: fmpz_mat, right: fmpz_mat, candidate: fmpz) -> IntegerPoint | None:
+    """The solution of matrix x = right; powers of the integer `candidate` may divide the minors. None if in doubt.
 
     The elimination assumes that certain divisions are exact; what it finds is tried in the equation.
     """
-    found = _eliminate(matrix, right, likely)
+    found = _eliminate(matrix, right, candidate)
     return found if found is not None and is_the_solution(found, matrix, right) else None
 
 
@@ -27,8 +27,8 @@ def is_the_solution(found: IntegerPoint, matrix: fmpz_mat, right: fmpz_mat) -> b
     return bool(matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator)
 
 
-def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
-    """Fraction-free elimination, two columns at a time, that also removes what the minors share with `likely`.
+def _eliminate(matrix: fmpz_mat, right: fmpz_mat, candidate: fmpz) -> IntegerPoint | None:
+    """Fraction-free elimination, two columns at a time, that also removes what the minors share with `candidate`.
 
     For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the denominator W, so that
     minors of order k share the (k - 2)-th power of W up to small primes. Taken out once, at order 3, this keeps all
@@ -54,7 +54,7 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
         if k == 0 and minors:
             # A few entries decide what all share; the result is verified in the end.
             entries = [entry for row in minors for entry in row]
-            divisor = _shared(likely, entries[:: max(1, len(entries) // 3)])
+            divisor = _shared(candidate, entries[:: max(1, len(entries) // 3)])
         for row, entries in zip(below, minors, strict=True):
             row[k + 2 :] = entries if divisor == 1 else [entry // divisor for entry in entries]
         b[k + 1 :] = [pivot, *((a[k] * b[j] - b[k] * a[j]) // previous for j in range(k + 2, n + 1))]
@@ -88,12 +88,12 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
     return IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
 
 
-def _shared(likely: fmpz, values: list[fmpz]) -> fmpz:
-    """The part of `likely` without small primes that divides the values, or 1 where it is not worth removing.
+def _shared(candidate: fmpz, values: list[fmpz]) -> fmpz:
+    """The part of `candidate` without small primes that divides the values, or 1 where it is not worth removing.
 
     Small primes often divide minors of order 3 by accident and then not, to the power needed, those of higher order.
     """
-    common, small_primes = likely, fmpz.primorial_ui(fmpz(1000))
+    common, small_primes = candidate, fmpz.primorial_ui(fmpz(1000))
     while (small := common.gcd(small_primes)) != 1:  # first of all: what is left often divides as it stands
         common = common // small
     for value in values:

@@ -13,13 +13,18 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.algebra.integers import content, over_one
-from kahanmaps.maps.orbits.constant_rows import ConstantRows
-from kahanmaps.maps.orbits.elimination import eliminated, is_the_solution
+from kahanmaps.maps.orbits.elimination import is_the_solution, solve_fraction_free
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.substitution import substitution
+from kahanmaps.maps.orbits.substitution import forward_substitution
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
+
+_SMALL_DIMENSION = 3
+# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
+_ELIMINATION_BITS = 4000
+_ELIMINATION_DIMENSION = 16  # and above this dimension as well
+_TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
 
 
 class IntegerSteps:
@@ -44,7 +49,7 @@ class IntegerSteps:
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
-        self._substitution = substitution(exponents, self._forms, n)
+        self._substitution = forward_substitution(exponents, self._forms, n)
         self._constant = None if self._substitution else self._constant_rows()
         self._rows = None if self._degree == 1 or self._constant else [self._without_powers(i) for i in range(n)]
 
@@ -54,24 +59,22 @@ class IntegerSteps:
             return self._substitution.step(point)
         matrix, right = self._equation(point)
         if self._constant is None:
-            return self._by_elimination(matrix, right, point.denominator) or _solved(matrix, right)
+            is_medium = _SMALL_DIMENSION < self.dim <= _ELIMINATION_DIMENSION
+            if self._trials and is_medium and point.denominator.bit_length() >= _ELIMINATION_BITS:
+                found = solve_fraction_free(matrix, right, point.denominator)
+                if found is not None:
+                    return found
+                self._trials -= 1
+            return _solved(matrix, right)
         scale = point.denominator**self._degree
-        rest, side = self._constant.without(matrix, right, scale)
+        rest, side = self._constant.reduce(matrix, right, scale)
         found = _solved(rest, side) if rest.nrows() else IntegerPoint((), fmpz(1))
-        return found and lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
+        return found and lowest(*self._constant.extend(right, scale, found.numerators, found.denominator))
 
     @property
-    def is_one_by_one(self) -> bool:
+    def is_triangular(self) -> bool:
         """Whether the equation gives one coordinate after the other, so that points are fractions."""
         return self._substitution is not None
-
-    def _by_elimination(self, matrix: fmpz_mat, right: fmpz_mat, below: fmpz) -> IntegerPoint | None:
-        is_medium = _CRAMER_DIMENSION < self.dim <= _ELIMINATION_DIMENSION
-        if not (self._trials and is_medium and below.bit_length() >= _ELIMINATION_BITS):
-            return None
-        found = eliminated(matrix, right, below)
-        self._trials -= found is None
-        return found
 
     def _constant_rows(self) -> ConstantRows | None:
         """The rows without x to the left; None where there are none or they do not pay, and for a singular equation."""
@@ -79,7 +82,7 @@ class IntegerSteps:
         alone = [k for k, exponent in enumerate(self._exponents) if not any(exponent[:-1])]
         others = [k for k in range(len(self._exponents)) if k not in alone]
         rows = [i for i in range(n) if not any(forms[i * (n + 1) + j][k] for j in range(n) for k in others)]
-        if not rows or not alone or n <= _CRAMER_DIMENSION:
+        if not rows or not alone or n <= _SMALL_DIMENSION:
             return None
         A = fmpq_mat([[fmpq(forms[i * (n + 1) + j][alone[0]]) for j in range(n)] for i in rows])
         return ConstantRows(rows, A) if A.rank() == len(rows) else None
@@ -147,45 +150,14 @@ def _monomial(X: Sequence[Any], exponents: Exponents) -> fmpz:
     return total
 
 
-_CRAMER_DIMENSION = 3
-# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
-_ELIMINATION_BITS = 4000
-_ELIMINATION_DIMENSION = 16  # and above this dimension as well
-_TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
-
-
 def _solved(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
     """The solution of matrix x = right in lowest terms; None where the matrix is singular."""
-    if matrix.nrows() <= _CRAMER_DIMENSION:
-        return _cramer(matrix, right)
     try:
         solution: fmpq_mat = matrix.solve(right)  # type: ignore[assignment]  # the stub promises less
-        column, denominator = solution.numer_denom()
     except ZeroDivisionError:
         return None
+    column, denominator = solution.numer_denom()
     return IntegerPoint(tuple(column.entries()), denominator)
-
-
-def _cramer(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
-    """The solution in dimension 1, 2 or 3 by Cramer's rule; its common factor is found by gcds, with few numbers."""
-    n = matrix.nrows()
-    rows, sides = matrix.tolist(), right.entries()
-    if n == 1:
-        numerators, denominator = sides, rows[0][0]
-    elif n == 2:
-        (a, b), (c, d) = rows
-        numerators, denominator = [sides[0] * d - sides[1] * b, a * sides[1] - c * sides[0]], a * d - b * c
-    else:
-        (a, b, c), (d, e, f), (g, h, i) = rows
-        cofactors = (e * i - f * h, f * g - d * i, d * h - e * g)
-        denominator = a * cofactors[0] + b * cofactors[1] + c * cofactors[2]
-        r, s, t = sides
-        numerators = [
-            r * cofactors[0] + s * (c * h - b * i) + t * (b * f - c * e),
-            r * cofactors[1] + s * (a * i - c * g) + t * (c * d - a * f),
-            r * cofactors[2] + s * (b * g - a * h) + t * (a * e - b * d),
-        ]
-    return lowest(numerators, denominator)
 
 
 def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
@@ -196,3 +168,50 @@ def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None
     if denominator < 0:
         common = -common
     return IntegerPoint(tuple(numerator // common for numerator in numerators), denominator // common)
+
+
+class ConstantRows:
+    """Rows A x~ = r of a system with integers whose left side does not depend on x, solved once and for all.
+
+    On integers over one denominator such a row of M is a power of the denominator times constants, which would go into
+    the determinant. Mechanical systems q' = p, p' = F(q) have it in half of their rows. `rows` are their places; A has
+    rational entries and independent rows. With A = (A_1 | A_2) up to the order of columns, A_1 invertible, x~_1 =
+    A_1^{-1} r - A_1^{-1} A_2 x~_2 goes into the other rows: their Schur complement is left.
+    """
+
+    def __init__(self, rows: Sequence[int], A: fmpq_mat) -> None:
+        n, places = A.ncols(), range(A.nrows())
+        reduced, rank = A.rref()
+        self._rows = list(rows)
+        self._columns = [next(j for j in range(n) if reduced[i, j] != 0) for i in range(rank)]
+        self._others = [i for i in range(n) if i not in self._rows]
+        self._free = [j for j in range(n) if j not in self._columns]
+        solved = fmpq_mat([[A[i, j] for j in self._columns] for i in places]).inv()
+        both = [[*solved.tolist()[i], *(reduced[i, j] for j in self._free)] for i in places]
+        integers, self._below = fmpq_mat(both).numer_denom()
+        self._solved = _part(integers, places, places)
+        self._rest = _part(integers, places, range(len(places), n))
+
+    def reduce(self, matrix: fmpz_mat, right: fmpz_mat, scale: fmpz) -> tuple[fmpz_mat, fmpz_mat]:
+        """The system that is left for the other coordinates, times `scale`; it may be empty.
+
+        `scale` stands in front of A in the matrix, and times it are all coordinates that are solved for.
+        """
+        known = self._solved * _part(right, self._rows, [0])
+        bound, free = _part(matrix, self._others, self._columns), _part(matrix, self._others, self._free)
+        side = _part(right, self._others, [0]) * (scale * self._below) - bound * known
+        return free * self._below - bound * self._rest, side
+
+    def extend(
+        self, right: fmpz_mat, scale: fmpz, numerators: Sequence[fmpz], denominator: fmpz
+    ) -> tuple[list[fmpz], fmpz]:
+        """Numerators and denominator of the solution, perhaps with a factor in common, from that of what was left."""
+        free = fmpz_mat(len(numerators), 1, list(numerators))
+        bound = self._solved * _part(right, self._rows, [0]) * denominator - self._rest * free
+        found = dict(zip(self._columns, bound.entries(), strict=True))
+        found |= {j: entry * self._below for j, entry in zip(self._free, numerators, strict=True)}
+        return [found[j] for j in range(len(found))], scale * denominator * self._below
+
+
+def _part(matrix: fmpz_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpz_mat:
+    return fmpz_mat(len(rows), len(columns), [matrix[i, j] for i in rows for j in columns])

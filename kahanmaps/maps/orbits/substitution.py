@@ -53,7 +53,7 @@ class _Row:
         return above // common, denominator * (below // common)
 
 
-class Substitution:
+class ForwardSubstitution:
     """The rows in the order in which they are solved."""
 
     def __init__(self, rows: Sequence[_Row]) -> None:
@@ -71,7 +71,7 @@ class Substitution:
         return FractionsPoint(image)
 
 
-def substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Substitution | None:
+def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> ForwardSubstitution | None:
     """Rows of (M | r) in the order to solve them; None where a row has always several new unknowns.
 
     `forms` has a row of coefficients for each entry, a column for each of the exponents.
@@ -89,7 +89,7 @@ def substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Substitution 
         unknown = next(j for j in used[i] if j not in known)
         solved.append(_row(rows[i], unknown, tuple(j for j in used[i] if j in known), exponents))
         left.remove(i)
-    return Substitution(solved)
+    return ForwardSubstitution(solved)
 
 
 def _row(row: Sequence[Sequence[fmpz]], unknown: int, known: tuple[int, ...], exponents: Exponents) -> _Row:

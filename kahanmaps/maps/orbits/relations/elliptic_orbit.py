@@ -107,7 +107,7 @@ class _Search:
         n = factors[0].dim
         self.groups: Groups = [tuple(range(n))]
         self.earlier: list[list[int | None]] = [[None]] * stride
-        if all(one.integer_steps.is_one_by_one for one in factors):
+        if all(one.integer_steps.is_triangular for one in factors):
             earlier = [_copies(factors[(k - 1) % len(factors)].equation) for k in range(stride)]
             if _are_new_at_last(earlier):
                 self.groups, self.earlier = [(i,) for i in range(n)], earlier
