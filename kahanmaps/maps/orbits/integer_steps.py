@@ -20,10 +20,10 @@ from kahanmaps.maps.orbits.substitution import forward_substitution
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
 
-_SMALL_DIMENSION = 3
 # Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
 _ELIMINATION_BITS = 4000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
+_SMALL_DIMENSION = 3  # in which constant rows do not pay
 _TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
 
 
@@ -59,8 +59,8 @@ class IntegerSteps:
             return self._substitution.step(point)
         matrix, right = self._equation(point)
         if self._constant is None:
-            is_medium = _SMALL_DIMENSION < self.dim <= _ELIMINATION_DIMENSION
-            if self._trials and is_medium and point.denominator.bit_length() >= _ELIMINATION_BITS:
+            is_long = point.denominator.bit_length() >= _ELIMINATION_BITS
+            if self._trials and is_long and self.dim <= _ELIMINATION_DIMENSION:
                 found = solve_fraction_free(matrix, right, point.denominator)
                 if found is not None:
                     return found
