@@ -204,15 +204,26 @@ def composed_map(
     if symbols is None:
         symbols = tuple(dict.fromkeys(name for one, _ in powers for name in one.symbols))
     context = ring(symbols)
-    parts = []
+    own = {name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)}
+    given_parts: list[Part] = []
     for k, (one, power) in enumerate(powers):
-        known = values[k] if values else {}
-        own = [known.get(name) or _symbol(context, name) for name in one.symbols]
-        parts += [Part(one, power < 0, tuple(own))] * abs(power)
-    if not parts:
+        known = own | dict(values[k]) if values else own
+        missing = next((name for name in one.symbols if name not in known), None)
+        if missing is not None:
+            raise InputError(
+                f"found a map with the symbol {missing}, expected its value, or a composition with that symbol"
+            )
+        given_parts += [Part(one, power < 0, tuple(known[name] for name in one.symbols))] * abs(power)
+    if not given_parts:
         raise InputError("found no map to compose, expected at least one")
-    first = parts[0].map
-    parts = _without_inverses(parts) or [*parts[:1], *_reversed(parts[:1])]
+    parts: list[Part] = []  # without those that their neighbours undo
+    for part in given_parts:
+        if parts and parts[-1].is_inverse != part.is_inverse and parts[-1].map_and_values == part.map_and_values:
+            parts.pop()
+        else:
+            parts.append(part)
+    first = given_parts[0].map
+    parts = parts or [*given_parts[:1], *_reversed(given_parts[:1])]
     if any(part.map.dim != first.dim for part in parts):
         dimensions = ", ".join(str(part.map.dim) for part in parts)
         raise InputError(f"found maps of the dimensions {dimensions}, expected one")
@@ -228,26 +239,9 @@ def composed_map(
     return ComposedMap(tuple(variables), parts, tuple(symbols))
 
 
-def _symbol(context: Any, name: str) -> RationalFunction:
-    if name not in context.names():
-        raise InputError(f"found a map with the symbol {name}, expected its value, or a composition with that symbol")
-    return RationalFunction(context.gen(context.names().index(name)), context.constant(1))
-
-
 def _reversed(parts: Sequence[Part]) -> list[Part]:
     """The inverses in the opposite order."""
     return [Part(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
-
-
-def _without_inverses(parts: Sequence[Part]) -> list[Part]:
-    """The parts without those that their neighbours undo."""
-    left: list[Part] = []
-    for part in parts:
-        if left and left[-1].is_inverse != part.is_inverse and left[-1].map_and_values == part.map_and_values:
-            left.pop()
-        else:
-            left.append(part)
-    return left
 
 
 def is_involution(map_: BirationalMap) -> bool:

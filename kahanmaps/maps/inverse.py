@@ -11,14 +11,16 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
-from flint import Ordering, fmpq_mpoly, fmpz, fmpz_mod_mpoly_ctx
+from flint import Ordering, fmpq_mpoly, fmpz_mod_mpoly_ctx
 
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import solve
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix
 
 Rows = tuple[tuple[fmpq_mpoly, ...], ...]
@@ -65,7 +67,7 @@ def inverse_rows(rows: Rows) -> Rows:
         for row in rows
     ]
     field, sample = _graph_point(rows)
-    found = _solved(equations, list(range(n)), lambda polynomial: _vanishes(polynomial, field, sample))
+    found = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
     home = ring(names)
     back = [home.constant(0)] * n + list(home.gens())
     inverse = []
@@ -77,35 +79,34 @@ def inverse_rows(rows: Rows) -> Rows:
 
 
 def why_not_birational(rows: Rows) -> str:
-    """Why a map is not birational, found modulo a prime at random eps and symbols; empty where it is or seems to be."""
-    found = [_why_not_modulo_a_prime(rows, seed) for seed in range(2)]
-    return found[0] if all(found) else ""
-
-
-def _why_not_modulo_a_prime(rows: Rows, seed: int) -> str:
+    """Why a map is not birational, found modulo primes at random eps and symbols; empty where it is or seems to be."""
     n, names = len(rows), names_of(rows[0][-1])
-    field, sample = _graph_point(rows, _BITS, seed)
-    context = fmpz_mod_mpoly_ctx.get(
-        (*(f"{name}." for name in names[:n]), *names[:n]), modulus=field.prime, ordering=Ordering.degrevlex
-    )
-    equations = []
-    for row in rows:
-        terms: dict[tuple[int, ...], Any] = {}
-        for j, entry in enumerate(row):
-            for monomial, coefficient in entry.terms():
-                value = field.convert(coefficient)
-                for given, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
-                    value = value * given**exponent
-                key = (*monomial[:n], *(int(j == k) for k in range(n)))
-                terms[key] = terms.get(key, field.zero) + value
-        equations.append(context.from_dict({key: int(value) for key, value in terms.items() if value != 0}))
-    try:
-        _solved(equations, list(range(n)), lambda polynomial: _vanishes(polynomial, field, sample))
-    except NotBirational as error:
-        return str(error)
-    except TooLarge:
+    reasons = []
+    for seed in range(2):
+        field, sample = _graph_point(rows, _BITS, seed)
+        context = fmpz_mod_mpoly_ctx.get(
+            (*(f"{name}." for name in names[:n]), *names[:n]), modulus=field.prime, ordering=Ordering.degrevlex
+        )
+        equations = []
+        for row in rows:
+            terms: dict[tuple[int, ...], Any] = {}
+            for j, entry in enumerate(row):
+                for monomial, coefficient in entry.terms():
+                    value = field.convert(coefficient)
+                    for given, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
+                        value = value * given**exponent
+                    key = (*monomial[:n], *(int(j == k) for k in range(n)))
+                    terms[key] = terms.get(key, field.zero) + value
+            equations.append(context.from_dict({key: int(value) for key, value in terms.items() if value != 0}))
+        try:
+            _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
+        except NotBirational as error:
+            reasons.append(str(error))
+            continue
+        except TooLarge:
+            pass
         return ""
-    return ""
+    return reasons[0]
 
 
 def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
@@ -113,7 +114,7 @@ def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, 
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {seed_for(seed, *(entry for row in rows for entry in row))}")
     while True:
-        field = _small_prime_field(rng, bits) if bits else random_prime_field(rng)
+        field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         given = [field.random(rng) for _ in names]
         try:
             values = [evaluate(entry, field, given) for row in rows for entry in row]
@@ -122,13 +123,6 @@ def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, 
         except (BadPrime, SingularMatrix):
             continue
         return field, [*given[:n], *image, *given[n:]]
-
-
-def _small_prime_field(rng: random.Random, bits: int) -> PrimeField:
-    while True:
-        candidate = fmpz(rng.getrandbits(bits) | 1 << (bits - 1) | 1)
-        if candidate.is_prime():
-            return PrimeField(int(candidate))
 
 
 def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool:
@@ -147,7 +141,14 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         return {}
     known: list[Any] = []
     for polynomial in polynomials:
-        if not polynomial.is_zero() and (factor := _on_graph_factor(polynomial, on_graph)) not in known:
+        if polynomial.is_zero():
+            continue
+        if len(polynomial) > _MOST_TERMS:
+            raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
+        factor = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
+        if factor is None:
+            raise TooLarge("the inverse of this map was not found: give it as well")
+        if factor not in known:
             known.append(factor)
     if len(known) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in known):
         raise NotBirational("found a map whose image is not the whole space: det dPhi is 0 everywhere")
@@ -183,16 +184,6 @@ def _by_resultants(known: Sequence[Any], unknowns: Sequence[int], on_graph: Call
         above, _ = _put_in(p, solution)
         common = above if common is None else common.gcd(above)
     return solution | _solved([common], [u], on_graph)
-
-
-def _on_graph_factor(polynomial: Any, on_graph: Callable[[Any], bool]) -> Any:
-    """The irreducible factor that vanishes on the graph."""
-    if len(polynomial) > _MOST_TERMS:
-        raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
-    found = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
-    if found is None:
-        raise TooLarge("the inverse of this map was not found: give it as well")
-    return found
 
 
 def _coefficients(polynomial: Any, u: int) -> list[Any]:

@@ -279,20 +279,6 @@ def test_long_numbers_are_shortened_on_a_terminal(on_terminal):
     assert max(len(line) for line in on_terminal.out.splitlines()) <= 100
 
 
-def test_in_narrow_columns_long_numbers_are_decimals_with_their_digits_as_well():
-    out = terminal(*shlex.split(f"{TOP} --steps 5"), columns=64).out
-    assert re.search(r"  -?[0-9.e+-]+ \(72/72\)", out)
-    assert "..." not in out
-    assert "# (30/28): digits above and below the line" in out
-    assert "(30/28)" not in terminal(*shlex.split(f"{TOP} --steps 1"), columns=64).out
-
-
-def test_balls_stand_below_each_other_where_columns_would_leave_nothing_of_them():
-    out = terminal(*shlex.split(f"{TOP} --steps 2 --arithmetic ball:200"), columns=60).out
-    lines = re.findall(r"^  x[123] = \[?-?[0-9.]+.*", out, re.MULTILINE)
-    assert (len(lines), max(map(len, lines)) <= 60) == (9, True)
-
-
 def test_npz_is_refused_on_a_terminal():
     outcome = terminal(*shlex.split(f"{TOP} --steps 5 --format npz"))
     assert (outcome.status, outcome.out) == (2, "")
@@ -345,34 +331,12 @@ def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
     assert points(kahanmaps(f"{line} --method doubling")) == points(kahanmaps(f"{line} --method generic"))
 
 
-def test_an_iterate_modulo_p_may_have_a_number_of_thirty_digits(kahanmaps):
-    # P_{a+b} is the b-th iterate of P_a
-    p = "mod:2305843009213693951"
-    whole = points(kahanmaps(f"{MEMBER} --at {10**30} --arithmetic {p} --format jsonl"))[0]
-    half = points(kahanmaps(f"{MEMBER} --at {10**29} --arithmetic {p} --format jsonl"))[0]
-    rest = f"orbit paper_m3 --start {','.join(half['x'])} --eps 1/10 --at {10**30 - 10**29}"
-    assert points(kahanmaps(f"{rest} --arithmetic {p} --format jsonl"))[0]["x"] == whole["x"]
-    assert whole["step"] == 10**30
-
-
 @pytest.mark.parametrize("suffix", ["jsonl", "csv", "npz"])
 def test_steps_beyond_machine_integers_are_written_in_every_format(kahanmaps, tmp_path, suffix):
     path = tmp_path / f"far.{suffix}"
     line = f"{MEMBER} --at 5,{10**30} --arithmetic mod:10007 --method doubling -o {path}"
     assert kahanmaps(line).status == 0
     assert path.stat().st_size > 0
-
-
-@pytest.mark.parametrize("line", ["--steps 60", "--at 1000"])
-def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
-    run = kahanmaps(f"{MEMBER} {line} --arithmetic ball:auto --accuracy 40 --format jsonl")
-    assert run.status == 0
-    for text in points(run)[-1]["x"]:
-        middle, _, radius = text.strip("[]").partition(" +/- ")
-        assert float(radius) <= 1e-40 * 2 * max(
-            1, *(abs(float(x.strip("[]").split(" ")[0])) for x in points(run)[-1]["x"])
-        )
-        assert len(middle) >= 40
 
 
 # Float orbits in .npy files, and what their end says.
@@ -423,3 +387,40 @@ def test_a_start_may_lie_in_a_number_field(kahanmaps, system):
 def test_an_algebraic_start_has_an_image_in_every_arithmetic(kahanmaps, arithmetic, second):
     line = f"orbit \"x' = y^2; y' = x^2\" --start 1,s -p s='sqrt(2)' --eps 1/3 --steps 1 --arithmetic {arithmetic}"
     assert kahanmaps(line).out.splitlines()[2].split("\t")[2] == second
+
+
+# One JSON object, the endings of files, options that are given twice.
+
+
+LV = "orbit lotka_volterra --start 1,2 --eps 1/10 --steps 3"
+
+
+def test_json_has_the_points_of_jsonl(kahanmaps):
+    whole = kahanmaps(f"{LV} --json --integral x*y").json
+    header, *points, end = map(json.loads, kahanmaps(f"{LV} --format jsonl --integral x*y").out.splitlines())
+    assert whole.pop("command") == "orbit"
+    assert whole.pop("points") == [{k: v for k, v in one.items() if k != "record"} for one in points]
+    assert {"record": "end", **whole.pop("end")} == end
+    assert {"record": "header", **whole} == header
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--json --format csv", "give --json or --format csv, not both"),
+        ("-o a.xlsx", "found the ending .xlsx of a.xlsx, expected .txt, .json, .jsonl, .csv, .npz, .npy, or --format"),
+        ("--eps 1/5", "--eps is given 2 times, expected once"),
+        ("--steps 1e-1", "found '1e-1', expected an integer"),
+    ],
+)
+def test_what_contradicts_itself_is_refused(kahanmaps, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    line = LV.removesuffix(" --steps 3") if "--steps" in words else LV
+    outcome = kahanmaps(f"{line} {words}")
+    assert (outcome.status, outcome.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert message in outcome.err
+
+
+def test_integers_may_have_an_exponent(kahanmaps):
+    assert kahanmaps(f"{LV[:-1]}3e0 -q").out == kahanmaps(f"{LV} -q").out
+    assert kahanmaps(f"{LV[:-1]}1.2e1 -q").out.splitlines()[-1] == "# completed: 12 steps"

@@ -272,11 +272,6 @@ def test_the_door_gives_the_orbit_in_every_arithmetic(name, text):
         assert np.allclose(numbers, [int(e.p) / int(e.q) for e in exact], rtol=1e-9)
 
 
-def test_a_map_that_depends_on_eps_needs_one():
-    with pytest.raises(InputError, match="found no eps"):
-        orbit(MAPS["bilinear"], [1, 2], steps=1)
-
-
 def test_steps_or_iterates_are_asked_for_and_not_both():
     for wrong in ({}, {"steps": 1, "at": [1]}):
         with pytest.raises(InputError, match="one of the two"):

@@ -16,7 +16,6 @@ from kahanmaps import GF, Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.integer_steps import lowest
 
 
 @pytest.fixture(autouse=True)
@@ -93,55 +92,10 @@ def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_s
     assert any(point.numerators[1] for point in points)
 
 
-def test_there_are_none_for_several_factors_and_in_high_dimension(monkeypatch):
-    map_over = over("euler_top")
-    start = begin(map_over)
-    assert bilinear.bilinear_forms(map_over**2, start) is None
-    monkeypatch.setattr(bilinear, "_MOST_DIMENSION", 2)
-    assert bilinear.bilinear_forms(map_over, start) is None
-
-
-def test_a_denominator_of_the_factors_is_learnt(monkeypatch):
-    map_over = over("three_wave")
-    points = single_steps(map_over, begin(map_over), 24)
-    forms = bilinear.bilinear_forms(map_over, points[0])
-    for k in range(3, 20):
-        assert forms.step(points[k - 3 : k], k) == points[k]
-    calls = []
-    monkeypatch.setattr(bilinear, "lowest", lambda *given: calls.append(given) or lowest(*given))
-    for k in range(20, 25):
-        assert forms.step(points[k - 3 : k], k) == points[k]
-    assert len(calls) == 5
-
-
 def test_combinations_that_do_not_exist():
     assert bilinear._solved([[1], [1]], [[1], [2]], 101) is None
     assert bilinear._solved([[0], [1]], [[1], [2]], 101) is None
     assert bilinear._solved([[2], [1]], [[4], [2]], 101) == [[2]]
-
-
-def test_relations_are_looked_for_where_they_may_pay(monkeypatch):
-    asked = []
-    monkeypatch.setattr(rational_orbit, "relations", lambda *given: asked.append(given))
-    walked(over("lorenz"), begin(over("lorenz")), 8)  # numbers double
-    assert not asked
-    for name, least in [("_LONG_BY_COORDINATES", k) for k in (100, 140, 200, 300)] + [("_LONG", 5000)]:
-        monkeypatch.setattr(rational_orbit, name, least)
-        points, _ = walked(over("euler_top"), begin(over("euler_top")), 30)
-        at = points.index(asked.pop()[2])
-        assert points[at].bits >= (least if name == "_LONG" else 16 * least) > points[at - 1].bits
-        for most, count in ((2 * points[at].bits, 0), (2 * points[at].bits + 2, 1)):  # few steps are left, or enough
-            list(rational_orbit.RationalOrbit(over("euler_top"), begin(over("euler_top")), most))
-            assert len(asked) == count
-        asked.clear()
-    monkeypatch.setattr(rational_orbit, "_LONG", 0)
-    monkeypatch.setattr(rational_orbit, "_LONG_BY_COORDINATES", 0)
-    monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 8)
-    points, _ = walked(
-        over("weierstrass"), IntegerPoint.from_rationals((fmpq(3**60 + 2, 2**100), fmpq(-(7**40), 2**100))), 14
-    )
-    assert asked.pop()[2].bits >= 8 * points[0].bits
-    assert not asked
 
 
 def test_an_image_is_told_from_other_points_and_from_a_choice_of_many():

@@ -64,10 +64,6 @@ def test_coordinates_that_are_no_sections_have_no_coefficients():
     assert search._coefficients(points, [forms(3, W, U, n) for n in range(2, 30)], P) is None
 
 
-def test_enough_points_are_used_also_where_all_sections_are_coordinates():
-    assert search.Sections(8, tuple(range(8)), 2, 1, ()).points_used >= 1 + 2 * 8 + 8
-
-
 @pytest.mark.parametrize("degree", range(2, 9))
 def test_forms_are_independent(degree):
     W, U = (around(WARD[0], 24), around(WARD[1], 24, WARD[0]))

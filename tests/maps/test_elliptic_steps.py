@@ -7,7 +7,6 @@ orbits lie on elliptic curves, also on several in turn, and nowhere else; what i
 from functools import reduce
 from io import StringIO
 from itertools import pairwise
-from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
@@ -160,30 +159,10 @@ def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
     assert steps.at(search.first) is not None
 
 
-def test_the_degree_is_that_of_the_equation_between_two_curves():
-    asked = []
-    factors = [
-        SimpleNamespace(equation=SimpleNamespace(exponents=[(d, 0)]), integer_steps=SimpleNamespace(step=lambda p: p))
-        for d in (3, 1)
-    ]
-    search = SimpleNamespace(stride=2, groups=[(0,)], degree=lambda k, g: (2, 5)[k], factors=factors, first=6)
-    W = SimpleNamespace(integer=lambda n: 1)
-    assert elliptic._is_proved("x", search, SimpleNamespace(at=lambda n: asked.append(n) or "x", multiples=W))
-    assert asked[0] == 6
-    assert asked[-1] - 6 >= 2 * (3 * 2 + 5 + 1)
-
-
 def test_an_orbit_that_ends_proves_nothing():
     map_over, search, numbers = found("euler_top")
     assert not elliptic._is_proved(POLE, search, elliptic._Exact(search, numbers).steps(map_over))
     assert elliptic._Search(map_over.factors, POLE, 1)._residues(2**61 - 1, 5) is None
-
-
-def test_curves_have_to_be_the_same():
-    _, search, numbers = found("qrt_asymmetric")
-    place = list(numbers)[1]
-    with pytest.raises(ArithmeticError, match="differ"):
-        elliptic._Exact(search, {**numbers, place: numbers[place]._replace(H=numbers[place].H + 1)})
 
 
 def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
@@ -258,13 +237,6 @@ def test_fractions_are_fractions_and_points_are_points():
         assert steps.at(50) == single_steps(map_over, begin(map_over), 50)[-1]  # directly
 
 
-def test_a_map_without_a_value_modulo_the_prime_is_left_to_single_steps(monkeypatch):
-    map_over = over("weierstrass")
-    expected = single_steps(map_over, begin(map_over), 40)
-    monkeypatch.setattr(elliptic_steps, "_PRIME", 7)
-    assert walked(map_over, expected[0], 40)[0] == expected
-
-
 def test_an_orbit_ends_after_a_point_with_too_many_bits():
     map_over = over("euler_top")
     *within, beyond = rational_orbit.RationalOrbit(map_over, begin(map_over), max_bits=4000)
@@ -298,13 +270,6 @@ def test_memory_does_not_grow_with_what_is_behind():
     assert last[-1] == single_steps(map_over, begin(map_over), 120)[-1]
 
 
-def test_common_factors_are_small_primes_of_the_curve():
-    map_over = over("euler_top")
-    steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
-    ((coordinates,),) = steps._places
-    assert all(coordinates._primes % p == 0 for p in (fmpz(2), fmpz(3), fmpz(11)))  # eps = 3/11
-
-
 def test_a_parameter_that_is_carried_along_is_no_coordinate_of_its_own():
     field = ring(["x", "y", "a", "b", "eps"])
     x, y, a, b, _ = field.gens()
@@ -315,13 +280,6 @@ def test_a_parameter_that_is_carried_along_is_no_coordinate_of_its_own():
     points, orbit = walked(map_over, start, 60)
     assert points == single_steps(map_over, start, 60)
     assert orbit.relations is not None
-
-
-@pytest.mark.parametrize("name", ["euler_top", "mcmillan"])
-def test_a_prime_of_the_start_that_is_the_one_in_use(name):
-    map_over = over(name)
-    start = IntegerPoint.from_rationals((fmpq(1, 2**61 - 1), *START[1 : map_over.dim]))
-    assert walked(map_over, start, 25)[0] == single_steps(map_over, start, 25)
 
 
 def test_powers_step_by_the_sequences_of_the_map_itself():
@@ -346,39 +304,6 @@ def test_of_several_factors_all_points_have_to_be_within_the_budget():
             if image.exceeding(max_bits):
                 break
         assert list(rational_orbit.RationalOrbit(there_and_back, begin(map_over), max_bits)) == expected
-
-
-def test_numbers_that_are_as_long_as_points_are_not_looked_for(monkeypatch):
-    map_over = over("repaired_icosahedral")
-    asked = []
-    monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 100)
-    monkeypatch.setattr(elliptic, "image_modulo", lambda *given: asked.append(given) or image_modulo(*given))
-    image_modulo = elliptic_steps.image_modulo
-    with pytest.raises(elliptic.TooLong):
-        elliptic.elliptic_steps(map_over, begin(map_over), 600)
-    assert len(asked) < 600
-
-
-def test_curves_are_looked_for_once_more_only_where_the_start_may_be_special(monkeypatch):
-    seen = []
-    real = elliptic._Search
-    monkeypatch.setattr(elliptic, "_Search", lambda *given: seen.append(given) or real(*given))
-    map_over = over("lorenz")
-    assert elliptic.elliptic_steps(map_over, begin(map_over), BITS) is None
-    assert len(seen) == 2
-
-
-def test_no_term_is_found_twice(monkeypatch):
-    map_over = over("euler_top")
-    steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
-    calls = []
-    real = somos.taken_apart
-    monkeypatch.setattr(somos, "taken_apart", lambda *given: calls.append(given) or real(*given))
-    for number in range(6, 101):
-        assert steps.step([], number) is not None
-    assert len(calls) <= 2 * 101
-    ((coordinates,),) = steps._places
-    assert all(len(terms._pairs) < 20 for terms in (coordinates._U, coordinates.W))
 
 
 def coordinates(degree, rows, primes):

@@ -149,36 +149,6 @@ def test_of_a_pole_at_the_iterate_and_one_before_it_the_first_is_said(first, sec
             NthIterate(normal_form, "1/2", QQ).value(start, n)
 
 
-def test_points_half_way_are_made_only_where_numbers_may_become_too_long(monkeypatch):
-    normal_form, system = structure_and_system("m = 2")
-    start = random_point(system.dim, 6, height=3)
-    asked, planes = [], rational_iterate._Planes
-    point = planes.point
-    monkeypatch.setattr(planes, "point", lambda self, n: asked.append(n) or point(self, n))
-    bits = NthIterate(normal_form, "1/10", QQ).value(start, 200).bits
-    assert asked == [200]
-    asked.clear()
-    NthIterate(normal_form, "1/10", QQ).value(start, 200, max_bits=2 * bits)
-    assert asked == [200]
-    asked.clear()
-    with pytest.raises(OverBudget):
-        NthIterate(normal_form, "1/10", QQ).value(start, 200, max_bits=bits // 3)
-    assert asked[0] < 200
-
-
-@pytest.mark.parametrize("more", [1, 8, 24])
-def test_the_pole_of_an_orbit_of_planes_is_where_it_is(more):
-    name = "a pole at step 2"
-    U, V, W = before(*STARTS[name], more)
-    _, normal_form, (_, u, _, v) = side_by_side(name, "a double root")
-    planes = rational_iterate.RationalOrbit(normal_form, fmpq(1, 2), (fmpq(U, W), u, fmpq(V, W), v), None)._planes
-    pole = more + 2
-    with pytest.raises(SingularStep, match=f"no value at step {pole - 1}$"):
-        planes.point(pole)
-    for n in (pole - 1, pole + 1)[: 1 + (more == 24)]:  # near ones are walked to, not passed over
-        assert len(coordinates(planes.point(n))) == 4
-
-
 # Balls.
 
 

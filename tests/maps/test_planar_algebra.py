@@ -17,8 +17,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.family.draw import draw_with_chi, parse_chi
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import planar_algebra, rational_iterate, tau
-from kahanmaps.maps.normal_form.iterate import NthIterate
+from kahanmaps.maps.normal_form import planar_algebra, tau
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.steps import NormalSteps
@@ -107,18 +106,6 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
     assert all(point.height <= point.bits + point._assembly.excess for point in found)
 
 
-@pytest.mark.parametrize("chi", ["t^2 - 10", "(t - 1)*(t^2 - 3)", "(t^2 - 2)*(t^2 + t + 1)"])
-def test_the_nth_iterate_is_the_point_of_the_orbit(chi):
-    normal_form, system = member_of(chi)
-    start = random_point(system.dim, 4)
-    points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(start), 61))
-    for n in (30, 60):
-        found = NthIterate(normal_form, "1/10", rational_iterate.QQ).value(start, n)
-        assert found == points[n] != points[n - 1]
-        assert hash(found) == hash(points[n])
-        assert found.lowest_terms() == points[n].lowest_terms()
-
-
 def test_a_plane_at_rest_stays():
     normal_form, system = member_of("(t - 1)*(t^2 - 3)")
     X, Y = normal_form.form.coordinates(random_point(system.dim, 1))
@@ -139,14 +126,6 @@ def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):
     monkeypatch.setattr(AlgebraBlock, "fraction", lambda self, P: (*fraction(self, P)[:2], fraction(self, P)[1] ** 0))
     points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(random_point(system.dim, 4)), 60))
     assert [point.lowest_terms() for point in points] != expected
-
-
-def test_a_wrong_iterate_does_not_pass(monkeypatch):
-    normal_form, system = member_of("t^2 - 10")
-    iterate = tau.iterate
-    monkeypatch.setattr(tau, "iterate", lambda block, n: iterate(block, n + 1))
-    with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        NthIterate(normal_form, "1/10", rational_iterate.QQ).value(random_point(system.dim, 4), 100)
 
 
 def test_what_denominators_have_in_common_with_a_point_is_taken_out():

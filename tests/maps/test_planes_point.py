@@ -97,12 +97,6 @@ def test_one_sign_in_one_triple_makes_another_point():
     assert PlanesPoint(point._assembly, [(U, V, -W), last]) != point
 
 
-def test_a_point_is_not_equal_to_something_else():
-    point = points(1)[0]
-    assert point != point.rationals()
-    assert point != 0
-
-
 # What the reduction rests on.
 
 

@@ -134,13 +134,6 @@ def test_the_bits_of_a_point_are_bounded_before_it_is_made(name):
         assert longest <= bound <= 1.1 * longest + 900
 
 
-@pytest.mark.parametrize("name", ["three real roots, irrational", "P_{-1}, P_0, P_1 on a line", "chi_2 = 0"])
-def test_few_steps_are_left_to_the_steps(name):
-    block = integer_block(*STARTS[name])
-    base = tau.table_near(block).base
-    assert [n for n in range(20) if tau.iterate(block, n) is None] == list(range(FIRST + base))
-
-
 @pytest.mark.parametrize(
     "name",
     [

@@ -15,7 +15,7 @@ from helpers import encloses, quick
 from planar_helpers import STARTS, Finite, by_gcds, integer_block, planes_over
 
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import CC, GF, RR
+from kahanmaps.algebra.fields import CC, RR
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.normal_form import translation
 from kahanmaps.maps.normal_form.level_curves import LevelCubic
@@ -170,31 +170,3 @@ def test_with_another_gamma_or_other_digits_the_point_is_another(wrong, monkeypa
     else:
         monkeypatch.setattr(translation, "_digits", lambda n: digits(n + 1))
     assert not same_point(found(block, start, 50), stepped(block, start, 50)[50])
-
-
-MATRICES = {  # by rows, with the period of (1, 2), where it is short
-    "no period": (1, 2, 3, 5),
-    "period 2": (0, 1, 3, 0),
-    "a fixed point": (3, 2, 4, 5),
-    "the start again and again": (5, 0, 8, 1),
-    "one fixed point": (2, 1, -1, 4),
-}
-
-
-@pytest.mark.parametrize("matrix", MATRICES.values(), ids=MATRICES)
-@pytest.mark.parametrize(("e", "f"), [((1, 0, 4), (2, 0, 9)), ((0, 3, 5), (0, 2, 7)), ((1, 2, 3), (5, 7, 11))])
-def test_four_points_on_a_line_tell_all_others_of_a_projective_map(matrix, e, f):
-    field = GF(10_007)
-    a, b, c, d = map(field.convert, matrix)
-    x, y, points = field.one, field.convert(2), []
-    for k in range(30):
-        points.append(tuple((3 + k) * (x * field.convert(g) + y * field.convert(h)) for g, h in zip(e, f, strict=True)))
-        x, y = a * x + b * y, c * x + d * y
-    assert all(same_point(translation._along_line(points[:4], n, is_zero), points[n]) for n in range(30))
-
-
-def test_four_points_of_period_three_tell_nothing():
-    points = [tuple(map(GF(101).convert, point)) for point in ((1, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0))]
-    assert same_point(translation._along_line(points, 4, is_zero), points[1])
-    with pytest.raises(NoTranslation):
-        translation._along_line([*points[:3], points[1]], 4, is_zero)
