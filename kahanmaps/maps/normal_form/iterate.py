@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.system_normal_form import SystemNormalForm
     from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
-    from kahanmaps.maps.normal_form.rational_iterate import RationalOrbit
+    from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
 _CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
 
@@ -43,7 +43,7 @@ class NthIterate:
         from kahanmaps.maps.normal_form.splitting import Splitting
 
         self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
-        self._rational: tuple[Any, RationalOrbit] | None = None  # the last one, with what it is of
+        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last one, with what it is of
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
@@ -55,11 +55,11 @@ class NthIterate:
         if n < 0:
             raise InputError(f"found the step {n}, expected 0 or more (for the inverse map, change the sign of eps)")
         if self.field is QQ:
-            from kahanmaps.maps.normal_form.rational_iterate import RationalOrbit
+            from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
             key = (tuple(start), max_bits)
             if self._rational is None or self._rational[0] != key:
-                self._rational = key, RationalOrbit(self.normal_form, self.eps, start, max_bits)
+                self._rational = key, OrbitInPlanes(self.normal_form, self.eps, start, max_bits)
             return self._rational[1].value(n)
         with self.field.working():
             x = [self.field.convert(entry) for entry in start]

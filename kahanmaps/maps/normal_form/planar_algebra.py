@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache, reduce
 from itertools import combinations, product
 from typing import Any
 
-from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod_poly
+from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_one, radical, taken_apart, without
@@ -118,16 +118,16 @@ class AlgebraBlock(LevelBlock):
 
     integral = shortest  # of a triple over K
 
-    def residue_map(self, prime: int) -> Callable[[EtaleElement], int] | None:
+    def residue_map(self, prime: int) -> Callable[[EtaleElement], nmod] | None:
         """A homomorphism to the residues modulo a prime, None where g has no root there."""
         g = nmod_poly([int(c.p) for c in self.algebra.chi.coeffs()], prime)
         root = next((-factor[0] / factor[1] for factor, _ in g.factor()[1] if factor.degree() == 1), None)
         if root is None:
             return None
 
-        def residue(element: EtaleElement) -> int:
+        def residue(element: EtaleElement) -> nmod:
             above, below = element.polynomial.numer(), element.polynomial.denom()
-            return int(nmod_poly([int(c % prime) for c in above.coeffs()], prime)(root) / int(below % prime))
+            return nmod_poly([int(c % prime) for c in above.coeffs()], prime)(root) / int(below % prime)
 
         return residue
 

@@ -85,7 +85,6 @@ def determinant(P: Sequence[Any], Q: Sequence[Any], R: Sequence[Any]) -> Any:
     return P[0] * (Q[1] * R[2] - Q[2] * R[1]) - P[1] * (Q[0] * R[2] - Q[2] * R[0]) + P[2] * (Q[0] * R[1] - Q[1] * R[0])
 
 
-def same_point(P: Sequence[Any], Q: Sequence[Any], modulus: int | None = None) -> bool:
-    """Whether two triples are proportional (neither of them zero), as integers modulo `modulus` if it is given."""
-    minors = (P[0] * Q[1] - P[1] * Q[0], P[0] * Q[2] - P[2] * Q[0], P[1] * Q[2] - P[2] * Q[1])
-    return all((minor if modulus is None else minor % modulus) == 0 for minor in minors)
+def same_point(P: Sequence[Any], Q: Sequence[Any]) -> bool:
+    """Whether two triples are proportional (neither of them zero)."""
+    return bool(P[0] * Q[1] == P[1] * Q[0] and P[0] * Q[2] == P[2] * Q[0] and P[1] * Q[2] == P[2] * Q[1])

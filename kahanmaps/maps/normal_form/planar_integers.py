@@ -16,7 +16,7 @@ from functools import cached_property
 from itertools import chain, islice
 from typing import Any
 
-from flint import fmpq, fmpz
+from flint import fmpq, fmpz, nmod
 
 from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
@@ -151,9 +151,9 @@ class IntegerBlock(LevelBlock):
         return primitive(_cleared([triple])[0])
 
     @staticmethod
-    def residue_map(prime: int) -> Callable[[fmpz], int] | None:
+    def residue_map(prime: int) -> Callable[[fmpz], nmod] | None:
         """How integers are reduced modulo a prime."""
-        return lambda entry: int(entry % prime)
+        return lambda entry: nmod(entry, prime)
 
     @staticmethod
     def shortest(triple: IntegerTriple) -> IntegerTriple:

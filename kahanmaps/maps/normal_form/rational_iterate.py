@@ -15,11 +15,11 @@ that of an orbit which is stepped all the way.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import islice
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, nmod
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.residues import random_prime
@@ -30,7 +30,6 @@ from kahanmaps.maps.normal_form.periods import Kind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Block, PlanesPoint
-from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.maps.normal_form.steps import NormalSteps
 
 _RISE = 16  # steps over which a rise of the heights is more than a fluctuation
@@ -38,6 +37,8 @@ _WALKED = 256  # steps taken exactly at first,
 _LIGHT = 8192  # as long as the numbers have at most so many bits
 _SHORT = 24  # up to here a plane is stepped
 _PRIMES = 20
+# Where no limit is given: longer numbers take minutes. So many steps modulo a prime are cheaper than long numbers.
+_MOST_BITS, _LOOKED = 1 << 28, 250_000
 
 
 class OverBudget(Exception):
@@ -48,18 +49,37 @@ class OverBudget(Exception):
         super().__init__(step, bits)
 
 
-class RationalOrbit:
-    """The orbit of a start over Q, any iterate of it directly; no pole on the way goes unnoticed."""
+class OrbitInPlanes:
+    """The orbit of a start over Q, any iterate of it directly; no pole on the way goes unnoticed.
+
+    Every plane has triples of integers or short elements of Z[t], and points from tables of psi and chi.
+    """
 
     def __init__(self, normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], max_bits: int | None) -> None:
-        splitting = Splitting(normal_form.form, QQ, eps, normal_form.T)
+        steps = NormalSteps(normal_form, eps)
         x = [QQ.convert(entry) for entry in start]
-        self._planes = _Planes(normal_form, splitting, x)
-        self._limit = self._planes.most_bits if max_bits is None else max_bits
+        self._blocks, self._assembly = steps.blocks(x)
+        triples = steps.splitting.triples(x)
+        self._planes = [_Plane(plane.block, P) for plane, P in zip(steps.splitting.planes, triples, strict=True)]
+        self._is_lazy = all(plane.lazy for plane in self._planes)
+        self._limit = _MOST_BITS if max_bits is None else max_bits
         self._end: SingularStep | OverBudget | None = None
         self._period: int | None = None
-        self._walked: list[PlanesPoint] = []
-        self._walk()
+        self._walked: list[PlanesPoint] = []  # the first steps, exactly
+        for step, value in enumerate(steps.points(x)):
+            bits = value.exceeding(self._limit)
+            if step == 0 or not bits:
+                self._walked.append(value)  # the start is given: the budget is for what is computed
+            if bits:
+                self._end = OverBudget(step, bits)
+                break
+            if step > 0 and value == self._walked[0]:
+                self._period = step
+                break
+            if step == _WALKED or value.bits > _LIGHT:
+                break
+        else:
+            self._end = _no_value(len(self._walked) - 1)
         self._far = len(self._walked) - 1  # the last step that is known to be within the budget and before all poles
 
     def value(self, n: int) -> PlanesPoint:
@@ -71,9 +91,9 @@ class RationalOrbit:
         if self._period is not None:
             return self._walked[n % self._period]
         step, value, bits = self._sighted(n)
-        pole = self._planes.first_pole(step, value)
+        pole = self._first_pole(step, value)
         if pole is not None:
-            before = self._planes.point(pole - 1)
+            before = self._point(pole - 1)
             if more := before.exceeding(self._limit):
                 raise OverBudget(pole - 1, more)
             raise _no_value(pole - 1)
@@ -84,38 +104,17 @@ class RationalOrbit:
         self._far = max(self._far, n)
         return value
 
-    def _walk(self) -> None:
-        """The first steps, exactly."""
-        for step, value in enumerate(self._planes.walk()):
-            bits = value.exceeding(self._limit)
-            if step == 0 or not bits:
-                self._walked.append(value)  # the start is given: the budget is for what is computed
-            if bits:
-                self._end = OverBudget(step, bits)
-                return
-            if step > 0 and value == self._walked[0]:
-                self._period = step
-                return
-            if step == _WALKED or value.bits > _LIGHT:
-                return
-        self._end = _no_value(len(self._walked) - 1)
-
     def _sighted(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
         """Step n, its value and 0; or a step before it that is over the budget, and the bits there (None: not known).
 
         The value is None if it was not computed, or is at a pole.
         """
         step = max(1, min(self._far, n - 1))
-        if self._planes.is_within(n, step, self._limit):
-            try:
-                value = self._planes.point(n)
-            except SingularStep:
-                return n, None, 0
-            return n, value, value.exceeding(self._limit)
-        target, before = n if self._planes.lazy else _halved(n, step), None
+        target = n if self._is_lazy or self._is_within(n, step) else _halved(n, step)
+        before: tuple[int, int] | None = None
         while True:
             try:
-                value = self._planes.point(target)
+                value = self._point(target)
             except SingularStep:
                 return target, None, 0
             bits = value.exceeding(self._limit)
@@ -125,11 +124,62 @@ class RationalOrbit:
             if before is not None and here[0] - before[0] >= _RISE and here[1] > before[1]:
                 # At four times the budget, by a line, it certainly is over.
                 beyond = 1 + 4 * self._limit * (here[0] - before[0]) // (here[1] - before[1])
-                if beyond <= min(n - target, self._planes.looked):
+                if beyond <= min(n - target, _LOOKED):
                     return target + beyond, None, None
             before = here
             # Four times the size is borne, but not more: heights may grow like n^2.
             target = _halved(n, target) if 4 * here[1] <= self._limit else min(n, target + target // 2)
+
+    def _is_within(self, n: int, step: int) -> bool:
+        """Whether the n-th point surely is within the budget, from bounds that need no point; the `step` is.
+
+        It is left undecided, False, where the limit may come soon after a step on the way.
+        """
+        if not all(isinstance(block, IntegerBlock) for block in self._blocks):
+            return False
+        while True:
+            step = _halved(n, step)
+            pairs = zip(self._blocks, self._planes, strict=True)
+            bits = [tau.most_bits(block, plane.reduced(step)) for block, plane in pairs]
+            total = sum(known or 0 for known in bits) + self._assembly.excess
+            if None in bits or total > self._limit or (step < n and 4 * total > self._limit):
+                return False
+            if step == n:
+                return True
+
+    def _point(self, n: int) -> PlanesPoint:
+        """Phi^n(start), poles on the way passed over. Raises SingularStep at a pole."""
+        triples = [_reached(block, plane.reduced(n)) for block, plane in zip(self._blocks, self._planes, strict=True)]
+        if any(W == 0 for _, _, W in triples):
+            raise _no_value(n - 1)
+        return PlanesPoint(self._assembly, triples)
+
+    def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
+        """The first step up to n without a value; `value` is the n-th, to be compared modulo a prime."""
+        known = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
+        busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
+        generator = random.Random()
+        for _ in range(_PRIMES):
+            poles: list[int] = []
+            for i in busy:
+                block, residue = self._blocks[i], None
+                while residue is None:  # a homomorphism to the residues modulo a random prime
+                    residue = block.residue_map(random_prime(generator))
+                pole, point = _steps_modulo(block, n, residue)
+                if pole is None:
+                    if value is not None and not same_point(list(map(residue, value.triples[i])), point):
+                        raise ArithmeticError("the iterate disagrees with the orbit modulo a prime: please report this")
+                    continue
+                try:
+                    is_pole = _reached(block, pole)[2] == 0
+                except SingularStep:
+                    is_pole = True
+                if not is_pole:  # over Q: the prime divides W there
+                    break
+                poles.append(pole)
+            else:
+                return min([*known, *poles], default=None)
+        raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
 
 
 def _halved(n: int, step: int) -> int:
@@ -192,89 +242,6 @@ def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
     return point
 
 
-class _Planes:
-    """An orbit in all planes: triples of integers or short elements of Z[t], points from tables of psi and chi."""
-
-    # Where no limit is given: longer numbers take minutes. So many steps modulo a prime are cheaper than long numbers.
-    most_bits, looked = 1 << 28, 250_000
-
-    def __init__(self, normal_form: SystemNormalForm, splitting: Splitting, x: Sequence[fmpq]) -> None:
-        self._steps = NormalSteps(normal_form, splitting.eps)
-        self._x = x
-        self.blocks, self._assembly = self._steps.blocks(x)
-        self._planes = [
-            _Plane(plane.block, triple) for plane, triple in zip(splitting.planes, splitting.triples(x), strict=True)
-        ]
-        self.lazy = all(plane.lazy for plane in self._planes)
-
-    def walk(self) -> Iterator[PlanesPoint]:
-        """The orbit, as long as it has values."""
-        return self._steps.points(self._x)
-
-    def point(self, n: int) -> PlanesPoint:
-        """Phi^n(start), poles on the way passed over. Raises SingularStep at a pole."""
-        triples = [_reached(block, plane.reduced(n)) for block, plane in zip(self.blocks, self._planes, strict=True)]
-        if any(W == 0 for _, _, W in triples):
-            raise _no_value(n - 1)
-        return PlanesPoint(self._assembly, triples)
-
-    def is_within(self, n: int, step: int, limit: int) -> bool:
-        """Whether the n-th point surely has at most `limit` bits, from bounds that need no point; the `step` has.
-
-        It is left undecided, False, where the limit may come soon after a step on the way.
-        """
-        if self.lazy or not all(isinstance(block, IntegerBlock) for block in self.blocks):
-            return False
-        while True:
-            step = _halved(n, step)
-            bits = [
-                tau.most_bits(block, plane.reduced(step))
-                for block, plane in zip(self.blocks, self._planes, strict=True)
-            ]
-            total = sum(known or 0 for known in bits) + self._assembly.excess
-            if None in bits or total > limit or (step < n and 4 * total > limit):
-                return False
-            if step == n:
-                return True
-
-    def first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
-        """The first step up to n without a value; `value` is the n-th, to be compared modulo a prime."""
-        known = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
-        busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
-        generator = random.Random()
-        for _ in range(_PRIMES):
-            residues = {}
-            for i in busy:  # a random prime and a homomorphism to the residues modulo it, for each plane
-                residue = None
-                while residue is None:
-                    prime = random_prime(generator)
-                    residue = self.blocks[i].residue_map(prime)
-                residues[i] = prime, residue
-            found = {i: _steps_modulo(self.blocks[i], n, *residues[i]) for i in busy}
-            poles = {i: pole for i, (pole, _) in found.items() if pole is not None}
-            if not all(self._is_pole(self.blocks[i], pole) for i, pole in poles.items()):
-                continue
-            if value is not None:
-                for i, (pole, point) in found.items():
-                    prime, residue = residues[i]
-                    if pole is None and not same_point(list(map(residue, value.triples[i])), point, prime):
-                        raise ArithmeticError(_DISAGREES)
-            return min([*known, *poles.values()], default=None)
-        raise ArithmeticError(_NO_POLE)
-
-    @staticmethod
-    def _is_pole(block: Block, step: int) -> bool:
-        """Whether a first pole modulo a prime is one over Q."""
-        try:
-            return bool(_reached(block, step)[2] == 0)
-        except SingularStep:
-            return True
-
-
-_DISAGREES = "the iterate disagrees with the orbit modulo a prime: please report this"
-_NO_POLE = "the orbit modulo many primes met a pole that it has not: please report this"
-
-
 def _reached(block: Block, n: int) -> Triple:
     """P_n; poles on the way are passed over, unless it has to be stepped. Raises SingularStep then."""
     if n <= _SHORT or block.is_constant or block.level is None:
@@ -294,22 +261,13 @@ def _reached(block: Block, n: int) -> Triple:
     return block.integral(triple)
 
 
-def _steps_modulo(
-    block: Block, n: int, prime: int, residue: Callable[[Any], int]
-) -> tuple[int | None, tuple[int, int, int]]:
+def _steps_modulo(block: Block, n: int, residue: Callable[[Any], nmod]) -> tuple[int | None, Triple]:
     """P_n modulo a prime, or the first step at which W vanishes there."""
     cubic = block.block
-    a, b, c, d = map(residue, (cubic.a, cubic.b, cubic.c, cubic.d))
-    p, q, r = map(residue, cubic.D)
-    U, V, W = map(residue, block.start)
-    twice_b, twice_c, thrice_a, thrice_d = 2 * b, 2 * c, 3 * a, 3 * d
+    modulo = PlanarBlock(*map(residue, (cubic.a, cubic.b, cubic.c, cubic.d)))
+    point: Triple = tuple(map(residue, block.start))  # type: ignore[assignment]  # of three
     for k in range(1, n + 1):
-        UU, UV, VV = U * U % prime, U * V % prime, V * V % prime
-        U, V, W = (
-            (U * W + b * UU + twice_c * UV + thrice_d * VV) % prime,
-            (V * W - thrice_a * UU - twice_b * UV - c * VV) % prime,
-            (W * W + p * UU + q * UV + r * VV) % prime,
-        )
-        if W == 0:
-            return k, (U, V, W)
-    return None, (U, V, W)
+        point = modulo.image(point)
+        if point[2] == 0:
+            return k, point
+    return None, point

@@ -37,6 +37,14 @@ class IntegerPoint:
         common = W.gcd(product)
         return [(entry // g, W // g) for entry in self.numerators for g in [common.gcd(entry % common)]]
 
+    def residues(self, prime: int) -> list[int] | None:
+        """The point modulo a prime, with 1 behind its coordinates; None where the prime divides its denominator."""
+        below = int(self.denominator % prime)
+        if not below:
+            return None
+        inverse = pow(below, -1, prime)
+        return [*(int(entry * inverse % prime) for entry in self.numerators), 1]
+
     @property
     def bits(self) -> int:
         """The bit length of the largest of the integers."""

@@ -48,6 +48,7 @@ class IntegerSteps:
                     sign = 1 if j < n else -1
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
+        self._modular: nmod_mat | None = None  # the forms modulo the last prime
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
         self._substitution = forward_substitution(exponents, self._forms, n)
         self._constant = None if self._substitution else self._constant_rows()
@@ -99,24 +100,28 @@ class IntegerSteps:
 
     def residues(self, point: IntegerPoint, prime: int, length: int) -> list[list[int]] | None:
         """So many points from this one on modulo a prime below 2^63, each with 1 behind its coordinates."""
-        n, forms = self.dim, nmod_mat(self._forms, prime)
-        denominator = int(point.denominator % prime)
-        if not denominator:
+        points, last = list[list[int]](), point.residues(prime)
+        while last is not None:
+            points.append(last)
+            if len(points) == length:
+                return points
+            last = self.image_modulo(last, prime)
+        return None
+
+    def image_modulo(self, point: Sequence[int], prime: int) -> list[int] | None:
+        """The image of residues with 1 behind them, None where there is none."""
+        if self._modular is None or self._modular.modulus() != prime:
+            self._modular = nmod_mat(self._forms, prime)
+        n, monomials = self.dim, list(point)
+        if self._degree != 1:
+            monomials = [int(_monomial(point, exponent) % prime) for exponent in self._exponents]
+        values = (self._modular * nmod_mat(len(monomials), 1, monomials, prime)).entries()
+        rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
+        try:
+            image = nmod_mat([row[:n] for row in rows], prime).solve(nmod_mat([row[n:] for row in rows], prime))
+        except ZeroDivisionError:
             return None
-        inverse = pow(denominator, -1, prime)
-        points = [[*(int(entry * inverse % prime) for entry in point.numerators), 1]]
-        while len(points) < length:
-            monomials = points[-1]
-            if self._degree != 1:
-                monomials = [int(_monomial(monomials, exponent) % prime) for exponent in self._exponents]
-            values = (forms * nmod_mat(len(monomials), 1, monomials, prime)).entries()
-            rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
-            try:
-                image = nmod_mat([row[:n] for row in rows], prime).solve(nmod_mat([row[n:] for row in rows], prime))
-            except ZeroDivisionError:
-                return None
-            points.append([*(int(entry) for entry in image.entries()), 1])
-        return points
+        return [*(int(entry) for entry in image.entries()), 1]
 
     def _equation(self, point: IntegerPoint) -> tuple[fmpz_mat, fmpz_mat]:
         """M(x) and r(x), each row times a common denominator of its coefficients and the least power of W."""

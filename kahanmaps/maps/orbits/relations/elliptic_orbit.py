@@ -26,7 +26,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapOver, StepOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
-from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps, image_modulo, residue
+from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps
 from kahanmaps.maps.orbits.relations.forms import common_primes
 from kahanmaps.maps.somos import Integers, Terms, around, first_terms
 
@@ -161,13 +161,11 @@ class _Search:
 
     def _residues(self, prime: int, length: int) -> Rows | None:
         """So many points from the start on modulo a prime, one for each step of a factor."""
-        if len(self.factors) == 1:
-            return self.factors[0].integer_steps.residues(self._start, prime, length)
-        point = residue(self._start, prime)
+        point = self._start.residues(prime)
         points: Rows = []
         while point is not None and len(points) < length:
             points.append(point)
-            point = image_modulo(self.factors[(len(points) - 1) % len(self.factors)], point, prime)
+            point = self.factors[(len(points) - 1) % len(self.factors)].integer_steps.image_modulo(point, prime)
         return points if len(points) == length else None
 
 

@@ -50,9 +50,9 @@ class EllipticSteps:
         """Whether the point before is sure to have an image: modulo a prime, by an orbit that goes along."""
         if self._residue is None:
             before = self.point(number - 1)
-            self._residue = None if before is None else residue(before, _PRIME)
-        if self._residue is not None:
-            self._residue = image_modulo(self._map, self._residue, _PRIME)
+            self._residue = None if before is None else before.residues(_PRIME)
+        for one in self._map.factors:
+            self._residue = self._residue and one.integer_steps.image_modulo(self._residue, _PRIME)
         return self._residue is not None
 
     def point(self, number: int) -> IntegerPoint | None:
@@ -126,22 +126,3 @@ class Coordinates:
         """Keep no long terms of numbers below n."""
         self.W.forget(n)
         self._U.forget(n)
-
-
-def residue(point: IntegerPoint, prime: int) -> list[int] | None:
-    """The point modulo a prime, with 1 behind its coordinates; None where the prime divides its denominator."""
-    below = int(point.denominator % prime)
-    if not below:
-        return None
-    inverse = pow(below, -1, prime)
-    return [*(int(entry * inverse % prime) for entry in point.numerators), 1]
-
-
-def image_modulo(map_over: MapOver, point: list[int], prime: int) -> list[int] | None:
-    """The image of such a point, None where there is none."""
-    for one in map_over.factors:
-        both = one.integer_steps.residues(IntegerPoint(tuple(map(fmpz, point[:-1])), fmpz(1)), prime, 2)
-        if both is None:
-            return None
-        point = both[1]
-    return point
