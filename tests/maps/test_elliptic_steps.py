@@ -22,7 +22,7 @@ from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
 
 BITS = 10_000
@@ -214,27 +214,6 @@ def test_a_start_on_a_curve_of_genus_0_or_of_finite_order_has_no_sequences():
     images = [RationalFunction(y, field.constant(1)), RationalFunction(1 + y, x)]
     pentagon = explicit_map(["x", "y"], images).at(1)  # of Gauss: period 5
     assert elliptic.elliptic_steps(pentagon, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(2))), BITS) is None
-
-
-def test_coordinates_that_a_step_only_moves_are_seen():
-    field = ring(["x", "y", "z", "eps"])
-    x, y, z, _ = field.gens()
-    one = field.constant(1)
-    moved = [RationalFunction(y, one), RationalFunction(x + 1, z), RationalFunction(x, one)]
-    assert elliptic._copies(explicit_map(["x", "y", "z"], moved).at(1).equation) == [1, None, 0]
-    divided = [RationalFunction(y, x), RationalFunction(z, one), RationalFunction(x, y)]
-    assert elliptic._copies(explicit_map(["x", "y", "z"], divided).at(1).equation) == [None, 2, None]
-    doubled = [RationalFunction(2 * y, one), RationalFunction(x * x, one), RationalFunction(z, one)]
-    assert elliptic._copies(explicit_map(["x", "y", "z"], doubled).at(1).equation) == [None, None, 2]
-
-
-def test_fractions_are_fractions_and_points_are_points():
-    for name, kind in (("mcmillan", FractionsPoint), ("weierstrass", IntegerPoint)):
-        map_over = over(name)
-        steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
-        assert type(steps.at(9)) is kind
-        assert steps.at(0) is None
-        assert steps.at(50) == single_steps(map_over, begin(map_over), 50)[-1]  # directly
 
 
 def test_an_orbit_ends_after_a_point_with_too_many_bits():

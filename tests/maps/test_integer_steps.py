@@ -110,14 +110,6 @@ def test_for_the_family_the_elimination_itself_finds_every_step(name, monkeypatc
     assert walk(FAMILY[name], "1/10", 12)[1:] == found
 
 
-@pytest.mark.parametrize("steps", [40, pytest.param(60, marks=pytest.mark.slow)])
-def test_a_long_orbit_beyond_the_threshold_is_the_orbit_on_fractions(steps):
-    x, system = start(6), FAMILY["m = 3"]
-    for point in walk(system, "1/10", steps)[1:]:
-        x = rational_step(system, fmpq(1, 10), x)
-        assert point.rationals() == x
-
-
 # Rows of the equation that do not depend on x are taken out.
 
 
@@ -147,11 +139,6 @@ def test_a_step_is_that_of_fractions_and_a_pole_is_one(system, eps, x):
         assert image is None
     else:
         assert image == IntegerPoint.from_rationals(expected)
-
-
-@pytest.mark.parametrize("name", ["clebsch_first_flow", "euler_top", "weierstrass"])
-def test_nothing_is_taken_out_where_there_is_nothing_or_where_minors_are_quicker(name):
-    assert load(name).map.at("3/11").integer_steps._constant is None
 
 
 def test_dependent_rows_leave_no_value_anywhere():

@@ -286,21 +286,3 @@ def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     )
     assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == wanted
     assert drawn == []
-
-
-def test_modulo_a_prime_an_iterate_without_a_value_is_named():
-    normal_form, system = structure_and_system("m = 2")
-    field, rng, told = GF(31), random.Random(4), set()
-    found = NthIterate(normal_form, "3/13", field)
-    for _ in range(40):
-        start = tuple(map(field.convert, [rng.randrange(31) for _ in range(system.dim)]))
-        points, end = walked(system, "3/13", field, start, 40)
-        if end.status == "singular":
-            n = len(points)
-            with pytest.raises(SingularStep) as refusal:
-                found.value(start, n)
-            told.add(str(refusal.value).replace(f"iterate {n} ", "iterate n ").replace(f"step {n - 1}", "step n - 1"))
-    assert told == {
-        "the map has no value at step n - 1",
-        "the map has a pole: its iterate n has no value at the start",
-    }

@@ -19,12 +19,11 @@ from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import level_curves, periods
+from kahanmaps.maps.normal_form import level_curves
 from kahanmaps.maps.normal_form.division import PeriodicLevels, division_polynomials
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.periods import (
     Kind,
-    _reductions,
     orbit_period,
     period_of,
     period_over_rationals,
@@ -165,21 +164,6 @@ def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(p
         assert abs(points - field.q - 1) <= 2 * field.q**0.5
 
 
-def test_in_characteristic_2_an_orbit_is_walked_to_its_end_or_as_far_as_allowed(monkeypatch):
-    lengths = set()
-    for block, point in planes_over(Finite(2), random.Random(3), 60):
-        found = plane_period(block, point, 2)
-        if found.kind is not Kind.STEPPED or found.status != "periodic":
-            continue
-        lengths.add(found.period)
-        monkeypatch.setattr(periods, "_WALK", found.period)
-        assert plane_period(block, point, 2) == found
-        monkeypatch.setattr(periods, "_WALK", found.period - 1)
-        assert plane_period(block, point, 2).status == "undecided"
-        monkeypatch.undo()
-    assert lengths == {1, 2}
-
-
 @pytest.mark.parametrize("field", [Finite(10_007), Finite(37, 2)], ids=repr)
 def test_with_the_number_of_points_modulo_small_primes_the_order_of_T_is_the_same(field, monkeypatch):
     rng = random.Random(5)
@@ -281,16 +265,6 @@ def test_random_rational_orbits_are_proved_not_to_be_periodic():
         assert "orders" in found.text
 
 
-@pytest.mark.parametrize(("gamma", "first"), [(fmpq(7, 3), 101), (fmpq(5, 101), 103), (fmpq(1, 101 * 103), 107)])
-def test_a_number_is_reduced_at_primes_above_100_that_do_not_divide_its_denominator(gamma, first):
-    for (prime, residue, context), expected in zip(_reductions(gamma), (first, 109, 113), strict=False):
-        assert prime >= first
-        assert (int(residue) * int(gamma.q) - int(gamma.p)) % prime == 0
-        assert context is None
-        if expected == first:
-            assert prime == first
-
-
 # Levels with a period: division polynomials.
 
 
@@ -311,18 +285,6 @@ def test_psi_vanishes_modulo_a_prime_where_the_order_divides_the_index_and_only_
         for n in range(1, 21):
             found = sum((int(c) * gamma**k for k, c in enumerate(table[n].coeffs())), nmod(0, prime))
             assert (found == 0) is (n % order == 0)
-
-
-def test_an_orbit_on_a_level_of_period_5_comes_back_and_one_beside_it_does_not():
-    block, eps = PlanarBlock(*(fmpq(c) for c in (0, 2, -1, 2))), fmpq(1, 2)
-    point = (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))  # with 2 eps = 1
-    above, below = block.level(point)
-    assert PeriodicLevels(5).squares(block.discriminant, eps) == ((above / below) ** 2,)
-    image = point
-    for _ in range(5):
-        image = block.image(image)
-    assert same_point(image, point)
-    assert plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(1, 3), fmpq(1))).status == "aperiodic"
 
 
 @pytest.mark.parametrize("period", [0, -1, 61])
