@@ -276,7 +276,7 @@ def test_powers_step_by_the_sequences_of_the_map_itself():
 def test_of_several_factors_all_points_have_to_be_within_the_budget():
     map_over = over("euler_top")
     there_and_back = (map_over**-2) @ (map_over**3)
-    for max_bits in range(1000, 9000, 1000):
+    for max_bits in (1000, 2500, 4000):
         expected = [begin(map_over)]
         while (image := there_and_back.integer_step(expected[-1], max_bits)) is not None:
             expected.append(image)

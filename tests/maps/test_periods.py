@@ -115,9 +115,9 @@ def test_in_an_extension_of_a_large_field_too(prime, degree):
 
 
 def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happen():
-    prime = 60_013
+    prime = 10_009
     rng, answers = random.Random(8), Counter()
-    for block, point in planes_over(Finite(prime), rng, 20):
+    for block, point in planes_over(Finite(prime), rng, 40):
         found = plane_period(block, point, prime)
         if found.kind is not Kind.SMOOTH:
             continue
@@ -139,7 +139,7 @@ def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happe
 
 def test_the_order_of_T_is_found_by_baby_and_giant_steps_as_by_adding():
     prime = 10_007
-    for gamma in range(2, 40):
+    for gamma in range(2, 14):
         element = GF(prime).convert(gamma)
         curve = Jacobian(element)
         point, n = curve.T, 1

@@ -123,7 +123,13 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
         a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, 64 * gamma * gamma))
         trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
         middle -= trace if 2 * trace <= unit else trace - unit
-    return _reduced(curve, _annihilator(curve, middle, unit, radius // unit + 2))
+    k = _annihilator(curve, middle, unit, radius // unit + 2)
+    for factor, exponent in fmpz(k).factor():
+        for _ in range(int(exponent)):
+            if curve.multiple(k // int(factor), curve.T) is not None:
+                break
+            k //= int(factor)
+    return k
 
 
 def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
@@ -164,23 +170,6 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
 def _matched(k: int, j: int, point: AffinePoint, babies: list[AffinePoint], unit: int) -> int:
     """k - j or k + j, for k T = `point` = +-j T."""
     return abs(k - j if point[1] == babies[j // unit - 1][1] else k + j)
-
-
-def _reduced(curve: Jacobian, k: int) -> int:
-    """The order of T, which divides k."""
-    for factor, exponent in fmpz(k).factor():
-        for _ in range(int(exponent)):
-            if curve.multiple(k // int(factor), curve.T) is not None:
-                break
-            k //= int(factor)
-    return k
-
-
-def number_of_points(order: int, q: int) -> int | None:
-    """The number of points of the curve if T of this order leaves no choice in the Hasse interval."""
-    radius = isqrt(4 * q)
-    first = -(-(q + 1 - radius) // order) * order
-    return first if first + order > q + 1 + radius else None
 
 
 class LevelCubic:
@@ -245,8 +234,10 @@ class LevelCubic:
         """
         if not self.is_zero(self.multiple(order, P)):
             return False
-        points = number_of_points(order, q)
-        if points is None:
+        # The number of points of the curve, where T of this order leaves no choice in the Hasse interval.
+        radius = isqrt(4 * q)
+        points = -(-(q + 1 - radius) // order) * order
+        if points + order <= q + 1 + radius:
             return None
         unknown = False
         for factor, exponent in fmpz(order).factor():

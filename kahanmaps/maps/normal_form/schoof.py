@@ -85,24 +85,19 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
         prime = next(n for n in range(prime + 1, 2 * prime) if fmpz(n).is_prime())
         if q % prime == 0:
             continue
-        found = _trace_at(prime, divisions[prime], x, c, A, q)
+        f, found = divisions[prime], None
+        while found is None:
+            try:
+                found = _trace_at(prime, _Torsion(f, c, A), x, q)
+            except _Divisor as smaller:
+                f = smaller.divisor
         trace += modulus * ((found - trace) * pow(modulus, -1, prime) % prime)
         modulus *= prime
     return trace, modulus
 
 
-def _trace_at(prime: int, f: Poly, x: Poly, c: Poly, A: Any, q: int) -> int:
-    """The trace modulo an odd prime; f is its division polynomial."""
-    while True:
-        torsion = _Torsion(f, c, A)
-        try:
-            return _matching_trace(prime, torsion, x, q)
-        except _Divisor as found:
-            f = found.divisor
-
-
-def _matching_trace(prime: int, torsion: _Torsion, x: Poly, q: int) -> int:
-    """The t that fits on the points where f is 0. Raises _Divisor."""
+def _trace_at(prime: int, torsion: _Torsion, x: Poly, q: int) -> int:
+    """The trace modulo an odd prime that fits on its torsion points where f is 0. Raises _Divisor."""
     f = torsion.f
     one = 0 * x + 1
     once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))

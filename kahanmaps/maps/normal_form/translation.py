@@ -142,23 +142,17 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
     if is_zero(c):  # the fourth point is Q: period 2 of a translation on the line is excluded, so P_3 = P_1
         raise NoTranslation
     r = (b * a * d / c - b * b) / a
-    x, y = _power_applied((0 * a, a, r, b), n)
-    return (x * P[0] + y * Q[0], x * P[1] + y * Q[1], x * P[2] + y * Q[2])
-
-
-def _power_applied(matrix: tuple[Any, Any, Any, Any], n: int) -> tuple[Any, Any]:
-    """The first column of the n-th power of a 2 x 2 matrix, given by rows."""
-    one = matrix[1] / matrix[1]
-    zero = one - one
-    x, y = one, zero
-    a, b, c, d = matrix
+    # The first column of the n-th power of the matrix with these rows.
+    one = a / a
+    x, y = one, one - one
+    (p, q), (s, t) = (one - one, a), (r, b)
     while n:
         if n & 1:
-            x, y = a * x + b * y, c * x + d * y
+            x, y = p * x + q * y, s * x + t * y
         n >>= 1
         if n:
-            a, b, c, d = a * a + b * c, b * (a + d), c * (a + d), d * d + b * c
-    return x, y
+            p, q, s, t = p * p + q * s, q * (p + t), s * (p + t), t * t + q * s
+    return (x * P[0] + y * Q[0], x * P[1] + y * Q[1], x * P[2] + y * Q[2])
 
 
 def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:

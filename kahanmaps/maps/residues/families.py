@@ -96,7 +96,11 @@ class Family:
         start[:, -1, 0, 0] = 1.0
         weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
         found = np.full((count, terms), TOO_LARGE, dtype=np.int64)
-        walk = _walk(choose_kernel(kernel, long=count >= LONG))
+        walk = _walk_in_flint
+        if choose_kernel(kernel, long=count >= LONG) == "numba":
+            from kahanmaps.maps.residues import curve_kernel
+
+            walk = curve_kernel.kernel()
         exponents = np.array(self.exponents, dtype=np.int64)
         layout = np.array(self.terms, dtype=np.int64)
 
@@ -136,14 +140,6 @@ class Family:
                 total += term * powers[exponents[-1]] % p
             found[:, :, place] = (total % p).T
         return found
-
-
-def _walk(kernel: str) -> Any:
-    if kernel == "numba":
-        from kahanmaps.maps.residues.curve_kernel import kernel as compiled
-
-        return compiled()
-    return _walk_in_flint
 
 
 def _walk_in_flint(

@@ -68,7 +68,10 @@ class RationalOrbit:
                 yield None
                 continue
             image = None if self.relations is None else self.relations.step(last, number)
-            if image is None or self._is_near_the_end(image):
+            # Near the end a factor on the way may have too many bits, which single steps see.
+            if image is None or (
+                self.max_bits is not None and len(self.map.factors) > 1 and 4 * image.bits > self.max_bits
+            ):
                 if self.relations is not None and reached < number - 1:
                     before = self.relations.point(number - 1)
                     if before is not None:
@@ -97,10 +100,6 @@ class RationalOrbit:
             return False
         is_short = self.max_bits is None or 2 * last.bits * number**2 < self.max_bits * reached**2
         return is_short and self.relations.skip(number)
-
-    def _is_near_the_end(self, image: IntegerPoint) -> bool:
-        """Whether a factor on the way may have too many bits, which single steps see."""
-        return self.max_bits is not None and len(self.map.factors) > 1 and 4 * image.bits > self.max_bits
 
     def _stepped(self, point: IntegerPoint, steps: int) -> IntegerPoint | None:
         """The point so many single steps later, or the first one with too many bits."""
