@@ -114,7 +114,7 @@ class IntegerBlock(LevelBlock):
         if len(points) < 2:  # a pole
             points.append(primitive(self.block.image(self.start)))
         first, second = (tuple(one * entry for entry in P) for P in points)
-        return self.block, first, second  # type: ignore[return-value]
+        return self.block, first, second
 
     slack = 0
 

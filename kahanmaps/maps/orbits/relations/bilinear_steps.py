@@ -104,7 +104,7 @@ class _Search:
         if points is None:
             return None
         ahead, here, before, behind = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
-        values = _table(self._products, here, before, prime)
+        values = [[x[i] * y[j] % prime for i, j in self._products] for x, y in zip(here, before, strict=True)]
         if self._used is None:
             chosen = pivots(echelon(values, prime))
             self._products = [self._products[k] for k in chosen]
@@ -116,11 +116,6 @@ class _Search:
         sides = [[f * x % prime for x in one] for f, one in zip(factors, ahead, strict=True)]
         columns = _solved(values, sides, prime)
         return None if columns is None else [[entry for column in columns for entry in column]]
-
-
-def _table(pairs: Pairs, first: Rows, second: Rows, prime: int) -> Rows:
-    """The products of coordinates i of the first and j of the second point, a row for each pair of points."""
-    return [[x[i] * y[j] % prime for i, j in pairs] for x, y in zip(first, second, strict=True)]
 
 
 def _factors(

@@ -108,8 +108,12 @@ class _Search:
         self.groups: Groups = [tuple(range(n))]
         self.earlier: list[list[int | None]] = [[None]] * stride
         if all(one.integer_steps.is_triangular for one in factors):
+            # Each coordinate is to be new some steps ago, and not one that is moved around for ever.
             earlier = [_copies(factors[(k - 1) % len(factors)].equation) for k in range(stride)]
-            if _are_new_at_last(earlier):
+            left = [(k, i) for k in range(stride) for i in range(n)]
+            for _ in range(stride * n):
+                left = [((k - 1) % stride, g) for k, i in left if (g := earlier[k][i]) is not None]
+            if not left:
                 self.groups, self.earlier = [(i,) for i in range(n)], earlier
         self.new = [(k, g) for k, row in enumerate(self.earlier) for g, copied in enumerate(row) if copied is None]
         self.sections: dict[tuple[int, int], Sections] = {}
@@ -138,26 +142,21 @@ class _Search:
             points = self._residues(prime, self.stride * needed)
             if points is None:
                 return None
+            curves: dict[tuple[int, int], Curve] = {}
             try:
-                curves = self._curves(points, prime)
+                for k, g in self.new:
+                    chosen = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
+                    one = curve(chosen, prime, known.get((k, g)))
+                    if one is None:
+                        break
+                    curves[k, g] = one
+                else:
+                    self.sections = {place: one.sections for place, one in curves.items()}
+                    return [group for one in curves.values() for group in one.numbers]
             except ArithmeticError:
                 if known or needed == points_needed(size)[-1]:
                     raise
-                continue
-            if curves is not None:
-                self.sections = {place: one.sections for place, one in curves.items()}
-                return [group for one in curves.values() for group in one.numbers]
         return None
-
-    def _curves(self, points: Rows, prime: int) -> dict[tuple[int, int], Curve] | None:
-        found = {}
-        for k, g in self.new:
-            chosen = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
-            one = curve(chosen, prime, self.sections.get((k, g)))
-            if one is None:
-                return None
-            found[k, g] = one
-        return found
 
     def _residues(self, prime: int, length: int) -> Rows | None:
         """So many points from the start on modulo a prime, one for each step of a factor."""
@@ -181,21 +180,6 @@ def _copies(equation: Equation) -> list[int | None]:
             if a == -b and sorted(change) == [-1] + [0] * (n - 1) + [1] and change[n] == -1:
                 found[unknowns[0]] = change.index(1)
     return found
-
-
-def _are_new_at_last(earlier: Sequence[Sequence[int | None]]) -> bool:
-    """Whether each coordinate was new some steps ago, and is not one that is moved around for ever."""
-    places = [(k, g) for k, row in enumerate(earlier) for g in range(len(row))]
-
-    def was_new(k: int, group: int) -> bool:
-        for _ in places:
-            copied = earlier[k][group]
-            if copied is None:
-                return True
-            k, group = (k - 1) % len(earlier), copied
-        return False
-
-    return all(was_new(*place) for place in places)
 
 
 def _is_proved(start: IntegerPoint, search: _Search, steps: EllipticSteps) -> bool:
