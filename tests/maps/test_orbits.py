@@ -293,6 +293,8 @@ def test_iterates_stop_where_numbers_would_be_too_long():
         KahanMap(system, "1/10"), [1, 2, 3, 4], at=[5, 10**5, 10**6], normal_form=normal_form, max_digits=1000
     )
     assert [point.step for point in iterates] == [5]
+    assert [point.step for point in iterates.first] == [5]
+    assert "more than the budget of 1000" in iterates._repr_html_()
     assert (iterates.end.status, iterates.end.steps) == ("budget", 5)
     assert iterates.end.message.startswith("step 100000 cannot be reached: step ")
     assert "more than the budget of 1000 (--max-digits)" in iterates.end.message

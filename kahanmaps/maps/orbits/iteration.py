@@ -190,7 +190,7 @@ class Orbit(Displayed):
         self.first, self.last = [], None
         try:
             for point in self._points() if self.at is None else self._iterates(self.at):
-                if point.step < FIRST_POINTS:
+                if len(self.first) < FIRST_POINTS:
                     self.first.append(point)
                 self.last = point
                 yield point
