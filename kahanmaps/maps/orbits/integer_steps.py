@@ -52,7 +52,6 @@ class IntegerSteps:
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
         self._substitution = forward_substitution(exponents, self._forms, n)
         self._constant = None if self._substitution else self._constant_rows()
-        self._rows = None if self._degree == 1 or self._constant else [self._without_powers(i) for i in range(n)]
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
@@ -91,8 +90,7 @@ class IntegerSteps:
     def determinant(self, point: IntegerPoint) -> fmpq:
         """det M(x)."""
         matrix, _ = self._equation(point)
-        degrees = [self._degree] * self.dim if self._rows is None else [sum(row[0][0]) for row in self._rows]
-        return fmpq(matrix.det(), self._scale * point.denominator ** sum(degrees))
+        return fmpq(matrix.det(), self._scale * point.denominator ** (self._degree * self.dim))
 
     def is_image(self, point: IntegerPoint, image: IntegerPoint) -> bool:
         """Whether the map is sure to have this value there."""
@@ -124,27 +122,12 @@ class IntegerSteps:
         return [*(int(entry) for entry in image.entries()), 1]
 
     def _equation(self, point: IntegerPoint) -> tuple[fmpz_mat, fmpz_mat]:
-        """M(x) and r(x), each row times a common denominator of its coefficients and the least power of W."""
+        """M(x) and r(x), each row times a common denominator of its coefficients and a power of W."""
         n, X = self.dim, [*point.numerators, point.denominator]
-        if self._rows is not None:
-            values = [(forms * _monomials(X, exponents)).entries() for exponents, forms in self._rows]
-        else:
-            column = fmpz_mat(n + 1, 1, X) if self._degree == 1 else _monomials(X, self._exponents)
-            values = fmpz_mat(n, n + 1, (self._forms * column).entries()).tolist()
-        return fmpz_mat([row[:n] for row in values]), fmpz_mat([[row[n]] for row in values])
-
-    def _without_powers(self, i: int) -> tuple[list[Exponents], fmpz_mat]:
-        """The monomials of a row, without the power of W that they share, and its forms of these."""
-        forms = self._forms.tolist()[i * (self.dim + 1) : (i + 1) * (self.dim + 1)]
-        used = [k for k in range(len(self._exponents)) if any(form[k] for form in forms)] or [0]
-        shared = min(self._exponents[k][-1] for k in used)
-        exponents = [(*self._exponents[k][:-1], self._exponents[k][-1] - shared) for k in used]
-        return exponents, fmpz_mat([[form[k] for k in used] for form in forms])
-
-
-def _monomials(X: Sequence[fmpz], exponents: Sequence[Exponents]) -> fmpz_mat:
-    """Their values in a column."""
-    return fmpz_mat(len(exponents), 1, [_monomial(X, exponent) for exponent in exponents])
+        monomials = X if self._degree == 1 else [_monomial(X, exponents) for exponents in self._exponents]
+        values = (self._forms * fmpz_mat(len(monomials), 1, monomials)).entries()
+        rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
+        return fmpz_mat([row[:n] for row in rows]), fmpz_mat([row[n:] for row in rows])
 
 
 def _monomial(X: Sequence[Any], exponents: Exponents) -> fmpz:
