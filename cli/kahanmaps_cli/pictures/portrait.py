@@ -172,9 +172,9 @@ def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, o
             )
         return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
     if options["starts"] is not None or options["count"] is not None:
-        from kahanmaps_cli.runs.ensemble_starts import asked_starts
+        from kahanmaps_cli.runs.ensemble_starts import requested_starts
 
-        return asked_starts(file, options)
+        return requested_starts(file, options)
     if field is None:
         raise lib.InputError(
             f"found no starts for {file.map.kind}, expected --start X, --starts FILE or --random N: they are "
