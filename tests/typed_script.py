@@ -24,7 +24,7 @@ def script() -> None:
     print(len(walk), walk[-1].text, [point.step for point in walk[1:3]], [point.x for point in walk])
     phi = km.map("euler_top", "1/10")
     print(phi([1, 2, 3]), (phi**-2 @ phi)([1, 2, 3]), top.at("1/10").inverse, top("1/10"))
-    print(km.cycles("weierstrass", 101, eps="1/10").lengths, km.lyapunov("lorenz", [1, 2, 3], "1/100", 100).mean)
+    print(km.cycles("weierstrass", eps="1/10", prime=101).lengths, km.lyapunov("lorenz", [1, 2, 3], "1/100", 100).mean)
     print(km.orbit(phi @ phi, np.array([1, 2, 3]), steps=2), km.orbit(fish, [1, 0], "1/10", 5, arithmetic=km.GF(7)))
     print(km.check_integrals(fish, "p^2", eps="1/10").holds, km.check_measure(fish, "p").rows())
     print(km.check_poisson(fish, [["0", "1"], ["-1", "0"]]).to_json(), km.heights(fish, "1/5", starts=[1, 2]).to_json())
@@ -34,7 +34,7 @@ def script() -> None:
         km.heights(top.map, "1/10", seconds=1).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence
     )
 
-    km.degrees(3)  # type: ignore[call-overload]
-    km.degrees("euler_top", max_tems=4)  # type: ignore[call-overload]
+    km.degrees(3)  # type: ignore[arg-type]
+    km.degrees("euler_top", max_tems=4)  # type: ignore[call-arg]
     print(km.degrees("euler_top").growth_txt)  # type: ignore[attr-defined]
     km.check_commute("euler_top", 3)  # type: ignore[arg-type]

@@ -15,13 +15,13 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.poisson import GivenTensor
 
 
-def settings_and_claim(settings: Settings | Any, extra: Any) -> tuple[Settings, Any]:
-    """The two in this order: a claim may stand in the place of the settings."""
+def settings_and_claim(settings: Settings | Any, extra: Any, eps: Any, time_step: Any) -> tuple[Settings, Any]:
+    """The two in this order, at an eps or time step if one is given: a claim may stand in the place of the settings."""
     if settings is None or isinstance(settings, Settings):
-        return settings or Settings(), extra
+        return Settings.of(settings, eps, time_step), extra
     if extra is not None:
         raise InputError(f"found claims as second and as third argument, expected Settings, not {settings!r}")
-    return Settings(), settings
+    return Settings.of(None, eps, time_step), settings
 
 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:

@@ -15,10 +15,11 @@ from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -73,7 +74,13 @@ def _require_another_than_identity(file: SystemFile, letter: str, map_: Biration
 
 
 def check_commute(
-    file: SystemFile, other: SystemFile | None = None, settings: Settings | None = None, eps2: fmpq | None = None
+    system: SystemLike,
+    other: SystemLike | None = None,
+    settings: Settings | None = None,
+    eps2: Any = None,
+    *,
+    eps: Any = None,
+    time_step: Any = None,
 ) -> Report:
     """Do the Kahan maps of two systems commute; of one member of the family: all its rational associated maps?
 
@@ -82,7 +89,7 @@ def check_commute(
     them commuting would be worthless. Raises InputError where there is nothing to compare, and where one of the maps is
     the identity at the parameters and the eps in force.
     """
-    settings = settings or Settings()
+    file, settings = as_file(system), Settings.of(settings, eps, time_step)
     if other is None:
         if eps2 is not None:
             raise InputError("a second step needs a second system: kahanmaps check-commute SYSTEM OTHER --eps2 E")
@@ -92,7 +99,7 @@ def check_commute(
                 "give a second system, or one of kind [family], whose associated maps are compared pairwise"
             )
         return _check_member(file, file.member, settings)
-    return _check_pair(file, other, settings, eps2)
+    return _check_pair(file, as_file(other), settings, eps2)
 
 
 def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: fmpq | None) -> Report:

@@ -20,6 +20,7 @@ from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.family.associated import FamilyMember
@@ -34,7 +35,7 @@ from kahanmaps.invariants.integrals import (
 from kahanmaps.invariants.normalize import measured_integrals
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, orbit_about
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 # The integrals that are also tried along an orbit, where there are many.
@@ -129,11 +130,13 @@ def functions_along(
 
 
 def check_integrals(
-    file: SystemFile,
+    system: SystemLike,
     settings: Settings | Any = None,
     extra: Mapping[str, Any] | Any = None,
     *,
     known: bool = False,
+    eps: Any = None,
+    time_step: Any = None,
 ) -> Report:
     """Are the integrals `extra` conserved; without them, those of theorems and of the file: identically, on an orbit?
 
@@ -146,7 +149,8 @@ def check_integrals(
     >>> str(check_integrals(System("x' = y; y' = -x"), "x^2 + y^2").verdict)
     'proved'
     """
-    settings, extra = settings_and_claim(settings, extra)
+    file = as_file(system)
+    settings, extra = settings_and_claim(settings, extra, eps, time_step)
     claims, of_file = claimed_functions(file, extra), {**file.integrals, **file.integrals_in_iterates}
     for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)

@@ -14,7 +14,7 @@ from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import Settings, run_orbit
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import (
     ClaimedDensity,
@@ -31,7 +31,7 @@ from kahanmaps.invariants.poisson import (
     transformation_sides,
 )
 from kahanmaps.maps.implicit import BirationalMap, MapOver
-from kahanmaps.maps.kahan import Kahan, KahanMap, as_map
+from kahanmaps.maps.kahan import Kahan, KahanMap, SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _NO_TENSOR = "the map seems to have no value, or the tensor or a denominator to vanish identically"
@@ -84,11 +84,13 @@ def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def check_measure(
-    file: SystemFile,
+    system: SystemLike,
     settings: Settings | Any = None,
     extra: RationalFunction | Any = None,
     *,
     known: bool = False,
+    eps: Any = None,
+    time_step: Any = None,
 ) -> Report:
     """Is dx/phi invariant for phi = `extra`; without it, for det(I - eps f') of Hamiltonian systems and the [density]?
 
@@ -100,7 +102,8 @@ def check_measure(
     >>> str(check_measure(System("x' = x*(1 - y); y' = y*(x - 2)"), "x*y").verdict)
     'proved'
     """
-    settings, extra = settings_and_claim(settings, extra)
+    file = as_file(system)
+    settings, extra = settings_and_claim(settings, extra, eps, time_step)
     candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
 
     def add(function: RationalFunction) -> None:
@@ -176,14 +179,22 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
     return Identity(dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, no_value=_NO_TENSOR, subject=subject)
 
 
-def check_poisson(file: SystemFile, settings: Settings | Any = None, extra: GivenTensor | Any = None) -> Report:
+def check_poisson(
+    system: SystemLike,
+    settings: Settings | Any = None,
+    extra: GivenTensor | Any = None,
+    *,
+    eps: Any = None,
+    time_step: Any = None,
+) -> Report:
     """Is `extra`, or without it Pi(x) = J - eps^2 f'(x)^2 J, a Poisson tensor that the map preserves?
 
     `extra` is a tensor or a matrix of formulas, in the place of the settings if there are none. Raises InputError for
     systems without a Hamiltonian where no tensor is given, for a tensor of another dimension, and for one that is
     identically zero at the parameters and the eps in force.
     """
-    settings, extra = settings_and_claim(settings, extra)
+    file = as_file(system)
+    settings, extra = settings_and_claim(settings, extra, eps, time_step)
     extra = claimed_tensor(file, extra)
     proof, source, condition = None, "", ""
     tensor: PoissonTensor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flint import fmpq
@@ -17,7 +17,7 @@ from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.maps.convention import eps_record
+from kahanmaps.maps.convention import eps_record, resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
@@ -59,6 +59,12 @@ class Settings:
         require_short(self.eps, [x for x in self.start or () if isinstance(x, fmpq)], self.max_digits)
         if not 1 <= self.error_bits <= 10_000:
             raise InputError(f"found an error bound of {self.error_bits} bits, expected 1 to 10000")
+
+    @classmethod
+    def of(cls, settings: Settings | None, eps: Any, time_step: Any) -> Settings:
+        """The settings, or the defaults, at an eps or time step if one is given."""
+        settings, eps = settings or cls(), resolve_eps(eps, time_step)
+        return settings if eps is None else replace(settings, eps=eps)
 
     def cut_short(self, run: OrbitRun) -> bool:
         """Whether an orbit that the user asked for ended early."""

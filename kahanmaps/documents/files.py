@@ -245,16 +245,6 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
         return parse_system(data, str(path), parameters)
 
 
-def map_at(file: SystemFile, eps: Any = None) -> MapOver:
-    """The map of a file at an exact eps: callable, and composed by @ and powers. Raises InputError where eps lacks.
-
-    >>> from kahanmaps.documents.catalog import load
-    >>> map_at(load("euler_top"), "1/10")([1, 2, 3])
-    (65/37, 10/37, 125/37)
-    """
-    return file.at(eps)
-
-
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:
     """The system that a text in TOML describes, or one in lines as XPP has them; `where` names it in messages.
 

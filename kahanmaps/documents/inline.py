@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.expressions import formula_text, number, roots_named, sides_of_equations
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.kahan import SystemLike
 
 
 def inline_file(
@@ -79,7 +83,16 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-def file_of(given: Any) -> SystemFile:
+def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> MapOver:
+    """The map of a system at an exact eps: callable, and composed by @ and powers. Raises InputError where eps lacks.
+
+    >>> map_at("euler_top", "1/10")([1, 2, 3])
+    (65/37, 10/37, 125/37)
+    """
+    return as_file(system).at(resolve_eps(eps, time_step))
+
+
+def as_file(given: Any) -> SystemFile:
     """The file that anything stands for: a file, a system, a name of the catalogue, a path, or equations as text.
 
     Raises InputError for anything else.

@@ -9,12 +9,14 @@ from flint import fmpq_poly
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.written.text import format_polynomial, format_rational_function, format_univariate
 from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.family.tensor import GENERATOR, inherited_density, inherited_integrals, over_algebra
+from kahanmaps.maps.kahan import SystemLike
 
 
-def tensor_file(file: SystemFile, chi: fmpq_poly) -> SystemFile:
+def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
     """The system of a file over K = Q[t]/(chi), as a file over Q; a parameter t of the file is the generator of K.
 
     Integrals and density are inherited, but where the file has a parameter t, which they may depend on, or where they
@@ -25,12 +27,13 @@ def tensor_file(file: SystemFile, chi: fmpq_poly) -> SystemFile:
     >>> found.dim, list(found.integrals)
     (6, ['F1_0', 'F1_1', 'F2_0', 'F2_1'])
     """
+    file = as_file(system)
     symbols = [GENERATOR] if GENERATOR in file.parameters else []
-    system = over_algebra(with_symbols(file, symbols), chi)
+    lifted = over_algebra(with_symbols(file, symbols), chi)
     document: dict[str, Any] = {
         "name": f"{file.name} over Q[t]/({format_univariate(chi)})",
-        "variables": list(system.variables),
-        "system": {"rhs": [format_polynomial(polynomial) for polynomial in system.rhs]},
+        "variables": list(lifted.variables),
+        "system": {"rhs": [format_polynomial(polynomial) for polynomial in lifted.rhs]},
     }
     if not symbols:
         try:

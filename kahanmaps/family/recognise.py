@@ -17,6 +17,7 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 
@@ -28,7 +29,7 @@ from kahanmaps.family.associated import FamilyMember, sign_polynomial
 from kahanmaps.family.cubics import third_derivatives
 from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix, factors_of_chi
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 32  # as for the members that are drawn; the unknowns are n(n-1)/2
 _DRAWS = 24  # small combinations that are tried beside the basis
@@ -184,14 +185,14 @@ def recognised_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
 
-def recognised_member_of(system: QuadraticSystem) -> RecognisedMember | None:
+def recognised_member_of(system: QuadraticSystem | Any) -> RecognisedMember | None:
     """`recognised_member` of the system, where x' = J grad H with the standard J; None otherwise.
 
     >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
     >>> print(recognised_member_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
     H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)
     """
-    hamiltonian = recognised_hamiltonian(system)
+    hamiltonian = recognised_hamiltonian(as_system(system))
     return None if hamiltonian is None else recognised_member(hamiltonian)
 
 

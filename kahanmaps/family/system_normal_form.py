@@ -7,13 +7,13 @@ one all the same if linear algebra finds an A for its Hamiltonian (`recognise`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flint import fmpq_mat
 
 from kahanmaps.errors import HypothesisError
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
@@ -50,7 +50,7 @@ class NoNormalForm:
 
 
 def system_normal_form(
-    system: QuadraticSystem, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
+    system: QuadraticSystem | Any, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
 ) -> SystemNormalForm | NoNormalForm:
     """The normal form of a system, from what is known of it: a member, its Hamiltonian, or nothing.
 
@@ -62,6 +62,7 @@ def system_normal_form(
     from kahanmaps.family.planar import normal_form
     from kahanmaps.family.recognise import reason_against, recognised_hamiltonian, recognised_member
 
+    system = as_system(system)
     if system.dim > _MAX_DIMENSION:
         return NoNormalForm(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
     declared, T = member is not None, None

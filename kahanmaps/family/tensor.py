@@ -12,6 +12,7 @@ import itertools
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz_mat
 
@@ -22,7 +23,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.algebra.written.text import format_univariate
 from kahanmaps.errors import InputError
 from kahanmaps.family.skew_hamiltonian import evaluate_at_matrix
-from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
+from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
 
 GENERATOR = "t"
 _LARGEST = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
@@ -126,7 +127,7 @@ class TensorStructure:
         return f"{what} over K = Q[t]/({self.chi_text}){note}"
 
 
-def tensor_structure(system: QuadraticSystem) -> TensorStructure | None:
+def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
     """The largest algebra K = Q[C] over which this is a system, or None where that is Q, or no single C generates it.
 
     All C with C f'(x) = f'(x) C are found by linear algebra over Q, up to dimension 12; where they do not commute with
@@ -138,6 +139,7 @@ def tensor_structure(system: QuadraticSystem) -> TensorStructure | None:
     >>> tensor_structure(QuadraticSystem.from_text(["x", "y"], ["y^2", "x^2 + y"])) is None
     True
     """
+    system = as_system(system)
     if system.dim > _LARGEST or system.symbols:
         return None
     space = centroid(system)

@@ -21,7 +21,7 @@ from typing import Any
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
@@ -29,6 +29,8 @@ from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Known, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
@@ -120,10 +122,11 @@ class Analysis(Findings, Printed):
 
 
 def analyze(
-    file: SystemFile,
+    system: SystemLike,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    time_step: Any = None,
     seconds: float | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -134,10 +137,11 @@ def analyze(
     """What a map preserves and how it grows, within a time budget.
 
     Args:
-        file: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an
+        system: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an
             algebraic parameter what is not done over a number field is named in `skipped`.
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
-        eps: an exact number, to analyse the map at that eps only (time step 2 eps); None for every eps.
+        eps: an exact number, to analyse the map at that eps only; None for every eps.
+        time_step: 2 eps, in its place.
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
         seed: of everything random.
         progress: is told what is being done.
@@ -157,6 +161,7 @@ def analyze(
     >>> found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth
     ('integrable', 1, 'quadratic')
     """
+    file, eps = as_file(system), resolve_eps(eps, time_step)
     if seconds is not None and not (seconds > 0 and math.isfinite(seconds)):
         raise InputError(f"found {seconds} seconds, expected a positive number")
     laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work

@@ -18,15 +18,15 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.fields import GF, integer, rational
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 2_000_000  # of a whole space, up to dimension 6; half as many with each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
@@ -86,10 +86,11 @@ class Census(Printed):
 
 
 def cycle_census(
-    given: QuadraticSystem | BirationalMap,
-    eps: Any,
-    prime: int,
+    system: SystemLike,
+    eps: Any = None,
+    prime: int = 0,
     *,
+    time_step: Any = None,
     samples: int | None = None,
     steps: int = DEFAULT_STEPS,
     seed: int = 0,
@@ -109,7 +110,7 @@ def cycle_census(
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
-    exact_eps, map_ = rational(eps), as_map(given)
+    exact_eps, map_, prime = rational(resolve_eps(eps, time_step)), as_map(system), integer(prime, "prime")
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
     space = _ProjectiveMap(map_, exact_eps, prime, None if seconds is None else time.monotonic() + seconds)

@@ -20,9 +20,11 @@ from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.written.numerals import is_name
 from kahanmaps.algebra.written.reading import Notation, terms_of
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.latex import write_latex
+from kahanmaps.maps.kahan import SystemLike
 
 LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
 PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
@@ -36,7 +38,7 @@ _FREE = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]
 
 
 def convert(
-    file: SystemFile,
+    system: SystemLike,
     language: str,
     what: Iterable[str] | None = None,
     *,
@@ -49,7 +51,7 @@ def convert(
     A system stands for its Kahan map.
 
     Args:
-        file: the system; its parameters are written as the numbers that the file gives.
+        system: the system; its parameters are written as the numbers that the file gives.
         language: one of `LANGUAGES`.
         what: of `PARTS`; None for the system, the map, and integrals and density where they are known.
         name: put before the names of all functions, so that two systems fit into one session; in LaTeX nothing.
@@ -77,7 +79,7 @@ def convert(
         raise InputError(f"found the language {str(language)[:40]!r}, expected one of {', '.join(LANGUAGES)}")
     if name and not (is_name(name) and name[0] != "_"):
         raise InputError(f"found the name {name[:40]!r}, expected a letter, then letters, digits and _")
-    formulas = Formulas(file, symbols)
+    formulas = Formulas(as_file(system), symbols)
     parts = _parts(what, formulas)
     if language == "latex":
         return write_latex(formulas, parts, command)

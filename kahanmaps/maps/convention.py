@@ -11,12 +11,23 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.written.text import format_number
+from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
 NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
 NO_EPS = "the map does not depend on eps"
+
+
+def resolve_eps(eps: Any, time_step: Any) -> Any:
+    """Return eps, given as itself or by the time step 2 eps; None where neither is given."""
+    if time_step is None:
+        return eps
+    if eps is not None:
+        raise InputError("found eps and time_step, expected one of them: the time step is 2 eps")
+    return rational(time_step) / 2
 
 
 def _time_steps(maps: tuple[BirationalMap, ...]) -> list[int]:

@@ -15,20 +15,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
-from kahanmaps.algebra.written.numerals import wrong_kind
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver, nonzero_eps
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+
+
+class HasMap(Protocol):
+    """A system file."""
+
+    @property
+    def map(self) -> BirationalMap: ...
+
+
+# What `as_map` takes.
+SystemLike: TypeAlias = (
+    "str | Path | HasMap | QuadraticSystem | BirationalMap | CubicHamiltonian | FamilyMember | AssociatedSystem"
+)
 
 
 class KahanMapOver(StepOver):
@@ -210,8 +228,16 @@ class Kahan(BirationalMap):
         return f"Kahan({', '.join(self.variables)})"
 
 
-def as_map(given: QuadraticSystem | BirationalMap) -> BirationalMap:
-    """A map as it is; a quadratic system stands for its Kahan map."""
-    if not isinstance(given, QuadraticSystem | BirationalMap):
-        raise wrong_kind(given, "a system or a map", "km.load(...).system is one, and km.load(...).map")
-    return Kahan(given) if isinstance(given, QuadraticSystem) else given
+def as_map(value: SystemLike) -> BirationalMap:
+    """Return the map that a value stands for; a system, however it is given, stands for its Kahan map.
+
+    A map, a system, a system file, a member of the family, a catalogue name, a path, or equations as text. Raises
+    InputError for anything else.
+    """
+    if isinstance(value, QuadraticSystem):
+        return Kahan(value)
+    if isinstance(value, BirationalMap):
+        return value
+    # Names and paths are read on a floor above, which is loaded only where one of them is given.
+    found: BirationalMap = import_module("kahanmaps.documents.inline").as_file(value).map
+    return found

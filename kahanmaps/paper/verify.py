@@ -32,13 +32,14 @@ from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.maps.convention import CONVENTION
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.paper import objects_over
 from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
 from kahanmaps.paper.objects import PaperObjects
@@ -57,11 +58,13 @@ NOTE_ON_PROOFS = (
 
 
 def verify(
-    file: SystemFile | None = None,
+    system: SystemLike | None = None,
     settings: Settings | None = None,
     options: VerifyOptions | None = None,
     *,
     m: int | None = None,
+    eps: Any = None,
+    time_step: Any = None,
 ) -> Report:
     """Every claim of the paper for a member of the family.
 
@@ -78,11 +81,12 @@ def verify(
     >>> str(report.verdict), report.findings[1].claim
     ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
     """
-    if (file is None) == (m is None):
+    settings = Settings.of(settings, eps, time_step)
+    if (system is None) == (m is None):
         raise InputError("expected a member of the family, or m: half the dimension of the one in general")
-    if file is None:
+    if system is None:
         return verify_universal(m or 0, settings, options)
-    settings, options = settings or Settings(), options or VerifyOptions()
+    file, options = as_file(system), options or VerifyOptions()
     member = file.member
     if member is None:
         raise InputError(

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.inline import file_of
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.floats.doubles import start_rows
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.automatic_starts import automatic_starts
@@ -54,7 +55,7 @@ class Plot:
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
         """As `km.portrait`."""
-        return draw_orbits(file_of(given), *others, **options)
+        return draw_orbits(given, *others, **options)
 
 
 def _require(found: Any, kind: type, expected: str) -> None:
@@ -63,19 +64,25 @@ def _require(found: Any, kind: type, expected: str) -> None:
 
 
 def draw_orbits(
-    file: SystemFile, starts: Any = None, eps: Any = None, steps: int = 1000, *, axes: Sequence[int] = (0, 1)
+    system: SystemLike,
+    starts: Any = None,
+    eps: Any = None,
+    steps: int = 1000,
+    *,
+    time_step: Any = None,
+    axes: Sequence[int] = (0, 1),
 ) -> Axes:
     """The float orbits of a map as a portrait in two coordinates: `plot portrait` has all that may be drawn beside.
 
     Args:
-        file: the map.
+        system: the map.
         starts: one start or many; by default those that `plot portrait` takes, around the fixed points of the field.
         eps: an exact number, half the time step where there is one.
         steps: of each orbit.
         axes: the numbers of the two coordinates.
     """
-    rounded = file.rounded
-    value = rounded.at(eps).eps
+    rounded = as_file(system).rounded
+    value = rounded.at(resolve_eps(eps, time_step)).eps
     if starts is None:
         starts = automatic_starts(rounded.system, value, axes)
     x = start_rows(starts)

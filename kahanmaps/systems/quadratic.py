@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
@@ -291,6 +292,14 @@ class SystemOver:
             return tuple(
                 (self.hessian_times(x) * column_y * half + self.B * (column_x + column_y) * half + self.c).entries()
             )
+
+
+def as_system(value: Any) -> QuadraticSystem:
+    """Return the quadratic system that a value stands for: all that `maps.kahan.as_map` takes, but for other maps."""
+    if isinstance(value, QuadraticSystem):
+        return value
+    found: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
+    return found
 
 
 def _indices(monomial: Sequence[int]) -> list[int]:

@@ -28,7 +28,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.displayed import Printed
@@ -51,9 +51,9 @@ from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMENSION, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
 from kahanmaps.laboratory.singular.written import with_eps
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.kahan import SystemLike, as_map
 
 _MOST_TERMS = 10_000
 _LINES = 2
@@ -272,9 +272,10 @@ class DegreeGrowth(Printed):
 
 
 def degree_growth(
-    system: QuadraticSystem | BirationalMap,
+    system: SystemLike,
     eps: Any = None,
     *,
+    time_step: Any = None,
     seconds: float = SECONDS["degrees"],
     max_terms: int | None = None,
     max_degree: int = ITERATE_DEGREE,
@@ -284,7 +285,7 @@ def degree_growth(
     enclosed: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
-    """The degrees of the iterates of a map, for one exact `eps` or generic eps; a system stands for its Kahan map.
+    """The degrees of the iterates of a map, for one exact `eps` or `time_step` = 2 eps, or generic eps.
 
     Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and it is explained by
     the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
@@ -301,12 +302,13 @@ def degree_growth(
     >>> found.degrees[:6], str(found.growth), found.recurrence.closed_form
     ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')
     """
+    eps = resolve_eps(eps, time_step)
     exact = None if eps is None else rational(eps)
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if not (seconds > 0 and math.isfinite(seconds)):
         raise InputError(f"found {seconds} seconds, expected a positive number")
-    if max_terms is not None and not 0 <= max_terms <= _MOST_TERMS:
+    if max_terms is not None and not 0 <= integer(max_terms, "max_terms") <= _MOST_TERMS:
         raise InputError(f"found {max_terms} terms, expected 0 to {_MOST_TERMS}")
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")

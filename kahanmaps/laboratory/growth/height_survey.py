@@ -25,9 +25,8 @@ from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, height_growth
 from kahanmaps.laboratory.defaults import SECONDS
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike, as_map
 
 DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
 DEFAULT_STARTS = 3
@@ -117,9 +116,10 @@ class HeightSurvey(Printed):
 
 
 def height_survey(
-    given: QuadraticSystem | BirationalMap,
+    system: SystemLike,
     eps: Any = None,
     *,
+    time_step: Any = None,
     starts: Sequence[Any] | int = DEFAULT_STARTS,
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
@@ -130,17 +130,17 @@ def height_survey(
 ) -> HeightSurvey:
     """The growth of heights along exact orbits over Q from given starts, or so many random ones, for one or two eps.
 
-    `given` is the map; a system stands for its Kahan map.
-    `eps` is one exact number (time step 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a number;
-    after `seconds` no orbit is begun, and the one in flight ends. A random start whose orbit meets a singular point is
-    replaced by another.
-    Raises InputError for wrong values.
+    A system stands for its Kahan map.
+    `eps` is one exact number (or `time_step` = 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a
+    number; after `seconds` no orbit is begun, and the one in flight ends. A random start whose orbit meets a singular
+    point is replaced by another. Raises InputError for wrong values.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
     >>> found.kind, found.text
     (<Growth.QUADRATIC: 'quadratic'>, 'bit lengths grow quadratically on all 4 exact orbits tried, at 2 values of eps')
     """
+    eps = resolve_eps(eps, time_step)
     if isinstance(starts, int) and not 1 <= starts <= _MOST_STARTS:
         raise InputError(f"found {starts} starts, expected 1 to {_MOST_STARTS}")
     if not isinstance(starts, int) and len(starts) == 0:
@@ -151,7 +151,7 @@ def height_survey(
         raise InputError(f"found {seconds} seconds, expected a positive number")
     deadline = time.monotonic() + seconds
     orbits: list[SurveyedOrbit] = []
-    map_ = as_map(given)
+    map_ = as_map(system)
     field = "" if map_.root is None else map_.root.number_field.name
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
         over = map_.at(value)

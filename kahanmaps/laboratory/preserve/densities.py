@@ -22,7 +22,7 @@ from kahanmaps.algebra.written.text import format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -40,6 +40,8 @@ from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integral
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
@@ -148,10 +150,11 @@ class DensitySearch(Search):
 
 
 def find_densities(
-    file: SystemFile,
+    system: SystemLike,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    time_step: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
@@ -162,9 +165,10 @@ def find_densities(
     """The polynomials phi of the least degree for which the map preserves dx/phi; failing these, a product of powers.
 
     Args:
-        file: the map; a differential equation stands for its Kahan map.
+        system: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        eps: an exact number, or None for formulas that contain eps.
+        time_step: 2 eps, in its place.
         flow: ask for those of the differential equation instead, div(f/phi) = 0.
         max_degree: of phi; by default as the number of unknowns allows, at most 12.
         integrals: those that are known: where nothing else is found phi may be a product of powers of their factors.
@@ -186,6 +190,7 @@ def find_densities(
     >>> [(one.text, str(one.verdict)) for one in found.densities]
     [('x*y', 'proved')]
     """
+    file, eps = as_file(system), resolve_eps(eps, time_step)
     require_time(seconds)
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")

@@ -24,7 +24,7 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_factored, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import latex
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.defaults import SECONDS
@@ -52,6 +52,8 @@ from kahanmaps.laboratory.preserve.search import (
     search,
     take_relations,
 )
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
@@ -236,10 +238,11 @@ class IntegralSearch(Search):
 
 
 def find_integrals(
-    file: SystemFile,
+    system: SystemLike,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    time_step: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
     seconds: float = SECONDS["integrals"],
@@ -249,9 +252,10 @@ def find_integrals(
     """Independent integrals of a map in closed form, each with its verdict.
 
     Args:
-        file: the map; a differential equation stands for its Kahan map.
+        system: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, the formulas are then for this eps only; None: formulas contain eps (time step 2 eps).
+        eps: an exact number, the formulas are then for this eps only; None: formulas contain eps.
+        time_step: 2 eps, in its place.
         flow: ask for the rational integrals of the differential equation instead.
         max_degree: the largest degree of relations along orbits; by default as dimension and time allow.
         seconds: the time that the search may take, about.
@@ -272,6 +276,7 @@ def find_integrals(
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
     ([('-y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
+    file, eps = as_file(system), resolve_eps(eps, time_step)
     require_time(seconds)
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")

@@ -21,6 +21,7 @@ from flint import fmpq, fmpz
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.invariants.growth import OF_DEGREES, Growth
@@ -32,7 +33,9 @@ from kahanmaps.laboratory.scan.members import Scanned, point_on
 from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Degrees, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import processors
 
 Progress = Callable[[str], None]
@@ -74,10 +77,11 @@ _MEASURED_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
 def scan(
-    file: SystemFile,
+    system: SystemLike,
     over: Sequence[str],
     *,
     eps: Any = None,
+    time_step: Any = None,
     terms: int | None = None,
     primes: Sequence[int] | None = None,
     seconds: float = DEFAULT_SECONDS,
@@ -89,9 +93,10 @@ def scan(
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
 
     Args:
-        file: the family; its claims are not looked at.
+        system: the family; its claims are not looked at.
         over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
+        time_step: 2 eps, in its place.
         terms: how many iterates are measured, by default as many as have small degrees, at most 7.
         primes: at least three primes, by default such that the members are some ten thousand.
         seconds: time for everything, about; what was left out then is said.

@@ -55,9 +55,10 @@ from kahanmaps.laboratory.singular.written import (
     period_of,
     written,
 )
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.inverse import TooLarge
-from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -164,9 +165,10 @@ class SingularityRun(Printed):
 
 
 def singularities(
-    system: QuadraticSystem | BirationalMap,
-    eps: Any,
+    system: SystemLike,
+    eps: Any = None,
     *,
+    time_step: Any = None,
     steps: int | None = None,
     seed: int = 0,
     seconds: float = SECONDS["singularities"],
@@ -185,7 +187,7 @@ def singularities(
     >>> run.denominator, str(run.verdict)
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
-    map_, exact_eps = as_map(system), rational(eps)
+    map_, exact_eps = as_map(system), rational(resolve_eps(eps, time_step))
     if map_.refusal:
         raise InputError(map_.refusal)
     if map_.dim > MAX_DIMENSION:

@@ -45,9 +45,8 @@ from kahanmaps.laboratory.symmetry.commuting_space import (
     unknowns,
 )
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan
-from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
 MAX_TOLD = 6  # sentences about equations that were not solved
@@ -162,7 +161,7 @@ class CommutingSystems(Printed):
 
 
 def commuting_systems(
-    system: QuadraticSystem,
+    system: SystemLike,
     shape: str | None = None,
     *,
     seed: int = 0,
@@ -183,6 +182,7 @@ def commuting_systems(
     >>> [(g.trivial, str(g.finding.verdict)) for g in commuting_systems(f).solutions]
     [('0', 'proved'), ('f', 'proved'), ('-f', 'proved')]
     """
+    system = as_system(system)
     if shape is None:
         if system.dim <= QUICK_DIMENSION:
             quick = min(seconds, QUICK_SECONDS)
@@ -352,7 +352,7 @@ class _Search:
 
 
 def find_commuting(
-    given: QuadraticSystem | BirationalMap,
+    system: SystemLike,
     shape: str | None = None,
     *,
     seed: int = 0,
@@ -362,9 +362,9 @@ def find_commuting(
 ) -> CommutingSystems:
     """All quadratic g whose Kahan map commutes with that of f at the same eps, over Q or the number field of f.
 
-    `given` is f, or its Kahan map, with an algebraic number in it or none; the rest is as for `commuting_systems`. Over
-    a number field g are of the shape B f unless "quadratic" is asked for, their right-hand sides contain the root, and
-    B is not given.
+    `system` is f, or its Kahan map, with an algebraic number in it or none; the rest is as for `commuting_systems`.
+    Over a number field g are of the shape B f unless "quadratic" is asked for, their right-hand sides contain the root,
+    and B is not given.
     Raises InputError for other maps and for what that function refuses.
 
     >>> from kahanmaps.documents.inline import System
@@ -375,8 +375,7 @@ def find_commuting(
     [[['x^2*a', 'y^2'], ['2*x^2', '0'], ['x^2*a', '0'], ['0', 'y^2*a']]]
     """
     options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "seconds": seconds, "progress": progress}
-    if isinstance(given, QuadraticSystem):
-        return commuting_systems(given, shape, **options)
+    given = as_map(system)
     kahan = given.given if isinstance(given, AlgebraicMap) else given
     if not isinstance(kahan, Kahan) or "eps" in kahan.system.symbols:
         raise InputError(f"found {kahan.kind}, expected a quadratic vector field without eps: g is sought for fields")

@@ -28,7 +28,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.defaults import SECONDS
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
-from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
 MAX_LISTED = 200  # of each kind in the JSON
@@ -173,7 +174,7 @@ class Symmetries(Printed):
 
 
 def linear_symmetries(
-    system: QuadraticSystem,
+    system: SystemLike,
     *,
     seconds: float = SECONDS["symmetries"],
     progress: Callable[[str], None] = lambda _: None,
@@ -190,6 +191,7 @@ def linear_symmetries(
     >>> found.order, [t.text for t in found.generators]
     (48, ['(x, y, z) -> (z, x, -y)', '(x, y, z) -> (-x, -z, y)'])
     """
+    system = as_system(system)
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a positive number")
     deadline = time.monotonic() + seconds

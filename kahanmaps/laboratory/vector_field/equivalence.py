@@ -24,9 +24,11 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 MAX_DIMENSION = 6  # 720 permutations
@@ -71,12 +73,12 @@ class Equivalence:
 
 
 def equivalent_system(
-    file: SystemFile, fixed: FixedPointSearch | None = None, seconds: float = 10
+    system: SystemLike, fixed: FixedPointSearch | None = None, seconds: float = 10
 ) -> Equivalence | None:
     """A system of the catalogue that an affine change of variables leads to, proved; None where none was found.
 
     Args:
-        file: a quadratic system. None is looked for if it is one of the catalogue itself.
+        system: a quadratic system. None is looked for if it is one of the catalogue itself.
         fixed: its fixed points, if they are known already: lines of them are a frame.
         seconds: bounds the time, roughly.
 
@@ -84,6 +86,7 @@ def equivalent_system(
     >>> print(equivalent_system(System("x' = 3*y*z; y' = x*z; z' = -x*y")))
     equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z
     """
+    file = as_file(system)
     f = file.system
     if f.degree < 2 or f.dim > MAX_DIMENSION or f.digits > LONG_COEFFICIENTS:
         return None

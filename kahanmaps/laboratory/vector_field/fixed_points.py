@@ -21,7 +21,8 @@ from kahanmaps.algebra.small_systems import Component, groebner, normal_form, qu
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_polynomial, format_product
 from kahanmaps.errors import counted
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 6  # above it Groebner bases of quadrics may take long, and they cannot be interrupted
 _KINDS = {1: "line", 2: "plane"}
@@ -111,7 +112,7 @@ class FixedPointSearch:
         return attributes(self, "found", "undecided")
 
 
-def fixed_points(system: QuadraticSystem, seconds: float = 10) -> FixedPointSearch:
+def fixed_points(system: SystemLike, seconds: float = 10) -> FixedPointSearch:
     """All equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
 
     `seconds` bounds the time, roughly; in dimension above 6 nothing is searched. What is not found is told.
@@ -125,6 +126,7 @@ def fixed_points(system: QuadraticSystem, seconds: float = 10) -> FixedPointSear
     >>> [one.text for one in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
     ["2 fixed points (x) with x^2 - 2 = 0, eigenvalues of f': lambda - 2*x = 0"]
     """
+    system = as_system(system)
     if system.dim > MAX_DIMENSION:
         return FixedPointSearch((), f"they are sought up to dimension {MAX_DIMENSION}")
     context = ring(system.variables)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.floats.blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.steps import (
@@ -31,7 +32,7 @@ from kahanmaps.maps.floats.steps import (
     planar_step,
 )
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.kernels import choose_kernel, has_llvm
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.processes import processors
@@ -345,7 +346,14 @@ class Watched:
 
 
 def ensemble(
-    given: QuadraticSystem | BirationalMap, /, starts: Any, eps: Any, steps: int = 0, **options: Any
+    system: SystemLike,
+    /,
+    starts: Any,
+    eps: Any = None,
+    steps: int = 0,
+    *,
+    time_step: Any = None,
+    **options: Any,
 ) -> FloatEnsemble:
     """The float orbits of many starts after `steps` steps; the arguments are those of `FloatEnsemble`.
 
@@ -356,7 +364,7 @@ def ensemble(
     [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
     require_steps(steps)
-    found = FloatEnsemble(given, eps, starts, **options)
+    found = FloatEnsemble(as_map(system), resolve_eps(eps, time_step), starts, **options)
     if steps:
         found.advance(steps)
     return found

@@ -19,17 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.errors import InputError
-from kahanmaps.maps.convention import time_step
+from kahanmaps.maps import convention
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.steps import eliminate
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.kahan import SystemLike, as_map
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
 _PORTION = 200_000  # entries of the tangent maps that are computed at once
@@ -106,11 +105,12 @@ def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
 
 
 def lyapunov_exponents(
-    given: QuadraticSystem | BirationalMap,
+    system: SystemLike,
     starts: Any,
-    eps: Any,
-    steps: int,
+    eps: Any = None,
+    steps: int = 0,
     *,
+    time_step: Any = None,
     transient: int = 0,
     seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
@@ -128,7 +128,12 @@ def lyapunov_exponents(
     >>> bool(np.abs(found.mean).max() < 1e-12), found.ended
     (True, 0)
     """
-    size = to_float(rational(eps))
+    eps, steps, transient = (
+        rational(resolve_eps(eps, time_step)),
+        integer(steps, "steps"),
+        integer(transient, "transient"),
+    )
+    size = to_float(eps)
     if size == 0.0:
         raise InputError(
             "found eps = 0 in machine numbers, expected another number: the Kahan map is the identity there"
@@ -136,7 +141,7 @@ def lyapunov_exponents(
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
     x = start_rows(starts)
-    map_ = as_map(given).rounded
+    map_ = as_map(system).rounded
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
         raise InputError(f"found starts of the shape {x.shape}, expected rows of {n} finite numbers, at least one")
@@ -182,7 +187,7 @@ def lyapunov_exponents(
     counted = max(0, orbits.step - transient)
     ended = len(x) - int(alive.sum())
     alive &= counted > 0
-    unit = time_step(size, map_) or 1.0
+    unit = convention.time_step(size, map_) or 1.0
     order = np.argsort(-sums[alive], axis=1)
     early = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
     return Lyapunov(

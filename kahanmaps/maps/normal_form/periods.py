@@ -23,16 +23,17 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
 
-from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.fields import GF, QQ, integer
 from kahanmaps.algebra.written.plain import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
 _WALK = 1 << 16  # steps taken where no theorem helps
@@ -325,7 +326,9 @@ def period_of(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], pri
     return _orbit_period(normal_form.form, normal_form.T, eps, start, prime)
 
 
-def period(system: QuadraticSystem, start: Sequence[Any], eps: Any, prime: int | None = None) -> OrbitPeriod:
+def period(
+    system: SystemLike, start: Sequence[Any], eps: Any = None, prime: int | None = None, *, time_step: Any = None
+) -> OrbitPeriod:
     """The period of an orbit of the Kahan map of a system that has a normal form: see `period_of`.
 
     Raises InputError where it has none, with the reason.
@@ -333,10 +336,10 @@ def period(system: QuadraticSystem, start: Sequence[Any], eps: Any, prime: int |
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
     'aperiodic'
     """
-    normal_form = system_normal_form(system)
+    normal_form, eps = system_normal_form(system), resolve_eps(eps, time_step)
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
-    return period_of(normal_form, eps, start, prime)
+    return period_of(normal_form, eps, start, None if prime is None else integer(prime, "prime"))
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:

@@ -19,9 +19,9 @@ from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import BadPrime, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.maps.convention import eps_record
-from kahanmaps.maps.implicit import BirationalMap, MapOver
-from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.convention import eps_record, resolve_eps
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.iteration import (
     DEFAULT_MAX_DIGITS,
@@ -34,7 +34,6 @@ from kahanmaps.maps.orbits.iteration import (
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
-from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 from kahanmaps.whole_files import growing_file
 
@@ -50,11 +49,12 @@ _BITS_PER_DIGIT = 3.3219281
 
 
 def orbit(
-    given: QuadraticSystem | BirationalMap | MapOver,
+    system: SystemLike | MapOver,
     start: Any,
     eps: Any = None,
     steps: int | None = None,
     *,
+    time_step: Any = None,
     at: Sequence[int] | None = None,
     arithmetic: str | Arithmetic | Field | type[float] = "exact",
     method: str | None = None,
@@ -71,10 +71,11 @@ def orbit(
     """The orbit of a start, or some of its iterates: iterate over it once, then look at `end`.
 
     Args:
-        given: the map; a quadratic system stands for its Kahan map. A map at one eps, phi @ psi for example, is
+        system: the map; a quadratic system stands for its Kahan map. A map at one eps, phi @ psi for example, is
             iterated as it is, in its own numbers.
         start: exact numbers, or text such as "1/2,-1/3"; floats may start float orbits.
         eps: an exact number, for Kahan maps half the time step; none for a map without it.
+        time_step: 2 eps, in its place.
         steps: how many steps to take, or
         at: which iterates alone are wanted.
         arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
@@ -101,6 +102,7 @@ def orbit(
     >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3, arithmetic="mod:7")]
     [['3'], ['2'], ['5'], ['4']]
     """
+    eps = resolve_eps(eps, time_step)
     if (steps is None) == (at is None):
         raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
     require_steps(steps)
@@ -113,10 +115,10 @@ def orbit(
     wanted = None if at is None else frozenset(integer(step, "a step of at") for step in at)
     far = max(wanted, default=0) if wanted is not None else (steps or 0)
     require_steps(far)
-    request = OrbitRequest(given, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
-    if isinstance(given, MapOver):
+    request = OrbitRequest(system, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
+    if isinstance(system, MapOver):
         return _orbit_at_one_eps(request, field)
-    map_ = as_map(given)
+    map_ = as_map(system)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls

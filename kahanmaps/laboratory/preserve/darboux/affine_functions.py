@@ -28,9 +28,9 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, evaluate, linear_combinations, primitive_part
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import Kahan, SystemLike
 from kahanmaps.systems.polynomial import PolynomialField
-from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver, as_system
 
 # The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
 MAX_EXTACTIC_DIMENSION = 12
@@ -60,7 +60,7 @@ class AffineDarbouxList:
     reason: str
 
 
-def affine_integrals(system: QuadraticSystem) -> tuple[tuple[fmpz, ...], ...]:
+def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
     """A basis of all v for which v . x is conserved by the flow, hence by the Kahan map for every eps.
 
     Args:
@@ -72,6 +72,7 @@ def affine_integrals(system: QuadraticSystem) -> tuple[tuple[fmpz, ...], ...]:
     >>> affine_integrals(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x*y"]))
     ((1, 1),)
     """
+    system = as_system(system)
     exponents = sorted({monomial for component in system.rhs for monomial in component.monoms()})
     if not exponents:
         n = system.dim
@@ -120,7 +121,7 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
     return QuotientForms(tuple(integrals), tuple(free), section, shift)
 
 
-def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxList:
+def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
     """All affine functions over Q whose zero set the flow keeps: l' = l L with an affine L, exactly.
 
     Args:
@@ -136,6 +137,7 @@ def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxLi
     >>> [(str(d.function), str(d.cofactor)) for d in found.functions], found.complete
     ([('x', '-y + 2'), ('y', '3*x - 1')], True)
     """
+    system = as_system(system)
     n = system.dim
     quotient = quotient_by(affine_integrals(system), n)
     m = len(quotient.free)

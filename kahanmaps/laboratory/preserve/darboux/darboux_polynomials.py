@@ -14,7 +14,7 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.written.plain import attributes
@@ -22,7 +22,7 @@ from kahanmaps.algebra.written.text import format_polynomial, format_rational_fu
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, product_of
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
@@ -40,6 +40,8 @@ from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomial
 from kahanmaps.laboratory.preserve.products import constants_of
 from kahanmaps.laboratory.preserve.results import Search
 from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
 
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
 _MOST_PRODUCTS = 2000
@@ -88,11 +90,12 @@ class DarbouxSearch(Search):
 
 
 def darboux_polynomials(
-    file: SystemFile,
+    system: SystemLike,
     degree: int,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    time_step: Any = None,
     flow: bool = False,
     seconds: float = 60.0,
     seed: int = 0,
@@ -103,10 +106,11 @@ def darboux_polynomials(
     For maps that are no Kahan maps, the product times any number, which may contain the symbols and eps.
 
     Args:
-        file: the system.
+        system: the system.
         degree: the largest degree of the polynomials, and of the products of cofactors.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        eps: an exact number, or None for formulas that contain eps.
+        time_step: 2 eps, in its place.
         flow: ask for those of the differential equation instead, P' = K P with any K but 0 (flow_polynomials.py).
         seconds: the time that the search may take, about.
         seed: of everything random.
@@ -127,6 +131,8 @@ def darboux_polynomials(
     C[x] x proved
     C[y] y proved
     """
+    degree = integer(degree, "degree")
+    file, eps = as_file(system), resolve_eps(eps, time_step)
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
     deadline, cofactors, spaces = time.monotonic() + seconds, laboratory.cofactors(), list[DarbouxPolynomials]()
     reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0

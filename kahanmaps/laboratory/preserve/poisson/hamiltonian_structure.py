@@ -28,8 +28,9 @@ from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 30  # n (n - 1)/2 unknowns: a few seconds for 435 of them
 _GRID = 2000  # points at which a Pfaffian is shown to vanish identically
@@ -63,7 +64,7 @@ class ConstantStructures(Printed):
         return all_fields(self)
 
 
-def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantStructures:
+def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructures:
     """All constant skew K with K f a gradient, and a Hamiltonian form f = J grad H with constant skew J.
 
     Args:
@@ -84,6 +85,7 @@ def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantSt
     >>> found.hamiltonian is None, found.reason
     (True, 'the dimension is odd and there is no affine integral')
     """
+    system = as_system(system)
     n = system.dim
     if n > MAX_DIMENSION:
         raise InputError(

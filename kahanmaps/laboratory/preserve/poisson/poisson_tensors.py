@@ -21,7 +21,7 @@ from typing import Any
 
 from flint import fmpq_mpoly, nmod
 
-from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.written.plain import attributes
@@ -31,7 +31,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.displayed import latex
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps
 from kahanmaps.invariants.poisson import GivenTensor
@@ -52,6 +52,8 @@ from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integral
 from kahanmaps.laboratory.preserve.poisson.casimirs import casimir_candidates
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 2000
 _MOST_LOGARITHMIC = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
@@ -185,11 +187,12 @@ class PoissonSearch(Search):
 
 
 def find_poisson(
-    file: SystemFile,
+    system: SystemLike,
     degree: int | None = None,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    time_step: Any = None,
     denominator: RationalFunction | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
     seconds: float = SECONDS["Poisson tensors"],
@@ -199,10 +202,11 @@ def find_poisson(
     """All tensors P with polynomial entries of at most a degree that the map of a file preserves.
 
     Args:
-        file: the map; a system stands for its Kahan map.
+        system: the map; a system stands for its Kahan map.
         degree: of the entries in the variables, or of their numerators; by default 3 in dimension 3, and else 2.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps, where there is one).
+        eps: an exact number, or None for formulas that contain eps.
+        time_step: 2 eps, in its place.
         denominator: a function of the variables and eps by which the entries are divided; None: where there are no
             tensors without one, the factors of a density that is a product are tried, if that is little work.
         integrals: those whose brackets are asked for; None: they are searched, if there is a tensor.
@@ -223,7 +227,8 @@ def find_poisson(
     >>> [(one.text, str(one.verdict), one.rank) for one in found.tensors]
     [('{x,y} = x*y', 'proved', 2)]
     """
-    degree = tensor_degree(file.dim) if degree is None else degree
+    file, eps = as_file(system), resolve_eps(eps, time_step)
+    degree = tensor_degree(file.dim) if degree is None else integer(degree, "degree")
     if degree < 0 or not seconds > 0:
         raise InputError(f"found the degree {degree} and {seconds} seconds, expected at least 0 and a time above 0")
     laboratory = Laboratory(file, symbols, eps, seed)

@@ -1,0 +1,209 @@
+"""Values of the library in Python: equal, copied, pickled, shown in short, plain data, arrays."""
+
+import copy
+import json
+import multiprocessing
+import pickle
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from fractions import Fraction
+from types import SimpleNamespace
+
+import flint
+import numpy as np
+import pytest
+from flint import arb, fmpq
+
+import kahanmaps as km
+from kahanmaps.errors import InputError
+
+FISH = "q' = p; p' = q^2 - q"
+
+
+def test_maps_are_equal_when_their_equations_are():
+    phi = km.map(FISH, "1/5")
+    assert phi == km.map(FISH, Fraction(1, 5)) == copy.copy(phi)
+    assert hash(phi) == hash(km.map(FISH, "1/5"))
+    assert phi @ phi == phi**2 != phi
+    assert phi**-1 == phi.inverse == km.map(FISH, "-1/5")
+    for other in (km.map(FISH, "1/6"), km.map("q' = p; p' = q^2", "1/5"), km.map("x' = y; y' = x^2 - x", "1/5"), 3):
+        assert phi != other
+
+
+def test_maps_are_called_and_composed():
+    phi = km.KahanMap(km.load("euler_top").system, "1/10")
+    psi = km.KahanMap(km.load("lorenz").system, "1/10")
+    x = phi.point([1, 2, 3])
+    assert (phi @ psi)(x) == phi(psi(x)) != psi(phi(x)) == (psi @ phi)(x)
+    assert (phi**3)(x) == phi(phi(phi(x)))
+    assert (phi**-2)((phi**2)(x)) == x == (phi**-1 @ phi)(x)
+    assert phi.inverse()(phi(x)) == phi.inverse(phi(x)) == x
+    identity = phi**0
+    assert identity(x) == identity.inverse(x) == x != phi(x)
+    assert (phi @ identity)(x) == phi(x)
+    assert identity.determinant(x) == 1
+    with pytest.raises(InputError, match="one dimension"):
+        phi @ km.KahanMap(km.load("weierstrass").system, "1/10")
+    with pytest.raises(TypeError):
+        phi @ 3
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_systems_maps_and_orbits_are_copied_and_pickled(again):
+    for name in ("lorenz", "paper_m3", "lyness", "henon_heiles", "lv(5,1)"):
+        file = km.load(name)
+        assert again(file) == file
+    phi = km.map(FISH, "1/5")
+    assert again(phi @ phi) == phi**2
+    assert again(phi).field is phi.field
+    assert again(km.System(FISH).system) == km.System(FISH).system
+    for arithmetic in ("exact", "float", "mod:101", f"mod:{2**127 - 1}", "ball:100"):
+        walk = km.orbit(FISH, [1, 2], "1/5", 3, arithmetic=arithmetic)
+        assert list(map(repr, again(walk))) == list(map(repr, walk))
+    floats = km.ensemble(FISH, [["1/2", "1/3"], [0, "1/4"]], "1/5", 9)
+    assert np.array_equal(again(floats).x, floats.x)
+
+
+@pytest.mark.parametrize("name", [*km.__all__, "map", "plot"])
+def test_public_names_are_the_same_after_a_pickle(name):
+    value = getattr(km, name)
+    again = pickle.loads(pickle.dumps(value))
+    assert again is value or (isinstance(value, str) and again == value)
+
+
+def test_functions_and_their_results_go_to_other_processes_and_back():
+    """`spawn`, so that the other process imports what it needs by what it is sent."""
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        others = [
+            pool.submit(km.check_integrals, "euler_top"),
+            pool.submit(km.analyze, "riccati"),
+            pool.submit(km.map, FISH, "1/5"),
+            pool.submit(km.parse_polynomial, "x + y/2", ("x", "y")),
+        ]
+        report, analysis, phi, polynomial = (other.result() for other in others)
+    assert report.to_json()["claims"] == km.check_integrals("euler_top").to_json()["claims"]
+    assert analysis.sections
+    assert phi == km.map(FISH, "1/5")
+    assert polynomial == km.parse_polynomial("x + y/2", ("x", "y"))
+
+
+@pytest.mark.parametrize("text", ["0", "2", "-1/3", "nan", "inf"])
+def test_balls_are_pickled_exactly(text):
+    with flint.ctx.workprec(200):
+        ball = arb(fmpq(-1, 3)) if "/" in text else arb(text)
+        pickled = pickle.dumps([ball, flint.acb(ball, 1)])
+    real, number = pickle.loads(pickled)
+    assert repr(real) == repr(number.real) == repr(ball)
+    assert real.is_nan() or (real.mid() == ball.mid() and real.rad() == ball.rad())
+
+
+def test_threads_may_share_a_system():
+    file = km.load("lorenz")
+
+    def walked(k: int) -> object:
+        return km.orbit(file, [1, 1, k], Fraction(1, k + 3), 6)[6].x
+
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(walked, range(20))) == [walked(k) for k in range(20)]
+
+
+def test_results_are_shown_in_short_and_are_plain_data():
+    member = km.draw_with_eigenvalues([1, -2], seed=3)
+    results = (
+        km.analyze("weierstrass", seconds=2),
+        km.check_integrals("euler_top"),
+        km.cycles(FISH, "1/7", 11),
+        km.lyapunov(FISH, [0.5, 0.25], "1/50", 20),
+        km.singularities(FISH, "1/10"),
+        km.constant_structures(FISH),
+        km.orbit_period(km.normal_form(member), "1/10", [1, 0, 1, 1], 10007),
+        km.degrees(FISH, max_terms=4),
+        km.heights(FISH, "1/5", starts=1, steps=20),
+        km.find_symmetry(FISH),
+        km.verify(m=1),
+        km.find_commuting("weierstrass"),
+    )
+    for found in results:
+        data = json.dumps(found.to_json())
+        assert " object at " not in data
+    for shown in (*results, km.load("euler_top"), km.map(FISH, "1/5") ** 9, km.orbit(FISH, [1, 2], "1/5", 12)[12]):
+        assert " object at " not in repr(shown)
+    for shown in (results[0], results[1], km.map(FISH, "1/5") ** 9, km.orbit(FISH, [1, 2], "1/5", 12)[12]):
+        assert len(repr(shown)) < 300
+    assert km.constant_structures(FISH).to_json()["forms"] == [[["0", "1"], ["-1", "0"]]]
+    assert str(km.System(FISH)).splitlines() == ["inline:", "q' = p", "p' = q^2 - q"]
+
+
+def test_points_of_an_orbit_are_the_same_however_one_asks():
+    walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5)
+    assert len(walk) == 6
+    assert [point.x for point in walk] == [walk[k].x for k in range(6)]
+    assert [point.x for point in walk[1:3]] == [walk[1].x, walk[2].x]
+    assert walk.end.status == "completed"
+    for kind in ("exact", "float", "mod:101"):
+        walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=kind)
+        assert np.asarray(walk).shape == (6, 3)
+        assert [row["step"] for row in walk.rows()] == list(range(6))
+    table = np.asarray(km.orbit("euler_top", [1, 2, 3], "1/10", 5))
+    assert table[1] == pytest.approx([65 / 37, 10 / 37, 125 / 37])
+    field = km.load("euler_top", a1="root of t^2 - 2")
+    walk = km.orbit(field, [1, 2, 3], "1/10", 2)
+    with pytest.raises(InputError, match='arithmetic="float"'):
+        np.asarray(walk)
+    assert [tuple(row) for row in np.asarray(walk, dtype=object)] == [point.x for point in walk]
+
+
+@pytest.mark.parametrize("prime", [101, 2**53 + 5, 2**61 - 1, 2**127 - 1])
+def test_arrays_of_residues_are_exact_or_refused(prime):
+    walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=f"mod:{prime}")
+    rows = [[int(x) for x in point.x] for point in walk]
+    assert max(map(max, rows)) > prime // 2
+    table = np.asarray(walk)
+    assert table.dtype == (np.int64 if prime < 2**63 else object)
+    assert table.tolist() == np.asarray(walk, dtype=object).tolist() == rows
+    for kind in (np.int64, np.uint8):
+        if max(map(max, rows)) <= np.iinfo(kind).max:
+            assert np.asarray(walk, dtype=kind).tolist() == rows
+        else:
+            with pytest.raises(InputError, match=r"found the coordinate \d+.*, expected integers.*take dtype=object"):
+                np.asarray(walk, dtype=kind)
+    if prime < 2**53:
+        assert np.asarray(walk, dtype=float).tolist() == rows
+    else:
+        with pytest.raises(InputError, match=f"rounds residues modulo {prime}, expected dtype=int or dtype=object"):
+            np.asarray(walk, dtype=float)
+
+
+@pytest.mark.parametrize(("arithmetic", "kind"), [("exact", fmpq), ("float", float), ("ball:64", arb)])
+def test_arrays_of_objects_have_the_coordinates_of_the_points(arithmetic, kind):
+    walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=arithmetic)
+    table = np.asarray(walk, dtype=object)
+    assert [tuple(map(repr, row)) for row in table] == [tuple(map(repr, point.x)) for point in walk]
+    assert all(type(x) is kind for x in table.flat)
+
+
+def test_arrays_of_integers_are_exact_or_refused():
+    grows = km.orbit("x' = x; y' = 0", [1, 5], 1 / fmpq(3), 70)  # x~ = 2 x
+    assert np.asarray(grows, dtype=object)[70, 0] == 2**70
+    for steps, kind in ((62, np.int64), (63, np.uint64), (6, np.int8)):
+        assert np.asarray(km.orbit("x' = x; y' = 0", [1, 5], "1/3", steps), dtype=kind)[-1].tolist() == [2**steps, 5]
+        with pytest.raises(InputError, match=f"found the coordinate {2 ** (steps + 1)}, expected integers"):
+            np.asarray(km.orbit("x' = x; y' = 0", [1, 5], "1/3", steps + 1), dtype=kind)
+    with pytest.raises(InputError, match=r"found the coordinate 65/37, expected .*take .*dtype=object"):
+        np.asarray(km.orbit("euler_top", [1, 2, 3], "1/10", 1), dtype=int)
+    with pytest.raises(InputError, match="found the dtype bool, expected one of floats or integers, or object"):
+        np.asarray(grows, dtype=bool)
+    with pytest.raises(ValueError, match="expected copy=None"):
+        np.array(grows, copy=False)
+
+
+def test_a_table_of_pandas_is_made_of_the_rows(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=list))
+    walk, found = km.orbit("euler_top", [1, 2, 3], "1/10", 2), km.degrees("weierstrass", max_terms=2)
+    assert walk.to_pandas() == walk.rows()
+    assert found.to_pandas() == found.rows()
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match="pip install pandas"):
+        found.to_pandas()
+    walk.to_csv(tmp_path / "o.csv")
+    assert (tmp_path / "o.csv").read_text().splitlines()[:2] == ["step,x1,x2,x3", "0,1,2,3"]
