@@ -30,29 +30,12 @@ for number, handler in [
 THOROUGH = frozenset((Path(__file__).parent / "thorough.txt").read_text(encoding="utf-8").splitlines())
 
 
-WRONGLY_LEFT = pytest.StashKey[list[str]]()
-
-
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests and cases that thorough.txt names: dear ones, whose subject has quicker tests as well."""
-    daily = dict[str, int]()
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as slow the tests and cases that thorough.txt names: their subjects have quicker tests as well."""
     for item in items:
-        test = item.nodeid.split("[")[0]
-        if not THOROUGH.isdisjoint({item.nodeid, test}):
+        if not THOROUGH.isdisjoint({item.nodeid, item.nodeid.split("[")[0]}):
             item.add_marker(pytest.mark.slow)
-            item.add_marker(pytest.mark.thorough)
-        daily[test] = daily.get(test, 0) + (item.get_closest_marker("slow") is None)
-    if not any("::" in argument for argument in config.args):
-        cases = {name for name in THOROUGH if "[" in name and name.split("[")[0] in daily}
-        stale = cases - {item.nodeid for item in items}
-        config.stash[WRONGLY_LEFT] = sorted(stale | {name for name in cases if not daily[name.split("[")[0]]})
-
-
-@pytest.fixture
-def wrongly_left(pytestconfig: pytest.Config) -> list[str]:
-    """Lines of thorough.txt, as far as tests were collected, that name no case or leave no case to each day."""
-    return pytestconfig.stash.get(WRONGLY_LEFT, [])
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,13 +1,12 @@
 """The benchmarks measure the same thing: all contestants that are present compute the same numbers, on a tiny case."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from kahanmaps import KahanMap, load, system_normal_form
+from kahanmaps import KahanMap, load
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 STEPS = 4
@@ -48,18 +47,6 @@ def test_contestants_of_the_exact_orbit_arrive_where_the_map_does(kind, m):
     assert present
 
 
-def test_formulations_of_pari_that_lost_arrive_there_too():
-    import bench_exact
-    import work
-
-    try:
-        found = bench_exact.gp_others(work.work(), STEPS)
-    except work.Absent as reason:
-        pytest.skip(str(reason))
-    for name, _, last in found:
-        assert last == stepped(work.work(), STEPS), name
-
-
 @pytest.mark.parametrize("name", ["henon_heiles", "euler_top", "qrt_asymmetric"])
 def test_contestants_on_the_catalogue_arrive_at_one_point(name):
     import bench_catalogue
@@ -67,34 +54,6 @@ def test_contestants_on_the_catalogue_arrive_at_one_point(name):
     map_over = load(name).map.at(bench_catalogue.EPS)
     assert bench_catalogue.ours(map_over, STEPS) == bench_catalogue.plain(map_over, STEPS)
     assert bench_catalogue.ours(map_over, STEPS) != bench_catalogue.plain(map_over, STEPS + 1)
-
-
-@pytest.mark.parametrize("name", ["euler_top", "paper_m2"])
-def test_longer_orbits_are_the_same_with_relations_and_in_normal_form(name, monkeypatch):
-    import bench_catalogue
-    import work
-
-    monkeypatch.setattr(bench_catalogue, "LONG_BITS", 5_000)
-    file = load(name)
-    normal = system_normal_form(file.system) if name == "paper_m2" else None
-    # PARI is not everywhere; FLINT's plain solve takes its place.
-    monkeypatch.setattr(bench_catalogue, "pari", lambda over, n, way: (1.0, bench_catalogue.plain(over, n), way))
-    rows = bench_catalogue._longer(name, file.map.at(bench_catalogue.EPS), normal, "plain")
-    assert [one["group"] for one in rows] == [bench_catalogue.LONG] * 2
-    assert rows[0]["work"].startswith(f"{name}, N = ")
-    monkeypatch.setattr(bench_catalogue, "pari", lambda *_: (1.0, [], ""))
-    with pytest.raises(work.Disagreement):
-        bench_catalogue._longer(name, file.map.at(bench_catalogue.EPS), normal, "")
-
-
-def test_the_claim_on_longer_orbits_is_the_worst_of_them_all():
-    import run
-
-    found = [run.bench_catalogue.row(run.bench_catalogue.LONG, run.bench_catalogue.PARI, k, 1.0, k) for k in (7, 6, 9)]
-    others = [run.bench_catalogue.row(run.bench_catalogue.GROUP, run.bench_catalogue.PARI, "", 1.0, 2)]
-    assert run._least_of_longer(found + others) == 6
-    with pytest.raises(KeyError):
-        run._least_of_longer(others)
 
 
 def test_a_contestant_with_another_result_stops_the_run():
@@ -141,20 +100,6 @@ def test_the_walkers_of_a_line_agree():
                 assert run(system, n)[1] == degrees, label
             except work.Absent:
                 continue
-
-
-def test_peaks_of_memory_are_those_of_the_processes_alone(tmp_path):
-    import bench_memory
-
-    held = bytearray(200 << 20)
-    megabytes, _, note = bench_memory.batch(tmp_path, 5)
-    assert 20 < megabytes < len(held) >> 20
-    assert note == "0 MB of results"
-    more, _, note = bench_memory.orbit(tmp_path, 60)
-    assert more < len(held) >> 20
-    assert (tmp_path / "orbit60.txt").read_text().splitlines()[-2].startswith("60\t")
-    with pytest.raises(subprocess.CalledProcessError):
-        bench_memory.peak("orbit", "no such system")
 
 
 def test_the_page_is_what_the_record_says():

@@ -17,7 +17,7 @@ sys.path.insert(0, str(DOCS / "_ext"))
 
 from check_pages import mistakes  # noqa: E402
 from helpers import together  # noqa: E402
-from kahanmaps_docs import docstrings, expanded, part, reference  # noqa: E402
+from kahanmaps_docs import docstrings, expanded, reference  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
 from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
 
@@ -94,23 +94,9 @@ def test_every_page_is_in_a_table_of_contents(built_from):
     assert set(built_from) - reached == set()
 
 
-def test_a_page_that_no_table_of_contents_names_is_noticed():
-    assert entries("howto/index", "```{toctree}\n:glob:\n\n*\n../batch\n```\n", {"howto/a", "batch", "alone"}) == {
-        "howto/a",
-        "batch",
-    }
-
-
 def test_every_command_has_its_entry(built_from):
     missing = [name for name in COMMANDS if f"(command-{name})=" not in built_from["reference/commands"]]
     assert missing == []
-
-
-def test_the_entry_of_a_command_has_its_options_and_its_examples(built_from):
-    entry = built_from["reference/commands"].partition("(command-find-integrals)=")[2].partition("(command-")[0]
-    assert "`--monomials LIST`" in entry
-    assert "\nkahanmaps find-integrals euler_top --symbolic" in entry
-    assert "(command-batch-run)=" in built_from["reference/commands"]
 
 
 def test_every_exported_name_has_its_entry(built_from):
@@ -132,12 +118,6 @@ def test_every_system_of_the_catalogue_has_its_section_with_its_sources(built_fr
     assert r"x_1^\prime &= x_2 x_3" in top
 
 
-def test_every_task_of_batches_has_its_section_with_its_options(built_from):
-    entry = built_from["reference/batch-tasks"].partition("(task-heights)=")[2].partition("(task-")[0]
-    assert re.search(r"\| `steps` \| .* \| `60` \|", entry)
-    assert re.search(r"\| `eps` \| .* \| required \|", entry)
-
-
 @together("path", markdown_files())
 def test_local_links_lead_to_a_file_and_to_a_heading_in_it(path):
     assert broken_links(path) == []
@@ -147,18 +127,6 @@ def test_links_that_lead_nowhere_are_noticed(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# One  thing\n[a](page.md#one--thing) [b](gone.md) [c](#two) `[d](code.md)` [e](https://e.org)\n")
     assert broken_links(page) == ["gone.md", "#two"]
-
-
-def test_files_of_the_project_that_are_pages_are_linked_as_pages():
-    text = "[all](../CONTRIBUTING.md#tests), [study](../../examples/members), `petrera-suris-2016`"
-    assert expanded("howto/page", text.replace("../C", "../../C")) == (
-        "[all](../contributing.md#tests), [study](../study.md), [`petrera-suris-2016`](#source-petrera-suris-2016)"
-    )
-
-
-def test_a_part_that_nobody_makes_is_refused():
-    with pytest.raises(ValueError, match="expected one of"):
-        part("weather")
 
 
 @pytest.mark.parametrize(
@@ -188,10 +156,6 @@ def test_a_built_page_that_leads_nowhere_or_needs_the_network_is_noticed(tmp_pat
         "a.html: c.html is not there",
         "a.html: https://e.org/math.js has to be fetched",
     ]
-
-
-def test_a_folder_without_pages_is_not_in_order(tmp_path):
-    assert mistakes(tmp_path) == [f"{tmp_path.resolve()} has no pages"]
 
 
 @pytest.mark.slow

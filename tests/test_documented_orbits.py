@@ -1,55 +1,11 @@
-"""What the documentation says in words of single points and orbits: witnesses, and how Lotka-Volterra orbits go."""
+"""What the documentation says of orbits of x' = x (1 - y), y' = y (x - 1), with H = x + y - log(xy)."""
 
 import math
-import re
-from pathlib import Path
 
 import pytest
 from flint import arb, ctx
-from test_readme import PAGES, ROOT, files
 
 import kahanmaps as km
-
-# A sentence on a witness: eps, x, the image of x, and the integral there and at x.
-_SENTENCE = re.compile(
-    r"at eps = (\S+) the map takes \(([^)]*)\)\s+to\s+\(([^)]*)\),\s+where\s+H is (\S+)\s+and\s+not\s+(\S+)\. "
-)
-_WITNESS = re.compile(r"witness: x = \(([^)]*)\), eps = (\S+)\n\s+I\(x~\) = (\S+)\n\s+I\(x\) = (\S+)\n")
-
-
-def wrong_sentences(page: Path) -> list[str]:
-    """The sentences on witnesses that do not repeat the witness that was printed last before them."""
-    text, wrong = page.read_text(), []
-    for said in _SENTENCE.finditer(text):
-        eps, x, _, after, before = said.groups()
-        printed = _WITNESS.findall(text[: said.start()])
-        if not printed or printed[-1] != (x, eps, after, before):
-            wrong.append(said.group())
-    return wrong
-
-
-def test_a_witness_in_words_is_the_one_printed_above_it():
-    assert [wrong for page in PAGES for wrong in wrong_sentences(page)] == []
-    assert sum(len(_SENTENCE.findall(page.read_text())) for page in PAGES) >= 1
-
-
-def test_another_witness_in_words_would_be_noticed(tmp_path):
-    page = tmp_path / "page.md"
-    tutorial = (ROOT / "docs/tutorial.md").read_text()
-    for old, new in (("takes (-1, -1)", "takes (0, -1)"), ("H is 31/24", "H is 5/6")):
-        page.write_text(tutorial.replace(old, new))
-        assert len(wrong_sentences(page)) == 1
-
-
-def test_the_image_of_the_witness_of_the_tutorial_is_the_one_it_names(tmp_path):
-    page = ROOT / "docs/tutorial.md"
-    path = tmp_path / "fish.toml"
-    path.write_text(files(page)["fish.toml"])
-    ((eps, x, image, _, _),) = _SENTENCE.findall(page.read_text())
-    assert [str(entry) for entry in km.map(str(path), eps)(x.split(", "))] == image.split(", ")
-
-
-# docs/kahans-method.md and README.md on Lotka-Volterra: x' = x(1 - y), y' = y(x - 1), with H = x + y - log(xy).
 
 
 def H(point) -> float:

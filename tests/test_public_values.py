@@ -71,6 +71,10 @@ def test_public_names_are_the_same_after_a_pickle(name):
     assert again is value or (isinstance(value, str) and again == value)
 
 
+def test_every_public_name_is_documented():
+    assert [name for name in km.__all__ if callable(getattr(km, name)) and not getattr(km, name).__doc__] == []
+
+
 def test_functions_and_their_results_go_to_other_processes_and_back():
     """`spawn`, so that the other process imports what it needs by what it is sent."""
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:

@@ -11,29 +11,37 @@ from kahanmaps import whole_files
 from kahanmaps.whole_files import whole_file, write_whole
 
 
-def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+def interrupted(*_):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("where", ["before the end", "at the end"])
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, where):
     target = tmp_path / "x.svg"
     target.write_bytes(b"before")
-    monkeypatch.setattr(whole_files.os, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
-    with pytest.raises(KeyboardInterrupt):
-        write_whole(target, b"after")
-    assert target.read_bytes() == b"before"
-    assert list(tmp_path.iterdir()) == [target]
+    if where == "at the end":
+        monkeypatch.setattr(whole_files.os, "replace", interrupted)
+    fail = interrupted if where == "before the end" else len
+    with pytest.raises(KeyboardInterrupt), whole_file(target) as stream:
+        fail(b"half of it" * stream.write(b"half of it"))
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"before"]
 
 
-def test_symbolic_links_in_a_circle_are_told_and_stay(tmp_path):
-    loop = tmp_path / "loop.svg"
-    loop.symlink_to(loop.name)
-    with pytest.raises(OSError, match="symbolic links") as caught:
-        write_whole(loop, b"")
-    assert (caught.value.errno, caught.value.filename) == (errno.ELOOP, str(loop))
-    assert loop.is_symlink()
+def test_a_full_disk_names_the_file(tmp_path):
+    with pytest.raises(OSError, match="No space") as caught, whole_file(tmp_path / "x"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert caught.value.filename == str(tmp_path / "x")
 
 
-def test_a_name_that_no_file_can_have_is_told():
-    with pytest.raises(OSError, match="Invalid argument") as caught:
-        write_whole("a\0b", b"")
-    assert (caught.value.errno, caught.value.filename) == (errno.EINVAL, "a\0b")
+@pytest.mark.parametrize(
+    ("name", "number"), [("loop", errno.ELOOP), ("missing/x", errno.ENOENT), ("a\0b", errno.EINVAL)]
+)
+def test_a_file_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, name, number):
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(OSError, match=r"Errno") as caught:
+        write_whole(f"{tmp_path}/{name}", b"")
+    assert (caught.value.errno, caught.value.filename) == (number, f"{tmp_path}/{name}")
+    assert (tmp_path / "loop").is_symlink()
 
 
 def test_a_symbolic_link_is_written_through(tmp_path):
@@ -44,34 +52,16 @@ def test_a_symbolic_link_is_written_through(tmp_path):
     assert (link.is_symlink(), (tmp_path / "there" / "x.svg").read_bytes()) == (True, b"x")
 
 
-def test_a_new_file_has_the_permissions_of_the_user(tmp_path):
+def test_a_new_file_has_the_permissions_of_the_user_and_a_replaced_one_keeps_its_own(tmp_path):
     before = os.umask(0o027)
     try:
-        write_whole(tmp_path / "x", b"")
+        write_whole(tmp_path / "new", b"")
     finally:
         os.umask(before)
-    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == 0o640
-
-
-def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
-    (tmp_path / "x").write_bytes(b"")
-    (tmp_path / "x").chmod(0o600)
-    write_whole(tmp_path / "x", b"new")
-    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == 0o600
-
-
-def test_a_link_stays_a_link(tmp_path):
-    (tmp_path / "link").symlink_to(tmp_path / "target")
-    write_whole(tmp_path / "link", b"new")
-    assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "target").read_bytes() == b"new"
-
-
-def test_a_file_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path):
-    wanted = tmp_path / "missing" / "x"
-    with pytest.raises(FileNotFoundError) as error:
-        write_whole(wanted, b"")
-    assert error.value.filename == str(wanted)
+    (tmp_path / "old").write_bytes(b"")
+    (tmp_path / "old").chmod(0o600)
+    write_whole(tmp_path / "old", b"new")
+    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("new", "old")] == [0o640, 0o600]
 
 
 def test_a_file_is_on_the_disk_before_it_has_its_name_and_its_name_before_the_end(tmp_path, monkeypatch):
@@ -92,25 +82,10 @@ def test_a_file_is_on_the_disk_before_it_has_its_name_and_its_name_before_the_en
     assert done == ["fsync file", "replace file", "fsync folder"]
 
 
-def test_what_fails_within_leaves_the_old_file_alone(tmp_path):
-    (tmp_path / "x").write_bytes(b"before")
-
-    def fail():
-        with whole_file(tmp_path / "x") as stream:
-            stream.write(b"half of it")
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-    with pytest.raises(OSError, match="No space") as caught:
-        fail()
-    assert caught.value.filename == str(tmp_path / "x")
-    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"before"]
-
-
 def test_a_pipe_gets_everything_at_the_end_and_stays_a_pipe(tmp_path):
     os.mkfifo(tmp_path / "p")
     reader = os.open(tmp_path / "p", os.O_RDONLY | os.O_NONBLOCK)
-    with whole_file(tmp_path / "p") as stream:
-        stream.write(b"new")
+    write_whole(tmp_path / "p", b"new")
     found = os.read(reader, 100)
     os.close(reader)
     assert (found, (tmp_path / "p").is_fifo(), list(tmp_path.iterdir())) == (b"new", True, [tmp_path / "p"])

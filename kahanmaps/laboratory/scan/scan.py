@@ -121,6 +121,7 @@ def scan(
     >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
     ['2', '1']
     """
+    file, eps = as_file(system), resolve_eps(eps, time_step)
     names = tuple(dict.fromkeys(over))
     if not names:
         raise InputError("found no parameter to scan over, expected at least one")
