@@ -121,9 +121,8 @@ from .maps.orbits.arithmetic import Arithmetic as Arithmetic
 from .maps.orbits.iteration import Orbit as Orbit
 from .maps.orbits.orbit import orbit as orbit
 from .maps.polarised import polarised_map as polarised_map
-from .paper.verifier import VerifyOptions as VerifyOptions
+from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
-from .paper.verify import verify_universal as verify_universal
 from .plots.plot import draw_orbits as draw_orbits
 from .plots.plot import plot as plot
 from .reports.report import report_html as report_html

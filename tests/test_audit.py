@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.paper.registry import claims
-from kahanmaps.paper.verify import verify_universal
+from kahanmaps.paper.verify import verify
 from kahanmaps_cli.runs.verify_table import markdown
 
 AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding="utf-8")
@@ -14,7 +14,7 @@ AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding=
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_the_table_of_the_audit_is_what_verify_prints():
-    assert AUDIT.split("<!-- table -->\n")[1].strip() == markdown(verify_universal(3)).strip()
+    assert AUDIT.split("<!-- table -->\n")[1].strip() == markdown(verify(m=3)).strip()
 
 
 def test_every_misprint_among_the_claims_is_in_the_list_of_the_audit():

@@ -172,9 +172,8 @@ from kahanmaps.maps.orbits.orbit import orbit as orbit
 from kahanmaps.maps.orbits.writers import form_of as form_of
 from kahanmaps.paper.claims.survivors import survivors as survivors
 from kahanmaps.paper.claims.survivors import table as table
-from kahanmaps.paper.verifier import VerifyOptions as VerifyOptions
+from kahanmaps.paper.verify import VerifyOptions as VerifyOptions
 from kahanmaps.paper.verify import verify as verify
-from kahanmaps.paper.verify import verify_universal as verify_universal
 from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves as draw_invariant_curves
 from kahanmaps.plots.curves.draw_invariant_curves import panels_of as panels_of
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves as InvariantCurves

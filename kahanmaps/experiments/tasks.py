@@ -88,8 +88,7 @@ def verify_member(
     error_bits: int = DEFAULT_ERROR_BITS,
 ) -> Whole:
     """Every statement of the paper, for one member of the family."""
-    from kahanmaps.paper.verifier import VerifyOptions
-    from kahanmaps.paper.verify import verify
+    from kahanmaps.paper.verify import VerifyOptions, verify
 
     settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
     return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)))
@@ -105,11 +104,10 @@ def verify_in_general(
     error_bits: int = DEFAULT_ERROR_BITS,
 ) -> Whole:
     """Every statement of the paper, for the member in general."""
-    from kahanmaps.paper.verifier import VerifyOptions
-    from kahanmaps.paper.verify import verify_universal
+    from kahanmaps.paper.verify import VerifyOptions, verify
 
     settings = Settings(seed=seed, error_bits=error_bits)
-    return _of_report(verify_universal(m, settings, VerifyOptions(sections, order, None, controls)))
+    return _of_report(verify(None, settings, VerifyOptions(sections, order, None, controls), m=m))
 
 
 @task("family-space", needs=MEMBER)

@@ -19,21 +19,25 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import count
+from typing import Any, cast
 
 from flint import fmpq_poly
 
-from kahanmaps.algebra.bounds import Size
+from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.written.text import format_number
-from kahanmaps.checks.claims import Evidence, Report
+from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.decide import Decision, Trial, decide
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.inline import as_file
-from kahanmaps.errors import BadPrime, InputError, PrecisionLost
+from kahanmaps.errors import BadPrime, InputError, PrecisionLost, counted
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
@@ -41,20 +45,50 @@ from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.paper import objects_over
-from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
+from kahanmaps.paper.controls import CONTROLS, broken
+from kahanmaps.paper.evaluate import UNDEFINED, Outcome, entries, evaluate, same, witness_of
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.proofs import PROOF_BUDGET, normal_form_proof
-from kahanmaps.paper.registry import Claim, Kind
-from kahanmaps.paper.verifier import Verifier, VerifyOptions
+from kahanmaps.paper.registry import SECTIONS, Claim, Kind, claims
 from kahanmaps.version import __version__
 
 MAX_M = 8
+# Products of terms in a proof: enough for every claim up to m = 6; at m = 8 a few that sum over all roots exceed it.
+PROOF_BUDGET = 50_000_000
 _MAX_INDETERMINATES = 64  # of a proof for one member
+_MAX_UNDEFINED = 40
+_POINTS = 4  # for statements that something differs, or has full rank
+_LARGE = 5  # from this m on, controls are looked at over GF(p) first
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "
     "symplectically similar to a specialization over the splitting field of chi (docs/mathematics.md)"
 )
+NOTE_ON_RANDOM_MEMBERS = (
+    "random members: A = S^{-T} diag(L, L) S^T with random roots L and a random symplectic S, H = sum of "
+    "random planar cubics, hidden by S; x and eps at random. Bounds are for the generic member"
+)
+
+
+@dataclass(frozen=True)
+class VerifyOptions:
+    """What to verify: sections (None: all), the order of the series, bits for complex balls, controls instead."""
+
+    sections: tuple[int, ...] | None = None
+    order: int = 3
+    ball_bits: int | None = None
+    controls: bool = False
+    beyond: bool = False  # the statements of section 10 that are asked of variations, and no others
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.order <= 20:
+            raise InputError(f"found the order {self.order}, expected 1 to 20")
+        if self.ball_bits is not None and not 32 <= self.ball_bits <= 100_000:
+            raise InputError(f"found {self.ball_bits} bits for the balls, expected 32 to 100000")
+        for section in self.sections or ():
+            if section not in SECTIONS:
+                raise InputError(
+                    f"found the section {section}, expected 1 to {max(SECTIONS)} ({max(SECTIONS)}: beyond)"
+                )
 
 
 def verify(
@@ -66,116 +100,137 @@ def verify(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Every claim of the paper for a member of the family.
+    """Every claim of the paper, for a member of the family or for the member in general.
 
-    `settings` gives eps (None: every eps, an indeterminate), the seed and the error bound. Exact but for the claims
-    whose verdict is `supported`. Without a file, `m` asks for the member in general, as `verify_universal` does.
-    Returns a Report with one Finding a claim, in the order of the paper. Raises InputError where the system is not of
-    kind [family].
+    Args:
+        system: a member of the family, with m at most 8; or
+        settings: eps (None: every eps, an indeterminate), the seed and the error bound.
+        options: which claims, and how.
+        m: half the dimension of the member in general, 1 to 8: roots, cubics, symplectic change, x and eps are all at
+            random over GF(p), and the error bound of a claim is on the probability that it is false for the generic
+            member. A claim that could also be proved in normal form is `proved`, for every member with distinct roots.
+        eps: an exact number, in the place of that of the settings; none for the member in general.
+        time_step: 2 eps, in its place.
 
-    Source: petrera-suris-2016, all of it.
+    Returns:
+        A Report with one Finding a claim, in the order of the paper. Exact but for the claims whose verdict is
+        `supported`.
 
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> file = SystemFile.from_member(draw_with_eigenvalues([1, -2], seed=7), "pair")
-    >>> report = verify(file, options=VerifyOptions(sections=(6,)))
-    >>> str(report.verdict), report.findings[1].claim
-    ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
-    """
-    settings = Settings.of(settings, eps, time_step)
-    if (system is None) == (m is None):
-        raise InputError("expected a member of the family, or m: half the dimension of the one in general")
-    if system is None:
-        return verify_universal(m or 0, settings, options)
-    file, options = as_file(system), options or VerifyOptions()
-    member = file.member
-    if member is None:
-        raise InputError(
-            f"{file.name} is of kind [{file.kind}], expected one of kind [family]: the paper is about skew-Hamiltonian "
-            "A and the cubics of its space ('kahanmaps family new' makes such files)"
-        )
-    if member.m > MAX_M:
-        raise InputError(f"found a member with m = {member.m}, expected m <= {MAX_M}")
-    if -1 in member.signs:
-        member = FamilyMember(member.A, member.chosen.K)  # f is the system that the file stands for
-    verifier = _MemberVerifier(member, settings, options)
-    findings = verifier.findings()
-    notes = verifier.notes()
-    context = {
-        **settings.context([file]),
-        "m": member.m,
-        "chi": format_univariate(chi_of(member.A)),
-        "factors": [str(factor) for factor in member.factors],
-        "order": options.order,
-        "controls": options.controls,
-    }
-    return Report("verify", tuple(findings), context, notes)
-
-
-def verify_universal(m: int, settings: Settings | None = None, options: VerifyOptions | None = None) -> Report:
-    """Every claim for the member in general: roots, cubics, symplectic change, x and eps all at random over GF(p).
-
-    The error bound of each claim is on the probability that it is false for the generic member. A claim that could
-    also be proved in normal form is `proved`, for every member with distinct roots. Half the dimension is `m`, from 1
-    to 8; the claims are for every eps. Returns a Report like `verify`; raises InputError for another m, or an eps.
+    Raises:
+        InputError: where the system is not of kind [family], and for another m.
 
     Source: petrera-suris-2016, all of it; schwartz-1980 for the bounds.
 
-    >>> report = verify_universal(2, options=VerifyOptions(sections=(6,)))
-    >>> str(report.verdict), report.findings[1].also[0].data["error_bound"]
-    ('proved', '2^-145')
+    >>> report = verify(m=2, options=VerifyOptions(sections=(6,)))
+    >>> str(report.verdict), report.findings[1].claim
+    ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
+    >>> report.findings[0].also[0].data["error_bound"]
+    '2^-145'
     """
-    settings, options = settings or Settings(), options or VerifyOptions()
-    if not 1 <= m <= MAX_M:
-        raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M}")
-    if settings.eps is not None:
-        raise InputError("found an eps, expected none: universal claims are for every eps")
-    verifier = _UniversalVerifier(m, settings, options)
+    settings, options = Settings.of(settings, eps, time_step), options or VerifyOptions()
+    if (system is None) == (m is None):
+        raise InputError("expected a member of the family, or m: half the dimension of the one in general")
+    if system is None:
+        if m is None or not 1 <= m <= MAX_M:
+            raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M}")
+        if settings.eps is not None:
+            raise InputError("found an eps, expected none: universal claims are for every eps")
+        member, context = (
+            None,
+            {
+                "version": __version__,
+                "system": f"universal, m = {m}",
+                "eps": "every",
+                "time_step": "every",
+                "convention": CONVENTION,
+                "arithmetic": "exact",
+                "seed": settings.seed,
+                "error_bits": settings.error_bits,
+                "m": m,
+            },
+        )
+    else:
+        file = as_file(system)
+        member = file.member
+        if member is None:
+            raise InputError(
+                f"{file.name} is of kind [{file.kind}], expected one of kind [family]: the paper is about "
+                "skew-Hamiltonian A and the cubics of its space ('kahanmaps family new' makes such files)"
+            )
+        if member.m > MAX_M:
+            raise InputError(f"found a member with m = {member.m}, expected m <= {MAX_M}")
+        if -1 in member.signs:
+            member = FamilyMember(member.A, member.chosen.K)  # f is the system that the file stands for
+        context = {
+            **settings.context([file]),
+            "m": member.m,
+            "chi": format_univariate(chi_of(member.A)),
+            "factors": [str(factor) for factor in member.factors],
+        }
+    verifier = Verifier(member, member.m if member is not None else m or 0, settings, options)
     findings = verifier.findings()
-    context = {
-        "version": __version__,
-        "system": f"universal, m = {m}",
-        "eps": "every",
-        "time_step": "every",
-        "convention": CONVENTION,
-        "arithmetic": "exact",
-        "seed": settings.seed,
-        "error_bits": settings.error_bits,
-        "m": m,
-        "order": options.order,
-        "controls": options.controls,
-    }
+    context |= {"order": options.order, "controls": options.controls}
     return Report("verify", tuple(findings), context, verifier.notes())
 
 
-class _MemberVerifier(Verifier):
-    """A given member."""
+class Verifier:
+    """How claims are verified: random points over GF(p), a proof, exact points, and controls.
 
-    def __init__(self, member: FamilyMember, settings: Settings, options: VerifyOptions) -> None:
-        super().__init__(settings, options)
-        self.member = member
-        self._seed = seed_for(settings.seed, member.A, member.H, settings.eps)
-        self.m = member.m
-        self.roots = objects_over.rational_roots(member)
+    For a given member, or (None) for the member in general, with half the dimension `m`.
+    """
+
+    def __init__(self, member: FamilyMember | None, m: int, settings: Settings, options: VerifyOptions) -> None:
+        self.member, self.m, self.settings, self.options = member, m, settings, options
+        self.roots = None if member is None else objects_over.rational_roots(member)
+        self._seed = settings.seed if member is None else seed_for(settings.seed, member.A, member.H, settings.eps)
+        self._points: dict[tuple[bool, int], PaperObjects | None] = {}
+
+    def findings(self) -> list[Finding]:
+        """One finding a claim, or one a claim and control and a last one on all controls together."""
+        sections = self.options.sections
+        made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
+        selected = [c for c in made if sections is None or c.section in sections]
+        found: list[Finding] = []
+        without: list[str] = []
+        for k, claim in enumerate(selected):
+            self.settings.progress(f"{claim.place} ({k + 1} of {len(selected)})")
+            if self.options.controls:
+                controls = self.controls(claim)
+                found += controls
+                if self.outside(claim) is None and not any(finding.is_as_expected for finding in controls):
+                    without.append(claim.key)
+            else:
+                found.append(self.verify_claim(claim))
+            for objects in self._points.values():  # or they would remember the values of all claims
+                if objects is not None:
+                    objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
+        if self.options.controls:
+            found.append(_last_word(found, without))
+        return found
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
-        # Where chi splits over Q one pool of points serves all claims.
-        needs_split = roots and self.roots is None
+        """The number-th random point over GF(p); with the roots of chi, if need be, or None where they are not had."""
+        # In general, and where chi splits over Q, one pool of points serves all claims.
+        needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)
         if key not in self._points:
             self._points[key] = self._new_point(needs_split, number)
         return self._points[key]
 
     def _new_point(self, needs_split: bool, number: int) -> PaperObjects | None:
+        member, order = self.member, self.options.order
+        if member is None:
+            rng = random.Random(f"universal {self._seed} {number}")
+            return objects_over.random_objects(self.m, random_prime_field(rng), rng, order)
         rng = random.Random(f"verify {self._seed} {needs_split} {number}")
-        if needs_split and not self.member.is_generic:
+        if needs_split and not member.is_generic:
             return None
         while True:
             try:
                 if needs_split:
-                    chi = chi_of(self.member.A)
                     self.settings.progress("looking for a prime at which chi splits")
                     # One prime in m! splits at worst, so that this fails with probability e^-40.
-                    found = objects_over.split_prime_field(chi, rng, 40 * math.factorial(self.m))
+                    found = objects_over.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                     if found is None:
                         return None
                     K, mod_roots = found
@@ -183,26 +238,32 @@ class _MemberVerifier(Verifier):
                 else:
                     K = random_prime_field(rng)
                     roots = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
-                return objects_over.point_over(self.member, K, roots, self.settings.eps, rng, self.options.order)
+                return objects_over.point_over(member, K, roots, self.settings.eps, rng, order)
             except BadPrime:
                 continue
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
-        if roots and self.roots is None:
+        """A random point over Q; None in general, and where the roots of chi are needed and not rational."""
+        if self.member is None or (roots and self.roots is None):
             return None
         rng = random.Random(f"exact {self._seed} {number}")
         return objects_over.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
+        """The objects as bounds."""
+        if self.member is None:
+            return objects_over.universal_bound_objects(self.m, self.options.order)
         return objects_over.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, roots: bool) -> int:
-        if not roots or self.roots is not None:
+        """A bound for the degree of the field that the coefficients lie in."""
+        if self.member is None or not roots or self.roots is not None:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
 
     def outside(self, claim: Claim) -> str | None:
-        if self.member.is_generic:
+        """Why a claim does not apply, if it does not."""
+        if self.member is None or self.member.is_generic:
             return None
         bounds = self.bounds()
         if not claim.distinct_roots and claim.kind in (Kind.EQUAL, Kind.DIFFERENT):
@@ -214,6 +275,9 @@ class _MemberVerifier(Verifier):
         return None
 
     def what_is_special(self) -> str:
+        """Why a statement for generic A and H may fail here."""
+        if self.member is None:
+            return "its A or H is special"
         if not self.member.is_generic:
             return "its A is not generic"
         reasons = []
@@ -231,30 +295,102 @@ class _MemberVerifier(Verifier):
             reasons.append("A^3 = A, so that H_1 is associated to H_0 where it is not 0")
         return "; ".join(reasons) or "its A or H is special"
 
+    # one claim
+
+    def verify_claim(self, claim: Claim) -> Finding:
+        """The finding on one claim."""
+        reason = self.outside(claim)
+        if reason is not None:
+            return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", reason))
+        if claim.kind is not Kind.EQUAL:
+            return self._verify_existence(claim)
+        statement = ClaimAtPoints(self, claim)
+        decision = decide(statement, self.settings.seed, self.settings.error_bits)
+        found = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
+        if claim.misprint and decision.verdict is Verdict.SUPPORTED:
+            silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
+            return replace(found, verdict=Verdict.UNDECIDED, evidence=silent, also=(found.evidence,), applies=False)
+        if claim.misprint or decision.verdict is Verdict.REFUTED:
+            return found
+        try:
+            proof = self.proof(claim, statement.needs, *statement.bound)
+            if proof is None and claim.theorem:
+                proof = Evidence("hypotheses", f"{claim.theorem} applies; its hypotheses hold by construction")
+            also = tuple(self.also(claim))
+        except Contradiction as error:
+            text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
+            return self._finding(claim, Verdict.REFUTED, Evidence("contradiction", text), witness=error.witness)
+        if proof is not None:
+            if decision.verdict is Verdict.SUPPORTED:
+                return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *also))
+            if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
+                return self._finding(claim, Verdict.PROVED, proof, also)
+        return replace(found, also=(*found.also, *also))
+
+    def _verify_existence(self, claim: Claim) -> Finding:
+        """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
+        roots, outcome, tried = False, None, 0
+        for number in range(_MAX_UNDEFINED):
+            # Large matrices over Q are dear, and where there is a reason for the other side a point over GF(p) will do.
+            modular = bool(claim.at_most) and self.m > 3
+            objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
+            if objects is None:
+                text = "no prime was found at which chi splits into distinct factors"
+                return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+            try:
+                outcome = evaluate(claim, objects)
+            except LookupError:  # the roots of chi are needed, and this field does not have them
+                roots = True
+                continue
+            except UNDEFINED:
+                continue
+            tried += 1
+            if outcome.holds and outcome.pairs:
+                where = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
+                method = "exact rational point" if objects.K is QQ else "point over GF(p)"
+                text = f"{'both sides differ' if claim.kind is Kind.DIFFERENT else 'attained'} at {where}"
+                if claim.kind is Kind.ATTAINED and claim.at_most:
+                    text += f", and it cannot be larger: {claim.at_most}"
+                # Modulo p a rank may be smaller and an equation hold that does not hold over Q, but not conversely.
+                is_proof = claim.kind is Kind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
+                verdict = Verdict.PROVED if is_proof else Verdict.SUPPORTED
+                return self._finding(claim, verdict, Evidence(method, text, {"points": tried}))
+            if tried >= _POINTS:
+                break
+        if outcome is None or not outcome.pairs:
+            text = f"the claim is not defined at any of {_MAX_UNDEFINED} random points"
+            return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+        text = "both sides agree" if claim.kind is Kind.DIFFERENT else "not attained"
+        if claim.in_general:
+            special = f"stated in general; for this member {text} at {tried} random points: {self.what_is_special()}"
+            evidence = Evidence("special member", special, {"points": tried})
+            return replace(self._finding(claim, Verdict.UNDECIDED, evidence), applies=False)
+        evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
+        return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
+
     def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
+        """A proof, if there is one."""
+        blocks, order = claim.blocks_for_proof(self.m), self.options.order
+        if self.member is None:
+            return normal_form_proof(claim.key, blocks, order) if claim.symplectic else None
         if not needs - {"roots"} and (self.roots is not None or "roots" not in needs):
             objects = self.exact_point("roots" in needs, 0)
             if objects is not None and equation.degree == 0 and _holds(claim, objects):
                 return Evidence("exact", "both sides are the same over Q", {})
         if claim.symplectic and self.member.is_generic:
-            evidence = normal_form_proof(claim.key, claim.blocks_for_proof(self.m), self.options.order)
+            evidence = normal_form_proof(claim.key, blocks, order)
             if evidence is not None:
                 verified = "A^T J = J A, A Hess(H) = Hess(H) A^T, distinct roots: verified"
                 data = {**evidence.data, "hypotheses_verified": verified}
                 return Evidence(evidence.method, f"{evidence.summary}; {verified}", data)
-        if equation.degree <= 6 and poles <= 4:
-            return self._symbolic(claim, needs)
-        return None
-
-    def _symbolic(self, claim: Claim, needs: set[str]) -> Evidence | None:
-        vectors = needs - {"roots"}
-        if ("roots" in needs and self.roots is None) or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
+        vectors = sorted(needs - {"roots"})
+        if equation.degree > 6 or poles > 4 or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
             return None
-        objects = objects_over.member_functions(
-            self.member, sorted(needs - {"roots"}), self.settings.eps, PROOF_BUDGET, self.options.order
-        )
+        if "roots" in needs and self.roots is None:
+            return None
+        functions = objects_over.member_functions(self.member, vectors, self.settings.eps, PROOF_BUDGET, order)
         try:
-            outcome = evaluate(claim, objects)
+            outcome = evaluate(claim, functions)
         except (BudgetExceeded, *UNDEFINED):
             return None
         if not outcome.holds:
@@ -264,8 +400,11 @@ class _MemberVerifier(Verifier):
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
     def also(self, claim: Claim) -> Iterable[Evidence]:
+        """Further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
+        if self.member is None or not self.member.is_generic:
+            return
         rng = random.Random(f"also {self._seed} {claim.key}")
-        if claim.blockwise and claim.symplectic and self.member.is_generic:
+        if claim.blockwise and claim.symplectic:
             objects = objects_over.etale_objects(self.member, rng, self.settings.eps, self.options.order)
             chi = format_univariate(chi_of(self.member.A))
             text = f"held at an exact random point of the normal form over Q[t]/({chi})"
@@ -275,11 +414,11 @@ class _MemberVerifier(Verifier):
                 yield Evidence("exact over Q[t]/chi", f"{text}, for all roots at once", {"points": 1})
             except UNDEFINED:  # a point where the map has no value: no evidence, and none is claimed
                 pass
-        if self.options.ball_bits is not None and self.member.is_generic:
-            yield self._by_balls(claim, self.options.ball_bits, rng)
+        if self.options.ball_bits is not None:
+            yield self._by_balls(claim, self.member, self.options.ball_bits, rng)
 
-    def _by_balls(self, claim: Claim, bits: int, rng: random.Random) -> Evidence:
-        objects = objects_over.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
+    def _by_balls(self, claim: Claim, member: FamilyMember, bits: int, rng: random.Random) -> Evidence:
+        objects = objects_over.ball_objects(member, bits, rng, self.settings.eps, self.options.order)
         widest, pairs = -math.inf, 0
         try:
             with objects.K.working():
@@ -298,6 +437,8 @@ class _MemberVerifier(Verifier):
 
     def notes(self) -> list[str]:
         """What holds for the whole table."""
+        if self.member is None:
+            return [NOTE_ON_RANDOM_MEMBERS]
         found = [diagnosis(self.member.A)]
         if self.member.is_generic and not self.options.controls:
             found.append(NOTE_ON_PROOFS)
@@ -306,39 +447,188 @@ class _MemberVerifier(Verifier):
             found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
         return found
 
+    def controls(self, claim: Claim) -> list[Finding]:
+        """The claim on broken input, one finding for every control that it names: each is expected to be refuted."""
+        if claim.misprint:
+            return [self.verify_claim(claim)]
+        found = []
+        for name in claim.breaks:
+            if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
+                continue
+            outcome = self._broken(claim, name)
+            text = f"control {name}: {CONTROLS[name].breaks}"
+            if outcome is None:
+                verdict, evidence = Verdict.UNDECIDED, Evidence("control", f"{text}; not defined, or no roots of chi")
+            elif outcome.holds or not outcome.pairs:
+                verdict, evidence = Verdict.SUPPORTED, Evidence("control", f"{text}; the claim holds all the same")
+            else:
+                field = outcome.objects.K.name
+                verdict, evidence = (
+                    Verdict.REFUTED,
+                    Evidence("control", f"{text}; fails at an exact point over {field}"),
+                )
+            finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
+            place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
+            found.append(replace(finding, control=True, place=place))
+        # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
+        return [finding for finding in found if finding.is_as_expected] or found
 
-class _UniversalVerifier(Verifier):
-    """The member in general."""
+    def _broken(self, claim: Claim, name: str) -> Outcome | None:
+        """The claim on input broken by a control, at a point at which it fails; else the last outcome.
 
-    def __init__(self, m: int, settings: Settings, options: VerifyOptions) -> None:
-        super().__init__(settings, options)
-        self.m = m
+        One point refutes an equation, a rational one unless m is large; that something differs, exists or has a certain
+        rank is refuted where several points in a row do not show it. Over Q ranks and steps of broken maps, where
+        nothing cancels, take minutes from m = 5 on.
+        """
+        at_one = claim.kind is Kind.EQUAL
+        needed = 1 if at_one else _POINTS
+        finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
+        outcome, failed = None, 0
+        for roots in (False, True):
+            for find in finds:
+                for number in range(_POINTS):
+                    objects = find(roots, number)
+                    if objects is None:
+                        continue
+                    try:
+                        outcome = evaluate(claim, broken(name, objects))
+                    except (*UNDEFINED, LookupError):
+                        continue
+                    if outcome.holds:
+                        if claim.kind is not Kind.EQUAL:
+                            return outcome
+                        continue
+                    failed += 1
+                    if failed >= needed:
+                        return outcome
+        return outcome
 
-    def point(self, roots: bool, number: int) -> PaperObjects | None:
-        key = (False, number)
-        if key not in self._points:
-            rng = random.Random(f"universal {self.settings.seed} {number}")
-            field = random_prime_field(rng)
-            self._points[key] = objects_over.random_objects(self.m, field, rng, self.options.order)
-        return self._points[key]
+    def _finding(
+        self,
+        claim: Claim,
+        verdict: Verdict,
+        evidence: Evidence,
+        also: tuple[Evidence, ...] = (),
+        witness: Witness | None = None,
+    ) -> Finding:
+        place = {
+            "key": claim.key,
+            "section": claim.section,
+            "section_title": SECTIONS[claim.section][0],
+            "place": claim.place,
+            "label": claim.label,
+            "makes_sense_for": claim.range_of_m,
+            **({"misprint": claim.misprint} if claim.misprint else {}),
+        }
+        title = f"{claim.place}: {claim.title}" + (" (misprint)" if claim.misprint else "")
+        source = "" if claim.section == 10 else f"petrera-suris-2016, {claim.place}"
+        if claim.label:
+            source += f" [{claim.label}]"
+        return Finding(title, verdict, evidence, also, witness, claim.formula, source, bool(claim.misprint), place)
 
-    def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
+
+class ClaimAtPoints:
+    """A claim as `decide` takes it: at the points of a verifier."""
+
+    name = "claim"
+    no_value = "a denominator seems to vanish identically"
+    patience = _MAX_UNDEFINED
+
+    def __init__(self, verifier: Verifier, claim: Claim) -> None:
+        self._verifier, self._claim = verifier, claim
+        bounds = verifier.bounds()
+        self.bound = bound_of(cast(BoundField, bounds.K), claim.function(bounds))
+        self.needs = bounds.used
+        self._roots = "roots" in self.needs
+        self.conjugates = verifier.conjugates(self._roots)
+
+    @property
+    def where(self) -> str:
+        """What is assumed of the primes."""
+        if self.conjugates == 1:
+            return ""
+        return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
+
+    def trials(self, seed: int) -> Iterator[Trial]:
+        """The claim at one random point after the other."""
+        for number in count():
+            objects = self._verifier.point(self._roots, number)
+            if objects is None:
+                return
+            try:
+                outcome = evaluate(self._claim, objects)
+            except UNDEFINED:
+                yield Trial()
+                continue
+            if not outcome.holds:
+                yield Trial(decision=self._refutation(outcome))
+            elif not outcome.pairs:
+                text = "it does not apply to this member: there is nothing to compare"
+                yield Trial(decision=Decision(Verdict.UNDECIDED, Evidence("outside the hypotheses", text)))
+            else:
+                yield Trial(objects.K.characteristic)
+
+    def data(self, undefined: int) -> dict[str, Any]:
+        """What evidence says beside the bounds."""
+        return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
+
+    def _refutation(self, outcome: Outcome) -> Decision:
+        for number in range(12):
+            objects = self._verifier.exact_point(self._roots, number)
+            if objects is None:
+                break
+            try:
+                exact = evaluate(self._claim, objects)
+            except (*UNDEFINED, LookupError):
+                continue
+            if not exact.holds:
+                evidence = Evidence("exact rational point", "fails at a rational point, exactly")
+                return Decision(Verdict.REFUTED, evidence, witness_of(exact))
+        text = f"fails at a point over {outcome.objects.K.name}, where all denominators are units, so it fails over Q"
+        if self._roots:
+            text = f"fails at a point over {outcome.objects.K.name}, where chi splits"
+        return Decision(Verdict.REFUTED, Evidence("point over GF(p)", text), witness_of(outcome))
+
+
+@lru_cache(maxsize=4096)
+def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
+    """The proof of a claim in normal form with so many blocks; None where it grows beyond the budget.
+
+    Raises Contradiction where the two sides are different rational functions.
+    """
+    claim = next(found for found in claims() if found.key == key)
+    bounds = objects_over.universal_bound_objects(blocks, order)
+    for _ in claim.function(bounds):  # which notes the letters that are used
+        pass
+    vectors = sorted(bounds.used - {"roots"})
+    try:
+        objects = objects_over.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
+        outcome = evaluate(claim, objects)
+    except (BudgetExceeded, *UNDEFINED):
         return None
+    K: Any = objects.K
+    if not outcome.holds:
+        text = f"{claim.place}: {claim.title}: the two sides are different rational functions in normal form"
+        raise Contradiction(text, witness_of(outcome))
+    if not outcome.pairs:
+        return None
+    what = counted(blocks, "block")
+    return Evidence(
+        "symbolic, normal form",
+        f"multiplied out in normal form, {what}, all data indeterminate",
+        {"blocks": blocks, "indeterminates": len(K.variables), "products_of_terms": PROOF_BUDGET - K.budget},
+    )
 
-    def bounds(self) -> PaperObjects:
-        return objects_over.universal_bound_objects(self.m, self.options.order)
 
-    def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
-        if not claim.symplectic:
-            return None
-        return normal_form_proof(claim.key, claim.blocks_for_proof(self.m), self.options.order)
-
-    def notes(self) -> list[str]:
-        """What holds for the whole table."""
-        return [
-            "random members: A = S^{-T} diag(L, L) S^T with random roots L and a random symplectic S, H = sum of "
-            "random planar cubics, hidden by S; x and eps at random. Bounds are for the generic member"
-        ]
+def _last_word(found: Sequence[Finding], without: Sequence[str]) -> Finding:
+    """Whether every claim that was looked at was refuted by some control."""
+    claims_tried = len({finding.place["key"] for finding in found})
+    claim = "every claim fails on some input that breaks one of its hypotheses"
+    if without or not found:
+        text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
+        return Finding(claim, Verdict.UNDECIDED, Evidence("controls", text, {"claims": claims_tried}))
+    text = f"{len(found)} controls of {claims_tried} claims, all refuted at exact points"
+    return Finding(claim, Verdict.PROVED, Evidence("controls", text, {"claims": claims_tried}))
 
 
 def _common_factor(chi: fmpq_poly, coefficients: Iterable[fmpq_poly]) -> fmpq_poly:

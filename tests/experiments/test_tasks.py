@@ -30,8 +30,7 @@ from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits.iteration import Orbit
-from kahanmaps.paper.verifier import VerifyOptions
-from kahanmaps.paper.verify import verify, verify_universal
+from kahanmaps.paper.verify import VerifyOptions, verify
 
 FALSE = """
 name = "false claims"
@@ -86,7 +85,7 @@ def normal_form(system: SystemFile) -> Any:
             "verify-universal",
             None,
             {"m": 2, "sections": 2, "controls": True, "order": 1},
-            lambda: verify_universal(2, None, VerifyOptions((2,), 1, None, True)),
+            lambda: verify(None, None, VerifyOptions((2,), 1, None, True), m=2),
         ),
     ],
 )

@@ -132,10 +132,6 @@ def eliminated(matrix: Matrix, columns: Matrix) -> tuple[Matrix, Any]:
     return [row[n:] for row in rows], determinant
 
 
-def inverse(matrix: Matrix) -> Matrix:
-    return eliminated(matrix, unit(len(matrix)))[0]
-
-
 def determinant(matrix: Matrix) -> Any:
     return eliminated(matrix, unit(len(matrix)))[1]
 

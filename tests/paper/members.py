@@ -7,6 +7,7 @@ from typing import Any
 from flint import fmpq_poly
 
 from kahanmaps.algebra.chance import random_prime_field
+from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime
 from kahanmaps.family.associated import FamilyMember
@@ -15,6 +16,7 @@ from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.paper import objects_over
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Claim, claims
+from kahanmaps.paper.verify import Verifier, VerifyOptions
 
 t = fmpq_poly([0, 1])
 
@@ -78,6 +80,11 @@ def point(name: str, number: int = 0) -> PaperObjects:
             return objects_over.point_over(found, K, roots, None, rng, 3)
         except BadPrime:
             continue
+
+
+def verifier_of(found: FamilyMember | None, m: int = 0) -> Verifier:
+    """The verifier of a member, or of the member in general, without options."""
+    return Verifier(found, m if found is None else found.m, Settings(), VerifyOptions())
 
 
 def named(key: str) -> Claim:

@@ -7,14 +7,12 @@ input, where the two sides differ, written out as rational functions of x and ep
 import pytest
 from bound_helpers import covers, lowest, true_size
 from helpers import together
-from paper.members import member
+from paper.members import member, verifier_of
 
-from kahanmaps.checks.settings import Settings
 from kahanmaps.paper import objects_over
 from kahanmaps.paper.controls import broken
 from kahanmaps.paper.registry import Kind, claims
-from kahanmaps.paper.verifier import ClaimAtPoints, VerifyOptions
-from kahanmaps.paper.verify import _MemberVerifier
+from kahanmaps.paper.verify import ClaimAtPoints
 
 # The letters of the paper
 
@@ -101,7 +99,7 @@ def difference_sizes(claim, o):
 @together("claim, control", BROKEN)
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
     found = member("m=1")
-    examined = _MemberVerifier(found, Settings(), VerifyOptions())
+    examined = verifier_of(found)
     bounds = broken(control, objects_over.bound_objects(found, None, 3))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
     statement = ClaimAtPoints(examined, claim)

@@ -9,19 +9,16 @@ from dataclasses import replace
 
 import pytest
 from helpers import together
-from paper.members import member, named, point
+from paper.members import member, named, point, verifier_of
 
 from kahanmaps.algebra.bounds import Size
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import decide
 from kahanmaps.checks.judge import Contradiction
-from kahanmaps.checks.settings import Settings
-from kahanmaps.paper import proofs, verifier, verify
+from kahanmaps.paper import verify
 from kahanmaps.paper.evaluate import evaluate, witness_of
-from kahanmaps.paper.proofs import normal_form_proof
 from kahanmaps.paper.registry import Claim, Kind, claims
-from kahanmaps.paper.verifier import ClaimAtPoints, VerifyOptions
-from kahanmaps.paper.verify import _MemberVerifier, _UniversalVerifier
+from kahanmaps.paper.verify import ClaimAtPoints, normal_form_proof
 
 IDENTITIES = [c for c in claims() if c.kind is Kind.EQUAL and not c.misprint and c.symplectic]
 
@@ -49,8 +46,7 @@ def only(monkeypatch):
     """Make the list of claims hold one claim only."""
 
     def register(claim):
-        for module in (proofs, verifier):
-            monkeypatch.setattr(module, "claims", lambda: (claim,))
+        monkeypatch.setattr(verify, "claims", lambda: (claim,))
         return claim
 
     return register
@@ -62,7 +58,7 @@ def examine(only):
 
     def run(claim, name="m=2, split"):
         normal_form_proof.cache_clear()
-        return _MemberVerifier(member(name), Settings(), VerifyOptions()).verify_claim(only(claim))
+        return verifier_of(member(name)).verify_claim(only(claim))
 
     return run
 
@@ -82,13 +78,6 @@ def nothing(o):
 # Proofs
 
 
-def test_a_true_claim_has_a_proof(only):
-    only(fabricated(true_claim))
-    evidence = normal_form_proof("fabricated", 2, 3)
-    assert evidence.method == "symbolic, normal form"
-    assert evidence.data["blocks"] == 2
-
-
 def test_a_false_claim_is_a_contradiction(only):
     only(fabricated(false_claim))
     with pytest.raises(Contradiction, match="different rational functions in normal form"):
@@ -100,28 +89,19 @@ def test_a_claim_that_compares_nothing_has_no_proof(only):
     assert normal_form_proof("fabricated", 2, 3) is None
 
 
-def test_beyond_the_budget_there_is_no_proof(only, monkeypatch):
-    only(fabricated(true_claim))
-    monkeypatch.setattr(proofs, "PROOF_BUDGET", 100)
-    assert normal_form_proof("fabricated", 2, 3) is None
-
-
-def test_a_budget_that_the_normal_form_alone_exceeds_gives_no_proof(only, monkeypatch):
-    only(fabricated(true_claim))
-    monkeypatch.setattr(proofs, "PROOF_BUDGET", 20)
-    assert normal_form_proof("fabricated", 2, 3) is None
-
-
-def test_a_false_claim_is_not_proved_by_a_small_budget(only, monkeypatch):
-    only(fabricated(false_claim))
-    monkeypatch.setattr(proofs, "PROOF_BUDGET", 100)
+@pytest.mark.parametrize(("function", "budget"), [(true_claim, 100), (true_claim, 20), (false_claim, 100)])
+def test_beyond_the_budget_there_is_no_proof(function, budget, only, monkeypatch):
+    only(fabricated(function))
+    monkeypatch.setattr(verify, "PROOF_BUDGET", budget)  # 20: the normal form alone exceeds it
     assert normal_form_proof("fabricated", 2, 3) is None
 
 
 def test_a_proof_needs_as_many_indeterminates_as_the_normal_form_has(only):
     # A root and three coefficients a block, eps, and a vector v of length 4.
     only(fabricated(lambda o: [(o.dot(o.vector("v"), o.fx), o.dot(o.fx, o.vector("v")))]))
-    assert normal_form_proof("fabricated", 2, 3).data["indeterminates"] == 2 * 4 + 1 + 4
+    evidence = normal_form_proof("fabricated", 2, 3)
+    assert (evidence.method, evidence.data["blocks"]) == ("symbolic, normal form", 2)
+    assert evidence.data["indeterminates"] == 2 * 4 + 1 + 4
 
 
 def changed(claim):
@@ -211,14 +191,14 @@ def test_without_a_proof_a_true_claim_is_supported(monkeypatch, examine):
 
 
 def test_a_claim_that_holds_at_points_but_not_in_normal_form_is_a_contradiction(monkeypatch, examine):
-    original = proofs.objects_over.normal_form_objects
+    original = verify.objects_over.normal_form_objects
 
     def broken(*arguments):
         o = original(*arguments)
         o.J = o.J + o.I
         return o
 
-    monkeypatch.setattr(proofs.objects_over, "normal_form_objects", broken)
+    monkeypatch.setattr(verify.objects_over, "normal_form_objects", broken)
     finding = examine(fabricated(lambda o: [(o.dot(o.x, o.J * o.x), o.K.zero)]))
     assert (finding.verdict, finding.evidence.method) == (Verdict.REFUTED, "contradiction")
     assert finding.witness is not None
@@ -265,14 +245,9 @@ def test_different_sides_are_proved_different_by_a_point(examine):
     assert (finding.evidence.method, where.startswith("a point over GF(")) == (method, method == "point over GF(p)")
 
 
-def test_equal_sides_are_not_different(examine):
-    finding = examine(fabricated(true_claim, kind=Kind.DIFFERENT))
-    assert finding.verdict is Verdict.REFUTED
-
-
-def test_one_pair_that_agrees_refutes_that_all_differ(examine):
-    finding = examine(fabricated(lambda o: [*false_claim(o), *true_claim(o)], kind=Kind.DIFFERENT))
-    assert finding.verdict is Verdict.REFUTED
+@pytest.mark.parametrize("pairs", [true_claim, lambda o: [*false_claim(o), *true_claim(o)]])
+def test_one_pair_that_agrees_refutes_that_all_differ(pairs, examine):
+    assert examine(fabricated(pairs, kind=Kind.DIFFERENT)).verdict is Verdict.REFUTED
 
 
 def test_a_rank_that_is_attained_is_proved_at_a_rational_point(examine):
@@ -288,18 +263,11 @@ def test_a_rank_that_is_not_attained_is_refuted(examine):
 
 
 def test_a_false_claim_is_refuted_for_the_member_in_general():
-    finding = _UniversalVerifier(2, Settings(), VerifyOptions()).verify_claim(fabricated(false_claim))
+    finding = verifier_of(None, 2).verify_claim(fabricated(false_claim))
     assert finding.verdict is Verdict.REFUTED
 
 
 # Evaluation
-
-
-def test_evaluation_stops_at_the_first_pair_that_fails():
-    o = point("m=2, split")
-    outcome = evaluate(fabricated(lambda o: [(o.K.one, o.K.one), (o.K.one, o.K.zero), (o.K.zero, o.K.one)]), o)
-    assert outcome.pairs == 2
-    assert outcome.failure == (o.K.one, o.K.zero)
 
 
 def test_matrices_of_different_sizes_are_different():
@@ -316,10 +284,6 @@ def test_a_witness_shows_the_first_entry_that_differs():
     assert (witness.left, witness.right) == (("1",), ("0",))
 
 
-def test_what_holds_has_no_witness():
-    assert witness_of(evaluate(fabricated(true_claim), point("m=2, split"))) is None
-
-
 def test_every_random_point_is_another():
     tried = []
 
@@ -328,7 +292,7 @@ def test_every_random_point_is_another():
             tried.append((o.K.characteristic, tuple(map(int, o.x.entries()))))
         yield o.n, o.n
 
-    statement = ClaimAtPoints(_MemberVerifier(member("m=2, split"), Settings(), VerifyOptions()), fabricated(claim))
+    statement = ClaimAtPoints(verifier_of(member("m=2, split")), fabricated(claim))
     statement.bound = (Size(1, 10.0), 0)
     evidence = decide(statement, 0, error_bits=400).evidence
     assert len(evidence.data["primes"]) == evidence.data["points"] >= 6

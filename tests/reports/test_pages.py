@@ -18,7 +18,7 @@ from kahanmaps.display.latex import GREEK_NAMES
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
-from kahanmaps.paper.verifier import VerifyOptions
+from kahanmaps.paper.verify import VerifyOptions
 from kahanmaps.reports.page import font_face, mathml, page_template
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.report import formulas_of, report_html, write_report

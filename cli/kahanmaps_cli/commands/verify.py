@@ -96,7 +96,7 @@ def command(system: str | None, **options: Any) -> int:
         if options["beyond"] and not options["controls"]:
             report = lib.survivors(3 if drawn["m"] is None else drawn["m"], settings)
         elif options["universal"] or options["beyond"]:
-            report = lib.verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
+            report = lib.verify(None, settings, what, m=3 if drawn["m"] is None else drawn["m"])
         else:
             if system is not None:
                 file = opt.load_system(system, {"parameters": options["parameters"]})

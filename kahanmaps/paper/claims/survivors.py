@@ -21,8 +21,7 @@ from kahanmaps.paper.evaluate import UNDEFINED, Outcome, same, witness_of
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, claims
 from kahanmaps.paper.variations import VARIATIONS
-from kahanmaps.paper.verifier import VerifyOptions
-from kahanmaps.paper.verify import verify_universal
+from kahanmaps.paper.verify import VerifyOptions, verify
 
 _MOST_ONES = 7
 _KEY = "not "
@@ -34,13 +33,13 @@ def survivors(m: int = 3, settings: Settings | None = None) -> Report:
     """Every statement for every variation, in half the dimension m: what holds is proved, what fails is refuted.
 
     Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
-    as `verify_universal` does.
+    as `verify` does.
 
     >>> cells = {found.claim: found for found in survivors(1).findings}
     >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary
     'fails for m = 1, H = u1^3 + v1'
     """
-    report = verify_universal(m, settings, VerifyOptions(beyond=True))
+    report = verify(None, settings, VerifyOptions(beyond=True), m=m)
     by_key = {claim.key: claim for claim in claims()}
     functions = {formula: function for function, formula, *_ in STATEMENTS}
     cells = []
