@@ -14,7 +14,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.matrices import solve
-from kahanmaps.errors import InexactNumber, InputError, SingularMatrix
+from kahanmaps.errors import InexactNumber
 
 D = DualField(QQ)
 FUNCTIONS = FunctionField(["x", "y"], budget=10**12)
@@ -88,15 +88,6 @@ def test_numbers_on_either_side_are_constants(result, value, slope):
     assert (result.value, result.slope) == (value, slope)
 
 
-def test_a_dual_number_equals_a_number_if_its_slope_is_zero():
-    assert (D.dual(3, 0) == 3, 3 == D.dual(3, 0), D.dual(3, 1) == 3, D.dual(3, 0) == fmpq(1, 2)) == (
-        True,
-        True,
-        False,
-        False,
-    )
-
-
 def test_an_inner_dual_number_is_a_constant_of_the_outer_ones_on_either_side():
     outer = DualField(D).dual(D.dual(5, 7), D.dual(1, 0))
     assert (x * outer, outer - x, x - outer) == (outer * x, -(x - outer), -(outer - x))
@@ -106,14 +97,6 @@ def test_an_inner_dual_number_is_a_constant_of_the_outer_ones_on_either_side():
 @pytest.mark.parametrize("operation", [lambda: x + 0.5, lambda: 0.5 * x, lambda: x / 0.5, lambda: D.dual(0.5, 1)])
 def test_a_machine_number_is_refused(operation):
     with pytest.raises(InexactNumber):
-        operation()
-
-
-@pytest.mark.parametrize(
-    "operation", [lambda: x + "1", lambda: None * x, lambda: x**0.5, lambda: x + DualField(GF(7)).one]
-)
-def test_what_is_no_number_is_no_operand(operation):
-    with pytest.raises(TypeError):
         operation()
 
 
@@ -161,14 +144,6 @@ def test_a_solution_solves_the_system_column_by_column(base, data, n):
 
 
 @over_all_bases
-def test_a_matrix_of_singular_value_is_refused_although_its_slope_is_regular(base):
-    field = DualField(base)
-    matrix = field.identity(2) * field.dual(0, 1)
-    with field.working(), pytest.raises(SingularMatrix):
-        solve(matrix, field.column([0, 0]))
-
-
-@over_all_bases
 @some
 @given(data=st.data())
 def test_sums_transposes_and_multiples_of_matrices_are_taken_entry_by_entry(base, data):
@@ -182,33 +157,4 @@ def test_sums_transposes_and_multiples_of_matrices_are_taken_entry_by_entry(base
         assert agree(field, found.transpose(), field.matrix(3, 2, [found[i, j] for j in range(3) for i in range(2)]))
 
 
-@over_all_bases
-@pytest.mark.parametrize("scalar", [3, fmpq(3)], ids=["int", "fmpq"])
-def test_a_scalar_multiplies_a_matrix_from_both_sides(base, scalar):
-    field = DualField(base)
-    matrix, expected = field.matrix(1, 2, [field.dual(1, 2), 5]), field.matrix(1, 2, [field.dual(3, 6), 15])
-    with field.working():
-        both = [matrix * scalar, scalar * matrix, matrix * base.convert(3), base.convert(3) * matrix]
-        assert both == [expected] * 4
-
-
-def test_matrices_over_different_duals_do_not_mix():
-    with pytest.raises(InputError, match="expected one over"):
-        DualField(RR(64)).identity(1) * DualField(RR(65)).identity(1)
-
-
 # The field.
-
-
-@over_all_bases
-def test_dual_numbers_are_equal_if_both_parts_are(base):
-    field = DualField(base)
-    one, others = field.dual(1, 2), [field.dual(1, 2), field.dual(1, 3), field.dual(0, 2)]
-    with field.working():
-        assert [field.equal(one, other) for other in others] == [True, False, False]
-        assert [one == other for other in others] == [True, False, False]
-
-
-@over_all_bases
-def test_dual_fields_of_the_same_base_are_equal_and_hash_alike(base):
-    assert (DualField(base), hash(DualField(base))) == (DualField(base), hash(DualField(base)))

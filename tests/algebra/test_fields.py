@@ -4,14 +4,13 @@ Specified here: what `convert` takes and what it refuses, that it respects sums 
 which moduli and precisions are allowed, and what a ball may be said to be.
 """
 
-import random
 from fractions import Fraction
 from itertools import product
 
 import flint
 import numpy as np
 import pytest
-from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mod_ctx, nmod
+from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mod_ctx, nmod
 from helpers import FIELDS, SMALLEST_LARGE_PRIME, encloses, over_exact_fields, rationals, some, together
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -19,7 +18,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.algebra.fields import CC, GF, QQ, RR, PrimeField, rational
+from kahanmaps.algebra.fields import CC, GF, QQ, RR, rational
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.matrices import nullspace, rank
 from kahanmaps.algebra.polynomials import evaluate, ring
@@ -58,12 +57,6 @@ MACHINE_NUMBERS = [0.1, -0.0, float("nan"), float("inf"), 1e300, 1j, np.float64(
 @together("field, value", product(ALL_FIELDS, MACHINE_NUMBERS))
 def test_a_machine_number_is_refused_by_every_field(field, value):
     with pytest.raises(InexactNumber, match="machine number"):
-        field.convert(value)
-
-
-@together("field, value", product(ALL_FIELDS, [True, None, (1, 2), {}, b"1", object()]))
-def test_what_is_no_number_is_refused_by_every_field(field, value):
-    with pytest.raises(InputError, match="expected"):
         field.convert(value)
 
 
@@ -124,17 +117,6 @@ def test_a_ball_is_read_from_midpoint_and_radius(text, left, right, outside):
     assert [encloses(ball, rational(number)) for number in (left, right, outside)] == [True, True, False]
 
 
-@pytest.mark.parametrize("text", ["[1 +/- x]", "[. +/- .]", "[1 +/- ]", "[ +/- 1]", "[1e5 +/- e1]", "[nan +/- 1]"])
-def test_a_ball_that_is_not_spelled_out_is_refused(text):
-    with pytest.raises(InputError):
-        RR(64).parse(text)
-
-
-def test_a_ball_of_more_digits_than_the_precision_can_hold_is_refused():
-    with pytest.raises(InputError, match="too long for 64 bits"):
-        RR(64).parse(f"[1.{'0' * 1000} +/- 1e-5]")
-
-
 COMPLEX = [  # text, real part, imaginary part
     ("1/2", "1/2", "0"),
     ("-3j", "0", "-3"),
@@ -154,34 +136,12 @@ def test_a_complex_ball_is_read_from_its_parts(text, real, imaginary):
     assert not encloses(ball.imag, rational(imaginary) + 3)
 
 
-@pytest.mark.parametrize("bits", [8, 128])
-@some
-@given(real=rationals(10**20), imaginary=rationals(10**20))
-def test_the_text_of_a_complex_ball_comes_back_as_a_ball_around_it(bits, real, imaginary):
-    ball = acb(RR(bits).convert(real), RR(bits).convert(imaginary))
-    assert CC(bits).parse(CC(bits).format(ball)).contains(ball)
-
-
-@pytest.mark.parametrize(
-    "text", ["j", "1 +j", "1 + j", "1j + 2", "(1 + 2j)", "[1 +/- x]j", "1 + 2i", "1 + 2 + 3j", "nanj"]
-)
-def test_a_complex_ball_that_is_not_spelled_out_is_refused(text):
-    with pytest.raises(InputError):
-        CC(64).parse(text)
-
-
 # Prime fields.
 
 
 @pytest.mark.parametrize("modulus", [4, 561, 2**67 - 1, 3215031751])  # 561 and the last pass weak tests of primality
 def test_a_composite_modulus_is_refused(modulus):
     with pytest.raises(InputError, match="is composite"):
-        GF(modulus)
-
-
-@pytest.mark.parametrize("modulus", [1, 0, -7])
-def test_a_modulus_below_two_is_refused(modulus):
-    with pytest.raises(InputError, match="at least 2"):
         GF(modulus)
 
 
@@ -192,32 +152,12 @@ def test_a_modulus_that_is_no_integer_is_refused_even_after_its_equal_was_accept
         GF(modulus)
 
 
-def test_a_modulus_is_an_integer_of_any_library():
-    assert GF(fmpz(7)) is GF(np.int64(7)) is GF(np.array(7)) is GF(7)
-
-
 def test_a_modulus_too_long_to_be_proved_prime_quickly_is_refused():
     with pytest.raises(InputError, match="expected at most 512"):
         GF(2**521 - 1)
 
 
-def test_fields_of_the_same_prime_are_equal_and_hash_alike():
-    assert (PrimeField(7), hash(PrimeField(7))) == (GF(7), hash(GF(7)))
-
-
-@pytest.mark.parametrize("other", [GF(5), QQ, RR(7), 7], ids=repr)
-def test_fields_of_different_kind_or_prime_are_different(other):
-    assert GF(7) != other
-
-
 # Balls.
-
-
-@over_balls
-def test_a_ball_around_a_third_is_not_a_third_but_overlaps_it(balls):
-    third = balls(64).convert("1/3")
-    assert (third * 3 == 1) is False  # balls: `!=` means certainly different, which is not the opposite
-    assert balls(64).equal(third * 3, balls(64).one)
 
 
 @over_balls
@@ -286,23 +226,7 @@ def test_a_precision_out_of_range_is_refused_even_after_its_equal_was_accepted(b
         balls(bits)
 
 
-@over_balls
-def test_balls_of_the_same_precision_are_the_same_field_and_of_another_precision_are_not(balls):
-    field, again = balls(64), type(balls(64))(64)
-    assert (field == again, hash(field) == hash(again), field == balls(65)) == (True, True, False)
-
-
 # Random elements and matrices.
-
-
-@over_all_fields
-def test_random_elements_are_determined_by_the_seed(field):
-    def draws(seed):
-        rng = random.Random(seed)
-        return [field.format(field.random(rng)) for _ in range(64)]
-
-    assert draws(1) == draws(1)
-    assert draws(1) != draws(2)
 
 
 ALGEBRA = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
@@ -312,9 +236,3 @@ FUNCTIONS = FunctionField(["x"])
 @pytest.mark.parametrize("field", [QQ, RR(64), CC(64), ALGEBRA, FUNCTIONS, BoundField(), DualField(QQ)], ids=repr)
 def test_only_fields_of_residues_have_a_characteristic(field):
     assert (field.characteristic, GF(7).characteristic, DualField(GF(7)).characteristic) == (0, 7, 7)
-
-
-@over_balls
-def test_a_matrix_of_balls_keeps_the_precision_of_the_field(balls):
-    entry = balls(300).convert_matrix(fmpq_mat(1, 1, [fmpq(1, 3)]))[0, 0]
-    assert entry.rel_accuracy_bits() >= 298

@@ -121,30 +121,3 @@ def test_the_budget_is_spent_before_the_work_is_done():
         power = power * power
     with pytest.raises(BudgetExceeded):
         _ = power * power * power * power
-
-
-def test_a_determinant_costs_the_same_the_second_time_and_is_refused_by_the_same_budgets():
-    def determinant(budget):
-        field = FunctionField(NAMES, budget)
-        x, y = field.variables
-        entries = [field.convert(k) + x * field.convert(k * k) + y for k in range(1, 17)]
-        return field, field.matrix(4, 4, entries).det()
-
-    with pytest.raises(BudgetExceeded):
-        determinant(200)  # given up: with more it is expanded all the same
-    field, first = determinant(10_000)
-    again, second = determinant(10_000)
-    assert (first.above, field.budget) == (second.above, again.budget)
-    cost = 10_000 - field.budget
-    assert determinant(cost)[0].budget == 0
-    with pytest.raises(BudgetExceeded):
-        determinant(cost - 1)
-
-
-def test_no_more_minors_are_kept_than_there_is_room_for(monkeypatch):
-    monkeypatch.setattr("kahanmaps.algebra.functions._kept", kept := {})
-    monkeypatch.setattr("kahanmaps.algebra.functions._MOST_KEPT", 3)
-    x, y = FIELD.variables
-    values = [FIELD.matrix(2, 2, [x, y, y, x + FIELD.convert(k)]).det() for k in (*range(9), *range(9))]
-    assert len(kept) == 3
-    assert all(FIELD.equal(value, x * x + x * FIELD.convert(k % 9) - y * y) for k, value in enumerate(values))

@@ -11,12 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.interpolation import Reconstruction, rational_reconstruction, rational_vector, reconstruct
-from kahanmaps.algebra.modular_fit import Quotient, Shape
+from kahanmaps.algebra.interpolation import Reconstruction, rational_reconstruction, reconstruct
 from kahanmaps.algebra.polynomials import RationalFunction, monomials, ring
-from kahanmaps.algebra.residues import from_residues, random_prime
+from kahanmaps.algebra.residues import from_residues
 from kahanmaps.algebra.written.text import parse_rational_function
-from kahanmaps.errors import InputError
 
 SPARE = 12  # values that confirm, or cover a round number
 
@@ -109,18 +107,6 @@ def test_random_functions(case: tuple[list[str], list[RationalFunction]]):
     assert found(known, names).samples <= limit + 9 * len(names) + SPARE
 
 
-def test_a_few_primes_may_fail_before_the_box_is_blamed():
-    box, seen = Box(functions(["x"], "123456789123456789123456789*x")), list[int]()
-
-    def modulo_one_prime(prime: int, point: tuple[int, ...]) -> tuple[int, ...] | None:
-        seen.append(prime)
-        return box(prime, point) if prime == seen[0] else None
-
-    result = reconstruct(modulo_one_prime, ["x"])
-    # the first one, three that do not lift it, and two more that are no better to begin with
-    assert (result.functions, len(result.primes), len(set(seen))) == (None, 6, 6)
-
-
 def test_a_box_without_values_gives_none():
     result = reconstruct(lambda p, point: None, ["x"])
     assert (result.functions, result.samples) == (None, 60)
@@ -192,11 +178,6 @@ def test_limits():
     assert time.monotonic() - start < 0.5
 
 
-def test_values_of_different_lengths_are_refused():
-    with pytest.raises(InputError, match="lengths"):
-        reconstruct(lambda p, point: [1] * (1 + point[0] % 2), ["x"])
-
-
 @given(st.integers(2, 400), st.integers(0, 10**6))
 def test_rational_reconstruction_is_unique_or_none(modulus: int, residue: int):
     within = {
@@ -209,31 +190,6 @@ def test_rational_reconstruction_is_unique_or_none(modulus: int, residue: int):
         and (n - residue * d) % modulus == 0
     }
     assert within == {x for x in [rational_reconstruction(residue, modulus)] if x is not None}
-
-
-@pytest.mark.parametrize(("bits", "is_one"), [(40, True), (49, False)])
-def test_a_number_above_the_bound_is_not_taken_over_the_denominator_of_the_others(bits: int, is_one: bool):
-    """Every other of eight numbers says what the denominator is: the bound is m^(4/5)/2^4, about 2^44.8."""
-    modulus, below = 2**61 - 1, 2**34 + 25
-    numbers = [fmpq(2**34 - 3**k, below) for k in range(5, 13)]
-    numbers[3] = fmpq(2**bits + 1, below)
-    residues = [int(x.p) * pow(int(x.q), -1, modulus) % modulus for x in numbers]
-    assert rational_vector(residues, modulus) == (tuple(numbers) if is_one else None)
-
-
-@pytest.mark.parametrize(("bits", "primes"), [(2, {2, 3}), (3, {5, 7}), (5, {17, 19, 23, 29, 31})])
-def test_random_primes_are_all_those_of_so_many_bits(bits: int, primes: set[int]):
-    assert {random_prime(random.Random(k), bits) for k in range(60)} == primes
-
-
-@pytest.mark.parametrize("prime", [7, 101, 2**61 - 1])
-def test_numerators_up_to_a_factor_are_equal_where_they_are_multiples(prime: int):
-    shape = Shape(((1, 0), (0, 1), (0, 0)), ((0, 0),))
-    numerators = [tuple(c * factor % prime for c in (3, 5, 2)) for factor in (1, 2, 6, prime - 1)]
-    found = {Quotient(shape, above, (1,)).numerator_up_to_factor(prime) for above in numerators}
-    (only,) = found
-    assert (only[0], only[1] * 3 % prime, only[2] * 3 % prime) == (1, 5, 2)
-    assert Quotient(Shape((), ((0, 0),)), (), (1,)).numerator_up_to_factor(prime) == ()
 
 
 def test_numbers_from_residues_modulo_primes_as_many_as_it_takes():

@@ -64,18 +64,6 @@ def test_a_curve_is_not_solved_and_not_dropped():
     assert "not isolated points" in found.reason
 
 
-def test_equations_whose_basis_would_be_too_large_are_not_dropped(monkeypatch):
-    monkeypatch.setattr("kahanmaps.algebra.small_systems.GROEBNER_LIMITS", (1, 1, 1))
-    found = solve(x**2 + y**2 - 5, x * y - 2, z)
-    assert (found.complete, found.reason) == (False, "a Groebner basis would be too large")
-    assert sorted(map(str, found.unsolved[0].equations)) == ["x*y - 2", "x^2 + y^2 - 5"]
-
-
-def test_the_time_is_a_reason():
-    found = solve(x**2 + y**2 - 1, z - x, seconds=-1.0)
-    assert (found.complete, found.reason) == (False, "the time is over")
-
-
 @pytest.mark.parametrize(
     ("equations", "expected"),
     [

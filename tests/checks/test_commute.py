@@ -18,15 +18,13 @@ from check_helpers import (
     half_step,
     only,
     system_of,
-    verdicts,
     verify_commute_witness,
 )
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
 from hypothesis import assume, given
 
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
-from kahanmaps.checks import commute, judge, theorems
+from kahanmaps.checks import judge, theorems
 from kahanmaps.checks import settings as settings_module
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
@@ -38,7 +36,6 @@ from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -122,12 +119,6 @@ def test_without_the_theorem_the_pairs_of_a_class_are_supported(name, monkeypatc
     assert control.verdict is REFUTED
 
 
-def test_a_member_at_one_named_eps_is_proved_and_its_control_refuted_at_that_eps():
-    report = check_commute(SystemFile.from_member(MEMBERS["m=2, split"]), settings=Settings(eps="-3/5", steps=2))
-    assert verdicts(report) == [PROVED, REFUTED]
-    assert report.findings[1].witness.eps == "-3/5"
-
-
 def test_a_control_that_commutes_is_noted():
     # A^2 = I makes f_1 = A^T f_0 an associated system: the control cannot fail, and the report says so.
     report = check_commute(SystemFile.from_member(draw_with_eigenvalues([1, -1], seed=3)), settings=QUICK)
@@ -143,16 +134,6 @@ def test_a_class_of_too_many_systems_is_compared_at_single_minus_signs(monkeypat
     assert len(report.findings) == comb(5, 2) + 1
     assert report.verdict is PROVED
     assert any("2^3" in note for note in report.notes)
-
-
-def test_beyond_some_pairs_the_hypotheses_alone_are_verified(monkeypatch):
-    monkeypatch.setattr(commute, "_PAIRS_TRIED", 2)
-    report = check_commute(SystemFile.from_member(SPLIT3), settings=QUICK)
-    pairs, _, _ = parts(report)
-    assert {found.verdict for found in pairs} == {PROVED}
-    tried = ["random points over GF(p)", "exact orbit"]
-    assert [[evidence.method for evidence in found.also] for found in pairs] == [tried] * 2 + [[]] * 4
-    assert any("first 2 pairs" in note for note in report.notes)
 
 
 # Pairs from two files
@@ -233,12 +214,6 @@ def test_shears_along_one_direction_are_supported():
     assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
 
 
-def test_linear_systems_with_commuting_matrices_are_supported():
-    # Phi is the Cayley transform (I - eps A)^{-1} (I + eps A); no theorem of the library covers A and A^2.
-    f, g = system_of("x y", "x + 2*y", "3*x + 4*y"), system_of("x y", "7*x + 10*y", "15*x + 22*y")
-    assert only(pair(f, g)).verdict is SUPPORTED
-
-
 def map_of(*image):
     return parse_system(f'variables = ["x", "y"]\n[map]\nimage = {list(image)}\n', "inline")
 
@@ -272,27 +247,7 @@ def test_a_map_that_is_the_identity_at_another_eps_is_compared():
         check_commute(load("lotka_volterra"), AT_A_TENTH, Settings(eps="1/9", steps=2), eps2="1/10")
 
 
-def test_a_member_of_the_family_with_the_cubic_0_has_no_maps_that_commute():
-    member = FamilyMember(fmpq_mat(2, 2, [1, 0, 0, 1]), parse_polynomial("0", ["q", "p"]))
-    with pytest.raises(InputError, match="whose map is the identity"):
-        check_commute(SystemFile.from_member(member), None, QUICK)
-
-
 # What is told
-
-
-def test_maps_are_compared_for_every_eps_where_one_of_them_has_it():
-    turned = explicit_map(["x", "y"], [parse_rational_function(text, ["x", "y", "eps"]) for text in ("-y", "x")])
-    pairs = [(LOTKA_VOLTERRA, turned), (turned, LOTKA_VOLTERRA), (turned, turned)]
-    identities = [commute.commutativity(f, g, None, ("f", "g")) for f, g in pairs]
-    assert [identity.where for identity in identities] == [", for every eps", ", for every eps", ""]
-
-
-def test_variables_are_matched_by_position_and_that_is_noted():
-    g = FORCED_PLANE.renamed(["a", "b"])
-    report = pair(FORCED_PLANE, g)
-    assert report.verdict is PROVED
-    assert report.notes == ["variables are matched by position: x, y with a, b"]
 
 
 @pytest.mark.parametrize("names", [("y", "x"), ("x", "y")])
@@ -316,12 +271,6 @@ def test_a_start_at_which_the_map_has_no_value_is_told():
     assert (orbit["start"], orbit["status"], orbit["steps"]) == (["5"], "singular", 0)
     assert "could not be tried at any point" in only(report).also[-1].summary
     assert "det(I - eps f'(x)) = 0 at step 0" in only(report).also[-1].summary
-
-
-def test_a_start_beyond_the_budget_is_tried_all_the_same():
-    report = pair(LORENZ, LORENZ, Settings(start=("1/" + "3" * 100, 1, 1), max_digits=20))
-    assert report.to_json()["orbit"]["start"][0] == "1/" + "3" * 100
-    assert "held exactly at 1 point of an orbit" in only(report).also[-1].summary
 
 
 def test_without_a_start_singular_starts_are_avoided(monkeypatch):

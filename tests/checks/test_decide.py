@@ -108,18 +108,6 @@ def test_as_many_points_are_tried_as_the_bound_needs_and_all_are_told(error_bits
     assert [str(field.prime) for field in fields] == data["primes"]
 
 
-def test_the_sentence_of_the_evidence_says_what_the_data_say():
-    evidence = decide(TRUE, 0).evidence
-    points, bound = evidence.data["points"], evidence.data["error_bound"]
-    assert evidence.summary == (
-        f"held at {points} random points over GF(p), p random of 63 bits, for every eps; "
-        f"false with probability below {bound}"
-    )
-    one = decide(identity_of(square_left, square_right, eps=fmpq(-1, 3)), 0).evidence
-    assert (evidence.data["eps"], one.data["eps"]) == ("every", "-1/3")
-    assert "for eps = -1/3;" in one.summary
-
-
 # The error of one trial, from the sources: bad primes among more than 3N/(5 ln N), roots at most degree/p
 
 
@@ -198,14 +186,6 @@ def test_where_no_rational_point_shows_it_the_witness_is_modular():
     assert (decision.witness.left, decision.witness.right) == ((str(x),), (str(p - x),))
 
 
-def test_a_difference_that_the_first_prime_divides_is_found_with_the_next():
-    first, second = (int(prime) for prime in decide(TRUE, 0).evidence.data["primes"])
-    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(first), degree=1, bits=64.0)
-    decision = decide(identity, 0)
-    assert second != first
-    assert decision.verdict is REFUTED
-
-
 def shifted(shift: int, subject: tuple[Any, ...]) -> Identity:
     """x = x + shift, which is false."""
     identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(shift), degree=1, bits=127.0)
@@ -236,13 +216,6 @@ def test_an_identity_that_holds_at_one_eps_is_supported_there_and_refuted_elsewh
     (x,), (at,) = exact(*decision.witness.point), exact(decision.witness.eps)
     assert eps is None or at == fraction(eps)
     verify_witness(decision.witness, [x * at], [x / 3])
-
-
-def test_a_witness_against_every_eps_is_looked_for_at_more_than_one_eps():
-    decision = decide(identity_of(lambda x, e, K: x * e, lambda x, e, K: x), 0)
-    (x,), (eps,) = exact(*decision.witness.point), exact(decision.witness.eps)
-    assert eps != 1
-    verify_witness(decision.witness, [x * eps], [x])
 
 
 def draw_first(monkeypatch, prime):
@@ -281,18 +254,6 @@ def test_an_identity_defined_nowhere_is_undecided(sides):
     assert "a denominator seems to vanish identically" in decision.evidence.summary
 
 
-class Ended(Stated):
-    """An identity with no further points to be had."""
-
-    def trials(self, seed):
-        return iter([])
-
-
-def test_a_statement_without_points_is_undecided():
-    decision = decide(Ended(1, TRUE.sides, None, subject=()), 0)
-    assert (decision.verdict, decision.witness, decision.evidence.data["points"]) == (UNDECIDED, None, 0)
-
-
 @pytest.mark.parametrize(("factor", "verdict"), [(1, UNDECIDED), (2, REFUTED)])
 def test_an_identity_without_values_over_bounds_has_no_bound_and_is_not_supported(factor, verdict):
     def sides(field, point, eps):
@@ -323,18 +284,6 @@ def test_an_identity_of_too_large_a_degree_is_undecided(degree):
     assert decide(identity_of(square_left, square_right, degree=1, poles=degree), 0).verdict is UNDECIDED
 
 
-@pytest.mark.parametrize(("bound", "points"), [(-0.5, 0), (-1.0, 0), (-1.5, 67)])
-def test_where_a_trial_is_wrong_as_often_as_not_nothing_is_decided(bound, points, monkeypatch):
-    monkeypatch.setattr(decide_module, "log2_error", lambda *_: bound)
-    identity, fields = counted(identity_of(square_left, square_right))
-    assert (decide(identity, 0).verdict, len(fields)) == (SUPPORTED if points else UNDECIDED, points)
-
-
-def test_an_error_of_another_kind_is_not_swallowed():
-    with pytest.raises(ZeroDivisionError):
-        decide(Stated(1, raises(ZeroDivisionError), None, subject=()), 0)
-
-
 # Chance, and how to repeat it
 
 
@@ -344,58 +293,7 @@ def test_the_same_seed_gives_the_same_decision():
         assert decide(identity, 12) == decide(identity, 12)
 
 
-def test_another_seed_draws_other_primes_and_points():
-    drawn = set()
-    for seed in range(20):
-        identity, fields = counted(TRUE)
-        decide(identity, seed)
-        drawn |= {field.prime for field in fields}
-    assert len(drawn) == 40
-
-
-def test_the_primes_drawn_are_spread_evenly():
-    rng = random.Random(2)
-    eighths = [0] * 8
-    for _ in range(1600):
-        eighths[(random_prime_field(rng).prime - 2**62) >> 59] += 1
-    # 200 expected in each eighth; chi squared with 7 degrees of freedom exceeds 29.9 with probability 10^-4.
-    assert sum((count - 200) ** 2 / 200 for count in eighths) < 29.9
-
-
-def test_every_eps_is_drawn_from_the_units(monkeypatch):
-    # Over GF(3) a third of all draws would meet 0 if it were allowed.
-    seen = set()
-
-    def sides(field, point, eps):
-        seen.add(int(eps))
-        return [], []
-
-    monkeypatch.setattr(decide_module, "random_prime_field", lambda rng: GF(3))
-    decide(Stated(1, sides, None, subject=()), 0, 3000)
-    assert seen == {1, 2}
-
-
-def test_points_to_look_for_a_witness_grow_slowly():
-    points = small_points(3, random.Random(1), 400)
-    heights = [max(max(abs(fraction(a).numerator), fraction(a).denominator) for a in point) for point in points]
-    assert heights[0] <= 1
-    assert max(heights) <= 41
-    assert max(heights[:100]) <= 10
-
-
-def test_points_to_look_for_a_witness_are_integers_first_and_fractions_later():
-    points = small_points(3, random.Random(1), 400)
-    assert all(entry.q == 1 for point in points[:200] for entry in point)
-    assert any(entry.q != 1 for point in points[200:] for entry in point)
-
-
 # Witnesses
-
-
-def test_a_witness_shows_all_of_both_sides():
-    point = (fmpq(1, 2),)
-    witness = witness_of(TRUE, QQ, point, fmpq(1), ([fmpq(1), fmpq(2)], [fmpq(1), fmpq(3)]))
-    assert (witness.point, witness.left, witness.right) == (("1/2",), ("1", "2"), ("1", "3"))
 
 
 def test_a_witness_with_named_entries_shows_the_first_that_differs():

@@ -62,10 +62,6 @@ def test_a_small_budget_ends_without_an_answer():
     assert expansion(identity(CONSERVED, None), budget=100) is None
 
 
-def test_sides_that_are_not_defined_prove_nothing():
-    assert expansion(Identity(1, lambda field, x, eps: None, None, subject=())) is None
-
-
 @pytest.mark.parametrize("k", [0, 2])
 def test_every_eps_is_not_an_eps_that_equals_a_coordinate(k):
     """eps = x_k holds where eps is that coordinate, and eps x_k = x_k eps everywhere."""

@@ -63,17 +63,6 @@ def test_a_proof_decides_and_the_points_stand_beside_it():
     assert [evidence.method for evidence in found.also] == ["random points over GF(p)", "exact orbit"]
 
 
-def test_beside_a_proof_one_random_point_is_enough():
-    found = judge("c", TRUE, Settings(error_bits=5000), PROOF)
-    assert found.also[0].data["points"] == 1
-
-
-def test_without_proof_there_are_as_many_points_as_the_error_asks_for(at_points_only):
-    found = judge("c", TRUE, Settings(error_bits=500))
-    assert found.verdict is SUPPORTED
-    assert found.evidence.data["points"] >= 9
-
-
 def test_a_proved_claim_that_fails_at_a_random_point_is_a_contradiction():
     with pytest.raises(Contradiction, match="c: Theorem 1 applies: a hypothesis, but it fails at a rational point"):
         judge("c", FALSE, Settings(), PROOF)
@@ -125,17 +114,6 @@ def test_an_orbit_refutes_what_random_points_let_pass(blind):
 )
 def test_an_orbit_says_at_how_many_points_a_claim_held(points, summary, blind):
     assert judge("c", POLE_FIRST, Settings(), None, orbit(*points)).also[-1].summary == summary
-
-
-def test_an_orbit_makes_nothing_supported_that_random_points_left_undecided():
-    found = judge("c", NOWHERE, Settings(), None, orbit(1, 2))
-    assert found.verdict is UNDECIDED
-    assert "could not be tried" in found.also[0].summary
-
-
-def test_a_finding_carries_formula_source_and_whether_it_is_a_control():
-    found = judge("c", TRUE, Settings(), PROOF, formula="x = x", source="somebody", control=True)
-    assert (found.claim, found.formula, found.source, found.control) == ("c", "x = x", "somebody", True)
 
 
 @pytest.mark.parametrize(
