@@ -4,7 +4,6 @@ import pytest
 from flint import fmpq_poly
 
 import kahanmaps as km
-from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.roots import parse_root
@@ -109,32 +108,6 @@ def test_a_file_reads_back_equal():
     assert km.parse_system(file.to_toml()) == file != km.load("euler_top", {"a1": "root of t^2 - 3"})
 
 
-def test_numbers_near_one_root_are_one_text_and_those_near_others_are_not():
-    names = {str(parse_root(f"root of t^3 - 3*t + 1 near {near}")) for near in ("1.4", "1.53", "7/4", "100")}
-    assert names == {"root of t^3 - 3*t + 1 near 1.532"}
-    assert str(parse_root("root of t^3 - 3*t + 1 near 1/3")) == "root of t^3 - 3*t + 1 near 0.3473"
-    # Four digits do not tell these two apart, and the number in the middle of two roots means none of them.
-    close = "root of (t - 1)^2*10^12 - 2"
-    assert parse_root(f"{close} near 2") != parse_root(f"{close} near 0")
-    assert parse_root(str(parse_root(f"{close} near 2"))) == parse_root(f"{close} near 2")
-    assert parse_root("root of t^2 - 2 near 0").near == 0
-    assert parse_root("root of t^2 + 1 near 2").near == 2
-
-
-def test_a_file_is_rounded_with_all_that_it_claims():
-    file = km.parse_system(km.System(TOP, a=ROOT).to_toml() + '[integrals]\nI = "a*x"\n')
-    rounded = file.rounded
-    assert abs(float(rounded.parameters["a"]) - 2**0.5) < 1e-15
-    assert rounded.integrals["I"].names == ("x", "y", "z", "eps")
-    assert rounded.rounded is rounded
-    with pytest.raises(InputError, match="is not real"):
-        _ = km.System(TOP, a="root of t^2 + 1").rounded
-
-
-def test_a_root_of_degree_one_is_a_rational_number():
-    assert km.load("euler_top", {"a1": "root of 2*t - 3"}) == km.load("euler_top", {"a1": "3/2"})
-
-
 def test_what_needs_rational_numbers_refuses_in_a_sentence():
     file = km.System(TOP, a=ROOT)
     for function in (km.find_poisson, km.find_symmetry, km.commuting_systems):
@@ -164,14 +137,3 @@ def test_functions_of_a_root_vanish_where_its_polynomial_divides():
         x / (r * r - 2)
     with pytest.raises(ZeroDivisionError):
         K.matrix(2, 2, [r, 2, 1, r]).solve(K.matrix(2, 1, [x, x]))
-
-
-def test_the_bound_is_one_for_all_conjugates():
-    from kahanmaps.algebra.bounds import BoundField
-
-    root = parse_root("root of 3*t^2 - t - 7")
-    field = BoundField()
-    bound = root.over(field)
-    sizes = [abs(complex(z)) for z, _ in root.polynomial.complex_roots()]
-    assert all(bound.scale * size <= 2**bound.above.bits for size in sizes)
-    assert root.number_field == EtaleAlgebra(root.polynomial)

@@ -8,7 +8,6 @@ from flint import fmpq_poly
 
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.structured_facts import GROWTHS
 
 over_the_catalogue = pytest.mark.parametrize("name", names())
 
@@ -74,10 +73,6 @@ GROWTH = {
 }
 
 
-def test_every_growth_that_a_file_may_name_is_known_here():
-    assert tuple(GROWTH) == GROWTHS
-
-
 @over_the_catalogue
 def test_growth_degrees_and_verdict_go_together(name):
     catalog = load(name).catalog
@@ -125,11 +120,3 @@ def test_the_degrees_follow_the_recurrence_of_the_dynamical_degree(name):
     assert follow(catalog["degrees"], minimal)
     assert catalog["growth"] == "exponential"
     assert max(root.real for root, _ in minimal.complex_roots()) > 1
-
-
-def test_a_recurrence_may_begin_late_but_has_to_hold_then():
-    halphen, double = [3, 6, 12, 24], fmpq_poly([-2, 1])  # of the Darboux-Halphen system; not so from d_0 on
-    assert follow(halphen, double)
-    assert not follow([3, 6, 12, 25], double)
-    assert not follow(halphen, fmpq_poly([-3, 1]))
-    assert not follow(halphen[:-1], double)  # one equation is not enough

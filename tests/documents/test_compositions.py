@@ -1,7 +1,6 @@
 """Maps of other files one after the other: read, written out whole, and refused with all that is wrong."""
 
 import json
-import os
 
 import pytest
 from flint import fmpq
@@ -39,18 +38,6 @@ def test_a_word_in_files_catalogue_and_tables_is_what_its_letters_do(tmp_path):
     assert not file.map.time_steps
 
 
-@pytest.mark.parametrize("kind", ["pipe", "device"])
-def test_a_part_that_is_no_regular_file_is_refused_and_not_waited_for(tmp_path, kind):
-    name = "/dev/zero"
-    if kind == "pipe":
-        name = "pipe.toml"
-        os.mkfifo(tmp_path / name)  # nobody ever writes to it
-    with pytest.raises(InputError, match="it is a pipe or a device, expected a file"):
-        read_system(written(tmp_path, f'{{ file = "{name}" }}'))
-    with pytest.raises(InputError, match="it is a pipe or a device, expected a file"):
-        read_system(tmp_path / name)
-
-
 def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):
     table = '{ map = { variables = ["u", "v"], map = { image = ["b*v", "u"] } } }'
     of = f'{{ file = "field.toml", parameters = {{ a = "b" }} }}, {table}'
@@ -71,13 +58,6 @@ def test_a_table_has_its_own_parameters_and_otherwise_those_around_it(tmp_path):
     first, second = table.format(""), table.format(", parameters = { b = 3 }")
     file = read_system(written(tmp_path, f"{first}, {second}", "parameters.b = 5"))
     assert file.map.at(EPS).step((fmpq(1), fmpq(2))) == (3, 10)
-
-
-def test_variables_may_be_named_anew(tmp_path):
-    path = written(tmp_path, '{ file = "field.toml" }', 'variables = ["p", "q"]')
-    assert read_system(path).variables == ("p", "q")
-    with pytest.raises(SystemFileError, match="found 1 variables for maps of dimension 2"):
-        read_system(written(tmp_path, '{ file = "field.toml" }', 'variables = ["p"]'))
 
 
 @pytest.mark.parametrize(
@@ -107,31 +87,11 @@ def test_a_wrong_composition_says_what_is_wrong(tmp_path, of, sentence):
     assert sentence in str(caught.value)
 
 
-def test_parameters_of_one_file_are_none_of_a_part_that_comes_from_another(tmp_path):
-    """Written out whole, the part still knows its own names only: x is a variable there, X the new point."""
-    (tmp_path / "lines.toml").write_text('variables = ["x"]\n[bilinear]\nequations = ["X - x = 2*eps*x*X"]')
-    lyness = '{ system = "lyness", parameters = { a = "x" } }'
-    heads = {lyness: 'variables = ["u", "v"]\nparameters.x = 2', '{ file = "lines.toml" }': "parameters.X = 2"}
-    for part, head in heads.items():
-        file = read_system(written(tmp_path, part, head))
-        again = parse_system(file.to_toml(), file.name)
-        assert again == file
-        assert again.map.at(EPS).step(START[: file.dim]) == file.map.at(EPS).step(START[: file.dim])
-
-
 def test_steps_that_undo_each_other_are_left_out(tmp_path):
     of = '{ system = "lyness", power = 32 }, { system = "lyness", power = 31, inverse = true }'
     assert read_system(written(tmp_path, of)).map.at(1).step(START) == load("lyness").map.at(1).step(START)
     of = '{ system = "lyness", power = 2 }, { system = "lyness", power = -2 }'
     assert read_system(written(tmp_path, of)).map.at(1).step(START) == START
-
-
-def test_compositions_in_each_other_come_to_an_end(tmp_path):
-    for k in range(12):
-        part = f'{{ file = "c{k + 1}.toml" }}'
-        written(tmp_path, f"{part}, {part}" if k < 11 else '{ file = "field.toml" }', name=f"c{k}.toml")
-    with pytest.raises(SystemFileError, match="more than 64 maps in one composition"):
-        read_system(tmp_path / "c0.toml")
 
 
 # Parts that share the symbol b, and such as have a b of their own.

@@ -23,11 +23,6 @@ def test_a_name_with_two_marks_is_the_second_iterate():
     assert format_rational_function(function) == "3*y*x~~ + a*eps"
 
 
-def test_letters_stand_for_functions_and_move_with_their_marks():
-    minors = read("(F0*F1~ - F1*F0~)/F1, F0 = x*y~ - a, F1 = y")
-    assert minors == read("((x*y~ - a)*y~ - y*(x~*y~~ - a))/y")
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -97,13 +92,6 @@ def test_a_file_may_claim_them_and_is_written_with_them():
     refuted = km.parse_system(TOML.replace("x*y~ - y", "x*y~ + y"))
     assert refuted != file
     assert [str(one.verdict) for one in km.check_integrals(refuted).findings] == ["proved", "refuted"]
-
-
-def test_a_density_contains_no_images():
-    with pytest.raises(InputError, match="unknown name 'x~'"):
-        km.parse_system(TOML + '[density]\nphi = "x~"\n')
-    with pytest.raises(InputError, match="expected one of x alone"):
-        km.check_measure(km.System(ROTATION), "x~")
 
 
 def test_what_the_search_prints_is_a_claim_that_holds():

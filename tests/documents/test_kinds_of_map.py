@@ -18,9 +18,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
-from kahanmaps.maps.convention import CONVENTION, NO_EPS, NO_TIME_STEP, eps_words
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.orbits.orbit import orbit
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]
@@ -86,37 +84,6 @@ def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
             ask()
     with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
         check_poisson(file)
-
-
-def test_a_record_of_a_map_without_time_step_does_not_speak_of_one():
-    assert check_measure(example("symplectic-euler")).context["convention"] == NO_TIME_STEP
-    assert check_measure(example("duffing")).context["convention"] == CONVENTION
-    assert check_measure(example("mcmillan")).context["convention"] == NO_EPS
-    assert [check_measure(example(name)).context["time_step"] for name in NAMES] == ["every", None, "every", None, None]
-    both = [check_commute(example("mcmillan"), example(name)).context for name in ("mcmillan", "symplectic-euler")]
-    assert [eps_words(context) for context in both] == ["", ", every eps"]
-    named = check_measure(example("symplectic-euler"), Settings(eps=fmpq(1, 9))).context
-    assert [eps_words(context) for context in (named, check_measure(example("mcmillan")).context)] == [
-        ", eps = 1/9",
-        "",
-    ]
-
-
-def test_the_new_point_may_have_any_names():
-    plain = 'variables = ["x"]\n[bilinear]\nequations = ["X - x = 2*eps*x*X"]'
-    named = 'variables = ["x"]\n[bilinear]\nnew = ["b"]\nequations = ["b - x = 2*eps*x*b"]'
-    assert parse_system(plain, "same").map.subject == parse_system(named, "same").map.subject
-
-
-LOST = 'variables = ["x", "y"]\n[map]\nimage = ["x + y/eps", "y/(eps - 1) + (x + y/eps)^2/(eps^2 - 1/4)"]'
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007"])
-def test_a_map_that_has_no_value_at_some_eps_ends_singular_there(arithmetic):
-    walk = orbit(parse_system(LOST).map, ["1/2", "1/3"], "1/2", steps=2, arithmetic=arithmetic)
-    assert len(list(walk)) == 1
-    assert walk.end.status == "singular"
-    assert singularities(parse_system(LOST).map, "1/2").map_degree == 0
 
 
 def test_an_image_of_lower_dimension_is_told_where_no_measure_makes_sense():

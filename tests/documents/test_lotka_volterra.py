@@ -20,7 +20,6 @@ from kahanmaps.documents.lotka_volterra import degree
 from kahanmaps.experiments.results.recipes import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 EPS = fmpq(3, 17)
 NO_SKEW = """
@@ -41,20 +40,7 @@ def orbit_of(file, count):
     return points
 
 
-def product_over_determinant(file, point):
-    total = 1 / file.map.at(EPS).determinant(point)
-    for c in point:
-        total = total * c
-    return total
-
-
 # names
-
-
-def test_a_member_is_the_system_that_one_would_write():
-    assert load("lv(3,1)").system == load("volterra_periodic_3").system
-    rhs = ["x1*(x2+x3+x4-x5)", "x2*(x3+x4+x5-x1)", "x3*(x4+x5-x1-x2)", "x4*(x5-x1-x2-x3)", "x5*(x1-x2-x3-x4)"]
-    assert load("lv(5,1)").system == QuadraticSystem.from_text([f"x{i}" for i in range(1, 6)], rhs)
 
 
 def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):
@@ -111,17 +97,6 @@ def test_a_cubic_and_a_constant_matrix_make_lv_of_2k_plus_1(k):
     )
     slopes = gradient(H)
     assert all(f == slopes[(r - k) % n] - slopes[(r + k) % n] for r, f in enumerate(system.rhs))
-
-
-@pytest.mark.parametrize("k", [1, 2, 3])
-def test_the_product_over_the_determinant_is_conserved(k):
-    file = load(f"lv({2 * k + 1},{k})")
-    assert len({product_over_determinant(file, x) for x in orbit_of(file, 3)}) == 1
-
-
-def test_for_other_n_it_is_not():
-    file = load("lv(6,2)")
-    assert len({product_over_determinant(file, x) for x in orbit_of(file, 3)}) == 3
 
 
 def invariant_polynomials(n):
@@ -207,14 +182,6 @@ def test_the_singularities_give_the_formula_for_the_degrees(n, k):
     coefficients = [int(c) for c in growth.explained.characteristic.coeffs()]
     for m in range(3, 30):
         assert sum(c * degree(n, k, m + i) for i, c in enumerate(coefficients)) == 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("n", "k"), [(n, k) for n in (6, 7) for k in range((n + 1) // 2)])
-def test_measured_degrees_have_the_formula(n, k):
-    degrees = measured(load(f"lv({n},{k})"), 10).degrees
-    assert len(degrees) >= 8
-    assert list(degrees) == [degree(n, k, m) for m in range(len(degrees))]
 
 
 def test_a_sign_changed_changes_the_degrees():

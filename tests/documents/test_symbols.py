@@ -11,7 +11,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import InputError
 
 FIELD = GF(PRIME)
 WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]
@@ -72,25 +72,3 @@ def test_what_cannot_be_a_symbol_is_refused(file, symbols, words):
     with pytest.raises(InputError) as caught:
         with_symbols(file, symbols)
     assert words in str(caught.value)
-
-
-def test_a_hamiltonian_that_is_cubic_only_at_a_number_is_refused():
-    text = 'variables = ["x", "y"]\n[parameters]\na = "0"\n[hamiltonian]\nH = "a*x^4 + y^2"\nJ = "standard"'
-    with pytest.raises(InputError, match=r"hamiltonian\.H: found a polynomial of degree 4, expected at most 3"):
-        with_symbols(parse_system(text), ["a"])
-
-
-def test_members_of_the_family_have_numbers():
-    text = load("paper_m2").to_toml().replace("[family]", '[parameters]\nt = "1"\n[family]')
-    with pytest.raises(InputError, match=r"found the symbols t in a \[family\] file"):
-        with_symbols(parse_system(text), ["t"])
-
-
-def test_a_prime_in_a_denominator_is_bad():
-    with pytest.raises(BadPrime):
-        with_symbols(system("x", "x^2/7")).over(GF(7))
-
-
-def test_the_degree_is_that_in_the_variables():
-    assert with_symbols(system("x", "a^5*x", a=1), ["a"]).degree == 1
-    assert with_symbols(system("x y", "0", "0")).degree == 0

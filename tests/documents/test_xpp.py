@@ -34,17 +34,6 @@ def test_what_is_left_out_is_said():
     )
 
 
-def test_a_parameter_of_the_file_can_be_set():
-    assert km.parse_system(LORENZ, "lorenz.ode", {"b": "8/3"}).parameters["b"] == fmpq(8, 3)
-
-
-def test_it_is_written_as_a_system_file():
-    file = km.parse_system(LORENZ, "lorenz.ode")
-    again = km.parse_system(file.to_toml())
-    assert again.system == file.system
-    assert again.parameters == file.parameters
-
-
 @pytest.mark.parametrize("where", ["standard input", "lines.txt"])
 def test_lines_of_equations_are_read_wherever_they_are_no_toml(where):
     assert km.parse_system("# two lines\nx' = x*y\ny' = -x\n", where).system == km.System("x' = x*y; y' = -x").system
@@ -97,10 +86,3 @@ def test_what_would_change_the_equations_is_refused_with_its_line(lines, line):
         km.parse_system(lines, "a.ode")
     assert line in str(caught.value)
     assert "\x1b" not in str(caught.value)
-
-
-def test_wrong_toml_stays_wrong_toml():
-    with pytest.raises(InputError, match="TOML: "):
-        km.parse_system("[system]\nrhs = \"x' = x\"\nx' = 3", "standard input")
-    with pytest.raises(InputError, match="TOML: "):
-        km.parse_system("x' = x", "a.toml")

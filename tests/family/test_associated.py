@@ -10,10 +10,7 @@ import pytest
 from flint import fmpq_mat, fmpq_poly
 
 import kahanmaps as km
-from kahanmaps.algebra.polynomials import gradient, linear_combinations
-from kahanmaps.errors import InputError
-from kahanmaps.family.associated import FamilyMember, sign_polynomial
-from kahanmaps.family.cubics import cubic_space
+from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix
 
@@ -62,12 +59,6 @@ def test_the_coefficients_give_the_sign_matrix_and_k(member):
         assert sum((c * H for c, H in zip(g.coefficients, member.chain, strict=True)), 0 * member.H) == g.K
 
 
-def test_at_a_double_root_the_sign_polynomial_has_a_zero_derivative():
-    # t^2 (3 - 2t) is 0 at 0 and 1 at 1, flat at both; so 1 - 2 t^2 (3 - 2t) is 1 at 0 and -1 at 1
-    factors = [Factor(t, 2), Factor(t - 1, 2)]
-    assert sign_polynomial(factors, (1, -1)) == 1 - 6 * t**2 + 4 * t**3
-
-
 # How many there are, and which.
 
 COUNTS = [  # chi, number of irreducible factors r, of rational associated systems 2^(r-1)
@@ -87,11 +78,6 @@ def test_there_is_one_rational_associated_system_for_every_choice_of_signs_up_to
 
 
 # f_s and K_s.
-
-
-@over_members
-def test_the_gradient_of_k_is_b_times_the_gradient_of_h(member):
-    assert all(gradient(g.K) == linear_combinations(g.B, gradient(member.H)) for g in member.associated())
 
 
 # Members as values.
@@ -114,12 +100,6 @@ def test_the_signs_of_a_member_choose_the_associated_system():
 )
 def test_members_that_differ_are_different(other):
     assert MEMBERS["m = 2, split"] != other
-
-
-@pytest.mark.parametrize("signs", [(1,), (1, 1, 1), (1, 0), (1, 5)], ids=str)
-def test_an_associate_with_signs_that_do_not_fit_is_refused(signs):
-    with pytest.raises(InputError, match="signs"):
-        MEMBERS["m = 2, split"].associate(signs)
 
 
 # over number fields
@@ -147,11 +127,3 @@ def test_associated_systems_over_a_number_field_commute_with_the_member_and_othe
         wrong = replace(found[0], coefficients=(found[0].coefficients[0] + 1, *found[0].coefficients[1:]))
         wrong_file = km.SystemFile.from_conjugate(wrong)
         assert km.check_commute(km.SystemFile.from_member(member), wrong_file).verdict is km.Verdict.REFUTED
-
-
-def test_the_root_has_a_name_that_no_variable_has():
-    A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])  # fmt: skip
-    H = cubic_space(A, ("t", "u", "v", "t0")).basis[0]
-    (one,) = FamilyMember(A, H).conjugate_associates()
-    assert one.name == "t1"
-    assert km.SystemFile.from_conjugate(one).variables == ("t", "u", "v", "t0")

@@ -5,7 +5,6 @@ A is forgotten an A with the same splitting is found again, and its normal form 
 structure nothing is found; and an A that leaves repeated roots is said not to be generic.
 """
 
-import itertools
 import random
 from dataclasses import replace
 
@@ -27,10 +26,6 @@ from kahanmaps.family.cubics import belongs, default_variables, third_derivative
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.recognise import (
-    _DRAWS,
-    _candidates,
-    _variants,
-    darboux_coordinates,
     reason_against,
     recognised_hamiltonian,
     recognised_member,
@@ -164,14 +159,6 @@ def test_systems_of_another_kind_are_no_members(H, J, reason):
         structure_space(hamiltonian.H, hamiltonian.J)
 
 
-def test_the_size_is_limited():
-    hamiltonian = cubic("x1^3", 34)
-    with pytest.raises(InputError, match="in dimensions up to 32, found 34"):
-        recognised_member(hamiltonian)
-    with pytest.raises(InputError, match="in dimensions up to 32, found 34"):
-        structure_space(hamiltonian.H)
-
-
 # All solutions.
 
 
@@ -200,28 +187,6 @@ def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
 
 
 # Another structure J.
-
-
-def test_pairs_in_another_order_are_only_put_in_order():
-    J = fmpq_mat([[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1], [0, 0, -1, 0]])
-    assert darboux_coordinates(J) == fmpq_mat([[1, 0, 0, 0], [0, 0, 1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-
-
-@pytest.mark.parametrize("J", [[[0, 1], [1, 0]], [[0]], [[0, 1, 0, 0], [-1, 0, 0, 0], [0] * 4, [0] * 4], [[0, 1]]])
-def test_what_is_no_invertible_skew_matrix_has_no_such_coordinates(J):
-    with pytest.raises(InputError):
-        darboux_coordinates(fmpq_mat(J))
-
-
-def test_the_new_coordinates_are_called_y_unless_the_system_has_such():
-    J = fmpq_mat([[0, 2], [-2, 0]])
-    assert found_in(CubicHamiltonian(parse_polynomial("a^3 + b^3", ["a", "b"]), J)).member.variables == ("y1", "y2")
-    assert found_in(CubicHamiltonian(parse_polynomial("y^3 + z^3", ["y", "z"]), J)).member.variables == ("yy1", "yy2")
-
-
-def test_the_text_says_where_coordinates_are_new():
-    found = found_in(CubicHamiltonian(parse_polynomial("a^3 + b^3", ["a", "b"]), fmpq_mat([[0, 2], [-2, 0]])))
-    assert found.text.endswith("chi = (t - 1), in coordinates y with x = T y and standard J")
 
 
 # Repeated roots, and cubics of fewer variables.
@@ -265,15 +230,6 @@ def test_a_cubic_of_few_variables_is_found(n, H):
         assert form.point(*form.step(*form.coordinates(x), 1)) == KahanMap(hamiltonian.system, 1).step(x)
 
 
-def test_solutions_that_do_not_commute_are_dealt_with():
-    """x1, x5 and x2, x6 apart, nothing on the rest: there every skew-Hamiltonian matrix of size 4 is a solution."""
-    hamiltonian = moved(cubic("x1^3 + x5^3 + x2*x6^2 + x2^3", 8), random_symplectic(4, random.Random(2)))
-    space = structure_space(hamiltonian.H)
-    assert any(X * Y != Y * X for X in space for Y in space)
-    found = found_in(hamiltonian)
-    assert (found.is_generic, found.dimension) == (True, 8)
-
-
 # Systems of which not even H is given.
 
 
@@ -295,31 +251,3 @@ def test_a_member_of_another_system_is_refused():
         replace(found, T=2 * found.T)
     with pytest.raises(HypothesisError, match="sign -1"):
         replace(found, member=replace(found.member, signs=(1, -1)))
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        ([-12, 0, 1], [-3, 0, 1]),  # t^2 = 12, so that X/2 has the square 3
-        ([7, 6, 1], [-2, 0, 1]),  # (t + 3)^2 = 2: X + 3
-        ([-54, 0, 0, 1], [-2, 0, 0, 1]),
-    ],
-)
-def test_an_element_is_made_simpler_by_an_integer_shift_and_divisor(before, after):
-    n = len(before) - 1
-    X = fmpq_mat(n, n, [-before[i] if j == n - 1 else int(i == j + 1) for i in range(n) for j in range(n)])
-    E = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
-    first, second = _variants(X, E, fmpq_poly(before))
-    assert first == (X, fmpq_poly(before))
-    assert second[1] == fmpq_poly(after)
-    for matrix, polynomial in (first, second):
-        assert evaluate_at_matrix(polynomial, matrix) == 0 * E
-
-
-def test_small_combinations_are_tried_before_larger_ones():
-    basis = [fmpq_mat(2, 2, [1, 0, 0, 0]), fmpq_mat(2, 2, [0, 0, 0, 1])]
-    tried = list(itertools.islice(_candidates(basis), 2 + 2 * _DRAWS))
-    assert tried[:2] == basis
-    largest = [max(abs(int(entry.p)) for entry in X.entries()) for X in tried[2:]]
-    assert (max(largest[:_DRAWS]), max(largest[_DRAWS:])) == (1, 2)
-    assert largest[:_DRAWS].count(1) > _DRAWS // 2

@@ -86,13 +86,3 @@ def test_without_a_structure_the_reason_is_said(system, reason):
     found = system_normal_form(system)
     assert isinstance(found, NoNormalForm)
     assert found.reason.startswith(reason)
-
-
-def test_a_member_with_a_repeated_root_has_no_normal_form():
-    member = draw_with_eigenvalues([2, 2], 1)
-    assert system_normal_form(member.chosen.system, member=member) == NoNormalForm("chi has a repeated root")
-
-
-def test_a_dimension_that_is_too_large_is_not_searched():
-    system = hamiltonian("x1^3", 34).system
-    assert system_normal_form(system) == NoNormalForm("the dimension 34 is above 32")

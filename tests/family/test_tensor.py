@@ -52,12 +52,6 @@ def test_over_nilpotent_elements_the_map_is_that_of_curves():
     assert list(found) == [value for pair in zip(map_.step(x), along, strict=True) for value in pair]
 
 
-def test_a_parameter_t_is_the_generator():
-    x_0, x_1 = ring(["x_0", "x_1"]).gens()
-    symbolic = QuadraticSystem((ring(["x", "t"]).gen(1) * ring(["x", "t"]).gen(0) ** 2,), ("t",))
-    assert over_algebra(symbolic, t**2 + 1).rhs == (-2 * x_0 * x_1, x_0**2 - x_1**2)
-
-
 @over_moduli
 def test_integrals_and_densities_are_inherited(chi):
     file = tensor_file(load("nahm_tetrahedral"), chi)

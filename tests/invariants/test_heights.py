@@ -6,7 +6,6 @@ constant of linear growth from the multiplier of a Moebius map, that of quadrati
 too short or fits no rule is undecided.
 """
 
-import json
 import random
 from fractions import Fraction
 from math import gcd, lcm, log2
@@ -19,9 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import over_members, side_by_side, structure_and_system
 
-from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import (
@@ -79,11 +77,6 @@ def test_the_height_is_the_bit_length_of_the_largest_of_coprime_homogeneous_coor
 )
 def test_known_heights(point, bits):
     assert height(point) == bits
-
-
-def test_machine_floats_have_no_height():
-    with pytest.raises(InexactNumber):
-        height([0.5])
 
 
 @over_members
@@ -182,12 +175,6 @@ CONTROLS = {
 }
 
 
-@pytest.mark.parametrize("name", CONTROLS)
-def test_controls_grow_as_their_closed_form_says(name):
-    system, start, eps, steps, kind, _ = CONTROLS[name]
-    assert growth(system, start, steps, eps).kind is kind
-
-
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -260,13 +247,6 @@ def test_the_constant_of_a_parabola_is_its_leading_coefficient(a, b, c, n, every
     assert found.constant == Fraction(a, every**2)
 
 
-@given(st.integers(16, 500), st.integers(0, 10**4), st.integers(8, 60), st.integers(1, 9))
-def test_the_constant_of_a_line_is_its_slope(b, c, n, every):
-    found = of_heights([b * k + c for k in range(n + 1)], every)
-    assert found.kind is LIN
-    assert found.constant == Fraction(b, every)
-
-
 # Decisions
 
 
@@ -286,10 +266,6 @@ def test_geometric_growth_is_exponential_as_soon_as_it_is_plain(factor):
             assert of_heights([int(9 * g**k) for k in range(n + 1)]).kind is E
 
 
-def test_an_orbit_that_stays_within_its_first_heights_is_bounded():
-    assert of_heights([5, 9, 7, 6, 8] * 8).kind is B
-
-
 @pytest.mark.parametrize(
     ("heights", "why"),
     [
@@ -304,23 +280,6 @@ def test_what_fits_no_rule_is_undecided(heights, why):
     assert of_heights(heights).kind is U, why
 
 
-@pytest.mark.parametrize(
-    ("slopes", "width", "kind"),
-    [
-        ((4, 4, 4, 5), 4, LIN),  # rises of 16 and 20: they differ by 4 bits and a quarter of the least, both allowed
-        ((3, 3, 3, 4), 4, U),  # 12 and 16: by more than a quarter
-        ((4, 4, 4, 5), 5, U),  # 20 and 25: by a quarter, but more than 4 bits and 1/32
-        ((32, 32, 32, 33), 8, LIN),  # 256 and 264: by 1/32
-        ((31, 31, 31, 32), 8, U),  # 248 and 256: by more
-    ],
-)
-def test_rises_that_differ_by_as_much_as_the_rule_allows_are_a_line(slopes, width, kind):
-    heights = [100]
-    for slope in slopes:
-        heights += [heights[-1] + slope * k for k in range(1, width + 1)]
-    assert of_heights(heights).kind is kind
-
-
 @pytest.mark.parametrize("heights", [[7], [7, 8], [k * k + 9 for k in range(8)], [20 * k + 9 for k in range(8)]])
 def test_few_heights_decide_nothing(heights):
     found = of_heights(heights)
@@ -329,59 +288,7 @@ def test_few_heights_decide_nothing(heights):
     assert "expected 9 or more" in found.reason
 
 
-def test_a_singular_end_leaves_the_decision_to_what_is_there_and_is_told_where_that_is_too_little():
-    far = growth(system_of(x="x^2"), ["1/100"], 2000, "1/2")  # 1/x: 100, 99, ..., 1, infinity
-    assert (far.end.status, far.steps[-1], far.heights[-1]) == ("singular", 99, 1)
-    near = growth(system_of(x="x^2"), ["1/3"], 2000, "1/2")
-    assert (near.kind, near.heights) == (U, (2, 2, 1))
-    assert near.reason.endswith(near.end.message)
-
-
-def test_a_period_is_seen_in_jumps_too():
-    normal_form, system = structure_and_system("m = 2")
-    found = growth(system, [0] * 4, 500, normal_form=normal_form, every=100)
-    assert (found.method, found.kind) == ("doubling", P)
-
-
 # Output
-
-
-def test_plain_data_has_a_few_heights_and_numbers_as_text():
-    found = growth(load("harmonic").system, START[:2], 20)
-    plain = found.to_json()
-    assert json.loads(json.dumps(plain)) == plain
-    assert plain == {
-        "steps": 20,
-        "every": 1,
-        "method": "generic",
-        "status": "completed",
-        "message": "20 steps",
-        "period": None,
-        "heights": [{"step": k, "bits": found.heights[k]} for k in (0, 1, 2, 4, 8, 16, 20)],
-        "final_height": found.heights[20],
-        "kind": "linear",
-        "reason": found.reason,
-        "constant": decimal_text(found.constant),
-        "ratio": decimal_text(found.ratio),
-    }
-
-
-def test_the_text_names_kind_constant_and_ratio():
-    assert of_heights([k * k + 1 for k in range(17)]).text.startswith(
-        "heights grow as: quadratic, about 1 n^2 bits; four quarters raise them by "
-    )
-    assert "by a factor of about 2 in 1 step" in of_heights([2**k for k in range(17)]).text
-
-
-@given(st.fractions(), st.integers(1, 12))
-def test_rounded_text_is_within_half_a_unit_of_the_last_digit(value, digits):
-    text = decimal_text(value, digits)
-    if value == 0:
-        assert text == "0"
-        return
-    leading = next(k for k in range(-400, 400) if abs(value) < Fraction(10) ** k)  # 10^(leading-1) <= |value|
-    assert abs(Fraction(text) - value) <= Fraction(10) ** (leading - digits) / 2
-    assert "e" not in text.lower()
 
 
 @pytest.mark.parametrize(
@@ -393,11 +300,6 @@ def test_wrong_input_is_refused(wrong, message):
     options = {name: value for name, value in vars(given).items() if name not in ("start", "steps")}
     with pytest.raises(InputError, match=message):
         growth(load("weierstrass").system, given.start, given.steps, **options)
-
-
-def test_there_are_no_heights_modulo_a_prime():
-    with pytest.raises(InputError, match="expected one over Q"):
-        height_growth(KahanMap(load("weierstrass").system, 3, GF(10007)), [1, 2], 5)
 
 
 def test_an_eps_longer_than_the_budget_ends_an_orbit_before_its_first_step():

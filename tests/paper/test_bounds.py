@@ -4,7 +4,6 @@ A bound is compared with the numerator, in lowest terms, of what it is a bound o
 input, where the two sides differ, written out as rational functions of x and eps.
 """
 
-import pytest
 from bound_helpers import covers, lowest, true_size
 from helpers import together
 from paper.members import member, verifier_of
@@ -111,13 +110,3 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, 
         # A denominator that occurs to some power must not be zero once.
         assert sum(true_size(factor)[0] for factor, _ in below.factor_squarefree()[1]) <= poles
         assert true_size(above)[1] <= equation.bits
-
-
-@pytest.mark.parametrize("m", [1, 3])
-def test_the_bounds_of_the_member_in_general_are_those_of_matrices_of_its_size(m):
-    objects = objects_over.universal_bound_objects(m, 3)
-    assert [(matrix.nrows(), matrix.ncols()) for matrix in (objects.A, objects.J, objects.x)] == [
-        (2 * m, 2 * m),
-        (2 * m, 2 * m),
-        (2 * m, 1),
-    ]

@@ -11,14 +11,12 @@ import pytest
 from helpers import together
 from paper.members import member, named, point, verifier_of
 
-from kahanmaps.algebra.bounds import Size
 from kahanmaps.checks.claims import Verdict
-from kahanmaps.checks.decide import decide
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.paper import verify
-from kahanmaps.paper.evaluate import evaluate, witness_of
+from kahanmaps.paper.evaluate import evaluate
 from kahanmaps.paper.registry import Claim, Kind, claims
-from kahanmaps.paper.verify import ClaimAtPoints, normal_form_proof
+from kahanmaps.paper.verify import normal_form_proof
 
 IDENTITIES = [c for c in claims() if c.kind is Kind.EQUAL and not c.misprint and c.symplectic]
 
@@ -224,19 +222,6 @@ def test_where_the_roots_are_not_rational_the_witness_is_over_a_prime_field(exam
     assert finding.witness.field.startswith("GF(")
 
 
-def test_a_claim_of_a_degree_that_primes_cannot_decide_is_undecided(examine):
-    def function(o):
-        value = o.x[0, 0]
-        for _ in range(70):
-            value = value * value
-        yield value, value
-
-    finding = examine(fabricated(function, symplectic=False))
-    assert finding.verdict is Verdict.UNDECIDED
-    assert "too large for primes of 63 bits" in finding.evidence.summary
-    assert examine(fabricated(function)).verdict is Verdict.PROVED  # in normal form x_1 = 1
-
-
 def test_different_sides_are_proved_different_by_a_point(examine):
     finding = examine(fabricated(false_claim, kind=Kind.DIFFERENT))
     assert finding.verdict is Verdict.PROVED
@@ -268,40 +253,3 @@ def test_a_false_claim_is_refuted_for_the_member_in_general():
 
 
 # Evaluation
-
-
-def test_matrices_of_different_sizes_are_different():
-    assert not evaluate(fabricated(lambda o: [(o.x, o.I)]), point("m=2, split")).holds
-
-
-def test_a_witness_shows_the_first_entry_that_differs():
-    def function(o):
-        entries = [o.K.one if k == 6 else entry for k, entry in enumerate(o.I.entries())]
-        yield o.K.matrix(4, 4, entries), o.I
-
-    witness = witness_of(evaluate(fabricated(function), point("m=2, split")))
-    assert (witness.left_label, witness.right_label) == ("left side, entry (2,3)", "right side, entry (2,3)")
-    assert (witness.left, witness.right) == (("1",), ("0",))
-
-
-def test_every_random_point_is_another():
-    tried = []
-
-    def claim(o):
-        if o.K.characteristic:  # it is run over bounds as well
-            tried.append((o.K.characteristic, tuple(map(int, o.x.entries()))))
-        yield o.n, o.n
-
-    statement = ClaimAtPoints(verifier_of(member("m=2, split")), fabricated(claim))
-    statement.bound = (Size(1, 10.0), 0)
-    evidence = decide(statement, 0, error_bits=400).evidence
-    assert len(evidence.data["primes"]) == evidence.data["points"] >= 6
-    assert len({prime for prime, _ in tried}) == len({x for _, x in tried}) == evidence.data["points"]
-
-
-def test_a_claim_is_given_up_after_forty_points_and_one_where_it_is_not_defined(examine):
-    finding = examine(fabricated(lambda o: [(o.inverse(o.x * o.x.transpose()), o.I)]))
-    assert (
-        finding.evidence.summary
-        == "the claim is not defined at any of 41 random points over GF(p): a denominator seems to vanish identically"
-    )

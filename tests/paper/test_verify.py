@@ -7,7 +7,6 @@ undecided and say why; nothing is refuted there but misprints.
 
 import random
 from dataclasses import replace
-from fractions import Fraction
 from functools import cache
 
 import pytest
@@ -19,7 +18,6 @@ from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.paper import objects_over
@@ -51,10 +49,6 @@ def by_key(report):
 
 def keys(report, verdict):
     return {key for key, finding in by_key(report).items() if finding.verdict is verdict}
-
-
-def all_evidence(report):
-    return [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
 
 
 def bits(evidence):
@@ -153,13 +147,6 @@ def test_a_section_alone_is_what_it_is_among_all(section):
     assert [f.verdict for f in part.findings] == [f.verdict for f in among]
 
 
-def test_the_same_seed_says_the_same_and_another_takes_other_primes():
-    first, again, other = (verify(file("m=1"), Settings(seed=seed), SIXTH).to_json() for seed in (1, 1, 2))
-    assert first == again
-    primes = [report["claims"][0]["also"][0]["primes"] for report in (first, other)]
-    assert primes[0] != primes[1]
-
-
 def test_at_one_eps_everything_holds_as_well():
     report = verify(file("m=2, split"), Settings(eps="1/10"))
     assert report.holds is True
@@ -234,25 +221,6 @@ def test_claims_that_need_distinct_roots_are_undecided_with_the_diagnosis(name):
             assert "repeated roots" in found[claim.key].evidence.summary
 
 
-@over_repeated
-@pytest.mark.parametrize("section", [2, 4])
-def test_what_does_not_speak_of_roots_holds_where_they_are_repeated(section, name):
-    found = {key: f for key, f in by_key(repeated(name)).items() if f.place["section"] == section}
-    assert {f.verdict for key, f in found.items() if key not in misprints(REPEATED[name].m)} <= {PROVED, SUPPORTED}
-
-
-def test_where_roots_are_repeated_the_claims_that_apply_are_refuted_by_controls():
-    report = verify(SystemFile.from_member(REPEATED["1, 1, 2"]), options=VerifyOptions(sections=(5, 6), controls=True))
-    assert report.findings[-1].verdict is PROVED
-
-
-def test_claims_that_no_control_refutes_are_named():
-    # Without an associated system but f itself the claim on inverses is about f alone, and holds for any f.
-    report = verify(SystemFile.from_member(REPEATED["(t-1)^2"]), options=VerifyOptions(sections=(6,), controls=True))
-    assert report.findings[-1].verdict is UNDECIDED
-    assert "no control refutes inverses" in report.findings[-1].evidence.summary
-
-
 # Special members
 
 
@@ -305,18 +273,6 @@ def test_the_degree_of_the_splitting_field_counts_where_roots_are_needed(chi, de
     member = draw_with_chi(fmpq_poly(chi), 1)
     verifier = verifier_of(member)
     assert (verifier.conjugates(False), verifier.conjugates(True)) == degrees
-
-
-def test_a_rank_that_is_defined_nowhere_is_undecided(monkeypatch):
-    def nowhere(claim, objects):
-        raise SingularStep("made up")
-
-    monkeypatch.setattr("kahanmaps.paper.verify.evaluate", nowhere)
-    verifier = verifier_of(special_member())
-    (ranks,) = [claim for claim in claims() if claim.key == "hamiltonians-are-independent"]
-    found = verifier.verify_claim(ranks)
-    assert found.verdict is UNDECIDED
-    assert found.evidence.summary == "the claim is not defined at any of 40 random points"
 
 
 @pytest.mark.parametrize(
@@ -395,13 +351,6 @@ def test_controls_refute_the_claims_for_the_member_in_general():
 
 
 # Witnesses of misprints, computed a second time
-
-
-def test_the_witness_of_the_misprint_in_the_two_forms_is_a_rational_point_with_both_sides():
-    witness = by_key(whole("m=2, split"))["two-forms-of-the-integral-for-any-cubic"].witness
-    assert witness.field == "QQ"
-    assert set(witness.vectors) == {"linear", "u1", "u2", "u3"}
-    assert Fraction(witness.left[0]) != Fraction(witness.right[0])
 
 
 @pytest.mark.parametrize("m", [6, 7, 9])
