@@ -4,7 +4,6 @@ With --json a check prints one object with the verdict, everything that is neede
 with evidence for each claim; a refuted claim has a witness that anybody can verify, here by `kahanmaps orbit`.
 """
 
-import re
 import shlex
 from fractions import Fraction
 
@@ -120,28 +119,8 @@ def test_a_pipe_gets_plain_lines(kahanmaps, command):
     assert lines[-1] == f"verdict\t{report['verdict']}"
 
 
-def test_a_terminal_gets_a_table_in_colour(pair):
-    shown = terminal("check-commute", str(pair))
-    assert shown.status == 0
-    assert "\x1b[32mproved" in shown.out
-    assert "│" in shown.out
-
-
-def test_long_numbers_are_shortened_on_a_terminal(kahanmaps):
-    command = "check-commute euler_top lorenz --eps 1e-30"
-    assert re.search(r"\.\.\.\d+ \(\d+\s+chars\)", terminal(*shlex.split(command)).out)
-    assert " chars)" not in kahanmaps(command).out
-
-
 def test_all_evidence_is_shown_on_a_terminal_when_asked_for(kahanmaps):
     command = "check-integrals henon_heiles"
     shown = " ".join(terminal(*shlex.split(f"{command} -v"), columns=5000).out.replace("│", " ").split())
     for line in kahanmaps(command).out.splitlines()[1:-1]:
         assert " ".join(line.split("\t")[-1].split()) in shown
-
-
-@pytest.mark.parametrize("check", ["commute", "measure"])
-def test_progress_goes_to_standard_error_only(kahanmaps, pair, slow_clock, check):
-    outcome = kahanmaps(f"check-{check}", pair, "--steps 2 --json")
-    assert outcome.err.startswith("orbit: step ") or outcome.err.startswith("associated system ")
-    assert outcome.out.count("\n") == 1

@@ -64,10 +64,6 @@ def test_commands_are_offered(offered):
     assert offered("kahanmaps check-i") == ["check-integrals"]
 
 
-def test_options_are_offered(offered):
-    assert offered("kahanmaps orbit euler_top --arith") == ["--arithmetic"]
-
-
 def test_systems_of_the_catalogue_are_offered(offered, tmp_path):
     assert offered("kahanmaps analyze ", tmp_path) == list(names())
     assert offered("kahanmaps check-commute euler_top lore", tmp_path) == ["lorenz"]
@@ -106,11 +102,6 @@ def test_nothing_that_computes_is_loaded():
 
 
 # The scripts
-
-
-def test_the_shell_is_that_of_the_environment(kahanmaps, monkeypatch):
-    monkeypatch.setenv("SHELL", "/usr/bin/fish")
-    assert kahanmaps("completion") == kahanmaps("completion fish")
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")

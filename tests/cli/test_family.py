@@ -4,7 +4,6 @@ What a seed draws is the same everywhere. Files that are written are read by eve
 """
 
 import json
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -32,20 +31,6 @@ def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
     assert kahanmaps(f"family new {options} -o", path).status == 0
     shown = kahanmaps("family show", path, "--json").json
     assert (shown["system"], shown["m"], shown["dim"]) == ("drawn", m, 2 * m)
-
-
-def test_signs_pick_an_associated_system(kahanmaps, tmp_path):
-    kahanmaps("family new --eigenvalues 1,2 --seed 4 --signs 1,-1 -o", tmp_path / "a.toml")
-    assert tomllib.loads((tmp_path / "a.toml").read_text())["family"]["signs"] == [1, -1]
-    shown = kahanmaps("family show", tmp_path / "a.toml")
-    assert "signs = 1,-1: K = " in shown.out
-
-
-def test_a_file_gets_what_standard_output_would(kahanmaps, tmp_path):
-    printed = kahanmaps("family new --m 2 --seed 5 --name a").out
-    kahanmaps("family new --m 2 --seed 5 -o", tmp_path / "a.toml")
-    assert (tmp_path / "a.toml").read_text() == printed
-    assert kahanmaps("family new --m 2 --seed 5 --name a -o -").out == printed
 
 
 # show

@@ -20,7 +20,7 @@ from typing import Any
 import click
 import numpy as np
 import pytest
-from cli_helpers import COMMAND, shell
+from cli_helpers import COMMAND
 from command_tree import all_commands
 from helpers import table
 from small_databases import ok, planned
@@ -30,7 +30,6 @@ from kahanmaps.plots.growth_records import curves_of_record, degrees_of_record
 from kahanmaps_cli.main import main
 from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.runs.ensemble_starts import read_starts
-from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder
 
 needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 
@@ -80,19 +79,6 @@ def given(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_every_output_goes_through_the_one_door_and_every_input_is_tried():
-    outputs = {w for w, c in COMMANDS.items() if any(isinstance(p.type, OutputFile) for p in c.params)}
-    assert outputs == set(READS)
-    for words, command in COMMANDS.items():
-        for parameter in command.params:
-            is_named = {"-o", "--output", "--write-to"} & set(parameter.opts)
-            assert bool(is_named) == isinstance(parameter.type, OutputFile | OutputFolder), (words, parameter.name)
-            is_text = isinstance(parameter.type, click.types.StringParamType)
-            is_input = is_text and parameter.name in ("system", "other", "systems", *CONTENT)
-            if words in READS and (is_input or type(parameter.type) is click.Path):
-                assert parameter.name in READS[words][1], (words, parameter.name)
-
-
 @pytest.mark.parametrize(
     ("words", "name", "way"),
     [*((*case, "the same") for case in CASES), *((*CASES[0], way) for way in ("hard link", "symbolic link"))],
@@ -110,21 +96,6 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
     outcome = kahanmaps(lines[name].replace("IN", str(source)), "-o", target)
     assert (outcome.status, outcome.out, source.read_bytes()) == (2, "", before)
     assert "it would be written over" in outcome.err
-
-
-def test_standard_input_is_not_written_over(given):
-    before = Path("system.toml").read_bytes()
-    outcome = shell("kahanmaps convert - --to latex -o system.toml < system.toml", given)
-    assert (outcome.status, Path("system.toml").read_bytes()) == (2, before)
-    assert shell("kahanmaps convert - --to latex -q -o other.tex < system.toml", given).status == 0
-
-
-def test_nothing_is_computed_before_the_output_is_refused(kahanmaps, given, monkeypatch):
-    monkeypatch.setattr(
-        "kahanmaps.laboratory.growth.degrees.degree_growth", lambda *_, **__: pytest.fail("it was computed")
-    )
-    Path("system.svg").write_bytes(Path("system.toml").read_bytes())
-    assert kahanmaps("plot degrees harmonic ./system.svg -o system.svg").status == 2
 
 
 def test_associated_systems_are_not_written_over_the_one_they_belong_to(kahanmaps, tmp_path):
@@ -163,20 +134,6 @@ def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_p
         assert json.loads(str(np.load(target)["meta"]))["end"]["status"] == "interrupted"
 
 
-def test_a_pipe_takes_an_npz_file(tmp_path):
-    script = f"mkfifo p; cat p > x.npz & kahanmaps orbit harmonic {ORBIT} -q --format npz -o p; echo $?; wait"
-    assert shell(script, tmp_path).out == "0\n"
-    assert np.load(tmp_path / "x.npz")["x"].shape == (2, 2)
-
-
-@pytest.mark.parametrize("command", [f"orbit harmonic {ORBIT} --arithmetic float", READS["ensemble"][1]["system"]])
-def test_a_pipe_is_no_place_for_a_file_that_grows(kahanmaps, tmp_path, command):
-    os.mkfifo(tmp_path / "p.npy")
-    outcome = kahanmaps(command.replace("IN", "harmonic"), "-o", tmp_path / "p.npy")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert "found a pipe, expected a file" in outcome.err
-
-
 # Damaged files
 
 READERS = {
@@ -184,7 +141,6 @@ READERS = {
     "heights.json": lambda path: curves_of_record(read_record(path), path),
     "degrees.json": lambda path: degrees_of_record(read_record(path), path),
 }
-NASTY = (None, float("inf"), "1/0", [], {})
 
 
 def damages(content: bytes, count: int) -> Iterator[bytes]:
@@ -214,18 +170,6 @@ def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name):
     for damaged in damages(content, 12):
         path.write_bytes(damaged)
         assert is_read_or_refused(READERS[name], path)
-
-
-@pytest.mark.parametrize("name", ["degrees.json", "heights.json"])
-def test_a_record_with_any_other_value_is_read_or_refused_with_its_name(made, tmp_path, name):
-    path = tmp_path / name
-    records = [json.loads(line) for line in (made / name).read_text().splitlines()]
-    for place, key in list(places(records)):
-        for nasty in NASTY:
-            before, place[key] = place[key], nasty
-            path.write_text("\n".join(map(json.dumps, records)))
-            assert is_read_or_refused(READERS[name], path)
-            place[key] = before
 
 
 def places(value: Any) -> Iterator[tuple[Any, Any]]:
@@ -274,19 +218,8 @@ def test_a_reader_that_has_left_changes_no_exit_status(kahanmaps, unread, least_
     assert (kahanmaps(line).status, unread(line)) == (status, status)
 
 
-def test_a_batch_goes_on_when_nobody_reads_its_records(unread, kahanmaps, least_folder):
-    assert unread("batch run SPEC --db new.db --jsonl -q") == 0
-    assert kahanmaps("batch status --db new.db --json").json["experiments"][0]["missing"] == 0
-
-
 def test_an_orbit_ends_early_when_its_reader_leaves(unread):
     assert unread("orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007") == 3
-
-
-def test_a_command_ends_early_when_the_reader_of_its_pipe_leaves(tmp_path):
-    words = "orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007 -q -o p"
-    outcome = shell(f"mkfifo p; head -n 1 p > /dev/null & kahanmaps {words}", tmp_path)
-    assert (outcome.status, outcome.err) == (3, "")
 
 
 # Disks and limits
@@ -313,11 +246,3 @@ def test_a_full_device_gives_3_and_is_named(kahanmaps, given, words):
     full.symlink_to("/dev/full")
     outcome = kahanmaps(line_to(words, str(full)))
     assert (outcome.status, outcome.err.splitlines()[-1]) == (3, f"Error: No space left on device: {full}")
-
-
-@pytest.mark.parametrize("words", READS)
-def test_a_folder_that_may_not_be_written_to_is_told_before_anything_is_read(kahanmaps, given, monkeypatch, words):
-    monkeypatch.setattr("os.access", lambda _, mode: mode != os.W_OK)  # who runs the tests may be root
-    target = "new" + READS[words][0]
-    outcome = kahanmaps(line_to(words, target).replace("system.toml", "missing.toml"))
-    assert (outcome.status, outcome.err) == (2, f"Error: Permission denied: {target}\n")

@@ -6,15 +6,12 @@ for each kind of them. No outcome is an internal error, none is a traceback, and
 
 import re
 import shlex
-import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, suppress
 from pathlib import Path
 
 import click
 import pytest
 from command_tree import LEAST, all_commands
-from small_databases import task
 
 from kahanmaps_cli.main import main
 
@@ -123,49 +120,6 @@ def test_numbers_and_paths_that_nobody_means_are_refused_in_a_sentence(words, ca
     values = {**VALUES, "path": VALUES["path"][1:]} if words.split()[0] in TAKE_THEIR_TIME else VALUES
     names = [name for w, name in cases(VALUES) if w == words and (values is VALUES or name != "seed")]
     assert [line for name in names for line in mistakes_of(words, name, values, capsys)] == []
-
-
-@pytest.mark.usefixtures("_folder")
-@pytest.mark.parametrize(
-    "line",
-    [
-        "batch export --csv --db DB",
-        "batch export --jsonl --db DB -o x.jsonl",
-        "batch summary --db DB",
-        "batch show KEY --db DB",
-        "batch run SPEC --dry-run --db DB",
-    ],
-)
-def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, line):
-    with closing(sqlite3.connect("DB")) as connection, connection:
-        connection.execute("UPDATE result SET result = NULL, seconds = 'soon'")
-    outcome = kahanmaps(line.replace("KEY", task(1).key[:6]))
-    assert outcome.status == 2
-    assert outcome.err.startswith("Error: DB is damaged (the record of task " + task(1).key)
-    assert "take a copy from before" in outcome.err
-    assert outcome.err.count("\n") == 1
-
-
-@pytest.mark.usefixtures("_folder")
-@pytest.mark.parametrize("value", [None, 10**17, "[]", b"\xff\0"], ids=str)
-def test_no_cell_of_a_database_makes_a_command_fail_or_hang(kahanmaps, value):
-    with closing(sqlite3.connect("DB")) as connection, connection:
-        tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
-        cells = [(t, row[1]) for (t,) in tables for row in connection.execute(f"PRAGMA table_info({t})")]
-        whole = connection.serialize()
-    statuses = set()
-    for table, column in cells:
-        with closing(sqlite3.connect("x.db")) as connection:
-            connection.deserialize(whole)
-            with suppress(sqlite3.IntegrityError), connection:
-                connection.execute(f"UPDATE {table} SET {column} = ?", (value,))
-            Path("x.db").write_bytes(connection.serialize())
-        for words in ("status", "summary", "export --csv", "export --jsonl", f"show {task(1).key[:6]}"):
-            outcome = kahanmaps(f"batch {words} --db x.db")
-            assert outcome.status in (0, 2, 3), (table, column, words, outcome.err)
-            statuses.add(outcome.status)
-    assert statuses <= {0, 2, 3}
-    assert 0 in statuses
 
 
 LONG_EPS = "9" * 10_100

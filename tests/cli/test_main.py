@@ -17,8 +17,6 @@ from cli_helpers import shell
 from command_tree import all_commands
 
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.version import __version__
-from kahanmaps_cli.main import main
 
 
 def failing_with(monkeypatch, error):
@@ -80,14 +78,6 @@ def test_an_error_becomes_a_message_and_an_exit_status(kahanmaps, monkeypatch, e
     assert "Traceback" not in outcome.err
 
 
-def test_ctrl_c_inside_an_import_which_python_tells_as_another_error_is_told_as_an_interrupt(kahanmaps, monkeypatch):
-    error = RuntimeError("Error calling __set_name__ on 'cached_property'")  # so up to Python 3.11
-    error.__cause__ = KeyboardInterrupt()
-    failing_with(monkeypatch, error)
-    outcome = kahanmaps("version")
-    assert (outcome.status, outcome.err) == (130, "interrupted\n")
-
-
 def test_an_internal_error_names_the_file_that_was_being_read(kahanmaps, monkeypatch, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('variables = ["x"]\n[system]\nrhs = ["x"]')
@@ -114,12 +104,6 @@ sys.exit(__main__.main())
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
 
 
-def test_the_program_gives_the_status_of_the_command():
-    done = subprocess.run([sys.executable, "-m", "kahanmaps_cli", "nonsense"], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert "There is no command 'nonsense'" in done.stderr
-
-
 @pytest.mark.parametrize("megabytes", [100, 250])
 def test_want_of_memory_is_told_and_never_ends_with_the_status_of_a_refuted_claim(tmp_path, megabytes):
     # OpenBLAS ends the process with 1 where it finds no memory; at 100 MB numpy itself cannot be loaded.
@@ -133,12 +117,6 @@ def test_nothing_in_a_message_can_steer_a_terminal(kahanmaps):
     assert outcome.status == 2
     assert r"\x1b[31mred\x07.toml" in outcome.err
     assert outcome.err.replace("\n", "").isprintable()
-
-
-def test_main_takes_its_arguments_from_the_command_line_when_given_none(monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["kahanmaps", "--version"])
-    assert main() == 0
-    assert capsys.readouterr().out == f"kahanmaps {__version__}\n"
 
 
 # Standard streams
@@ -201,13 +179,6 @@ def test_output_to_a_closed_stream_is_an_error():
     done = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *PROGRAM, "version"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (3, "")
     assert "standard output is closed" in done.stderr
-
-
-def test_a_command_that_prints_nothing_needs_no_standard_output(tmp_path):
-    line = [*PROGRAM, *f"plot portrait harmonic --eps 1/20 --steps 9 -q -o {tmp_path}/o.svg".split()]
-    done = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *line], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "o.svg").exists()
 
 
 IN_FLINT = """

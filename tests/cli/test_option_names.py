@@ -57,12 +57,6 @@ def test_whoever_takes_right_hand_sides_takes_parameters():
     assert {words for words, _ in options["--rhs"]} <= {words for words, _ in options["-p"]}
 
 
-def test_every_command_takes_the_option_for_colours():
-    assert [
-        words for words, command in LEAVES if own(words) and not any("--color" in one.opts for one in command.params)
-    ] == []
-
-
 @pytest.mark.parametrize("words", [words for words, _ in by_name()["--seed"] if own(words)])
 def test_a_negative_seed_is_refused_by_every_command(kahanmaps, words):
     outcome = kahanmaps(words, "--seed -1")
@@ -81,9 +75,3 @@ def test_a_time_that_is_none_is_refused_by_every_command(kahanmaps, words, value
 def test_the_old_name_of_an_option_still_works(kahanmaps):
     new = kahanmaps("heights weierstrass --eps 1/10 --random 1 --steps 20")
     assert kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20") == new
-
-
-def test_step_numbers_may_have_an_exponent_as_integers_may(kahanmaps):
-    line = """orbit --rhs "x' = x" --start 1 --eps 1/10 --at"""
-    assert kahanmaps(f"{line} 1e1,2").out == kahanmaps(f"{line} 10,2").out
-    assert kahanmaps(f"{line} 1e-1").status == 2

@@ -5,10 +5,8 @@ shape of the other checks and with the place of each statement in the paper. On 
 """
 
 import json
-import re
 
 import pytest
-from cli_helpers import terminal
 
 from kahanmaps.paper.registry import claims
 from kahanmaps.version import __version__
@@ -68,13 +66,6 @@ def test_controls_are_refuted_and_that_is_success(once):
     assert last["verdict"] == "proved"
 
 
-def test_balls_enclose_the_complex_roots(kahanmaps):
-    report = kahanmaps("verify --chi t^2+1 --section 6 --balls 128 --json").json
-    for claim in report["claims"]:
-        (balls,) = [evidence for evidence in claim["also"] if evidence["method"] == "complex balls"]
-        assert balls["bits"] == 128
-
-
 # A pipe
 
 
@@ -84,18 +75,6 @@ def test_in_a_pipe_every_statement_stands_on_a_line_with_its_verdict(once):
     assert len(rows) == len(expected(1))
     assert {row[0] for row in rows} - {"supported"} == {"proved", "refuted (as expected)"}
     assert outcome.out.splitlines()[-1] in ("verdict\tproved", "verdict\tsupported")
-
-
-def test_in_a_pipe_the_statements_are_those_of_json(once):
-    text, report = once(QUICK).out, once(f"{QUICK} --json").json
-    for claim in report["claims"]:
-        assert f"{claim['verdict']}\t{claim['claim']}" in text
-        assert claim["formula"] in text
-
-
-def test_progress_names_the_statement_and_counts(kahanmaps, slow_clock):
-    err = kahanmaps(QUICK).err
-    assert "Theorem 9 (2 of" in err
 
 
 # Exit statuses
@@ -113,31 +92,6 @@ def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
 
 
 # A terminal
-
-COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-
-
-def plain(outcome):
-    return COLOUR.sub("", outcome.out)
-
-
-def test_misprints_are_explained_on_a_terminal():
-    text = " ".join(plain(terminal("verify", "--m", "3", "--section", "9", columns=200)).split())
-    assert "misprint: the entry (2,3) is eps^2 q_3" in text
-
-
-def test_verbose_shows_the_evidence():
-    short, long = (plain(terminal("verify", "--m", "1", "--section", "6", *v, columns=200)) for v in ([], ["-v"]))
-    assert "random points over GF(p): held at" not in short
-    assert "random points over GF(p): held at" in long
-
-
-def test_what_is_outside_the_hypotheses_is_told_on_a_terminal():
-    outcome = terminal("verify", "--chi", "(t-1)^2*(t+2)", "--section", "9", columns=200)
-    assert outcome.status == 3
-    assert "undecided" in plain(outcome)
-    assert "repeated roots" in plain(outcome)
-
 
 # What survives
 
