@@ -29,8 +29,14 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                     shutil.copyfileobj(held, stream)
             return
         target = resolved(path)
-        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
-        with _beside(target, path) as part:
+        os.umask(umask := os.umask(0o022))  # there is no other way to ask for it
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask
+        try:
+            prefix = f".{target.name}"[:100] + "."
+            beside = NamedTemporaryFile(dir=target.parent, prefix=prefix, delete=False)  # noqa: SIM115
+        except OSError as error:  # about the file that was asked for, not about the one beside it
+            raise type(error)(error.errno, error.strerror, os.fspath(path)) from None
+        with beside as part:
             try:
                 yield part
                 os.chmod(part.name, mode)
@@ -40,7 +46,13 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                 with suppress(OSError):
                     os.unlink(part.name)
                 raise
-        _sync_folder(target.parent)
+        # The new name is on the disk, too; some file systems know no such thing, and have it anyway.
+        with suppress(OSError):
+            descriptor = os.open(target.parent, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
 
 
 @contextmanager
@@ -86,26 +98,3 @@ def resolved(path: str | os.PathLike[str]) -> Path:
     if os.path.islink(found):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))
     return Path(found)
-
-
-def _beside(target: Path, path: str | os.PathLike[str]) -> Any:
-    try:
-        return NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}"[:100] + ".", delete=False)
-    except OSError as error:  # about the file that was asked for, not about the one beside it
-        raise type(error)(error.errno, error.strerror, os.fspath(path)) from None
-
-
-def _sync_folder(folder: Path) -> None:
-    """The new name is on the disk, too; some file systems know no such thing, and have it anyway."""
-    with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-
-
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask

@@ -40,7 +40,9 @@ class Size:
         return Size(self.degree + other.degree, self.bits + other.bits)
 
     def __add__(self, other: Size) -> Size:
-        return Size(max(self.degree, other.degree), _log_sum(self.bits, other.bits))
+        low, high = sorted((self.bits, other.bits))
+        bits = high + math.log2(1 + 2 ** (low - high)) if high - low < 200 else high + 1e-9
+        return Size(max(self.degree, other.degree), bits)
 
     def __pow__(self, exponent: int) -> Size:
         return Size(self.degree * exponent, self.bits * exponent)
@@ -283,8 +285,3 @@ def _larger(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]
 def _together(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
     """The product of two products of denominators."""
     return {number: left.get(number, 0) + right.get(number, 0) for number in {*left, *right}}
-
-
-def _log_sum(left: float, right: float) -> float:
-    high, low = max(left, right), min(left, right)
-    return high + math.log2(1 + 2 ** (low - high)) if high - low < 200 else high + 1e-9

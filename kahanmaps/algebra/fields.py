@@ -370,10 +370,10 @@ class PrimeField(Field):
                 else nmod(number, self.prime)
             )
         except ZeroDivisionError:
+            text = format_number(number)
+            text = text if len(text) <= 40 else f"{text[:20]}...{text[-20:]}"
             raise BadPrime(
-                f"the prime {self.prime} divides the denominator of {_shorten(format_number(number))}: "
-                "take another prime",
-                self.prime,
+                f"the prime {self.prime} divides the denominator of {text}: take another prime", self.prime
             ) from None
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
@@ -563,7 +563,3 @@ def _example(text: str) -> str:
     except InputError:
         return "1/10"
     return text
-
-
-def _shorten(text: str, width: int = 40) -> str:
-    return text if len(text) <= width else f"{text[: width // 2]}...{text[-width // 2 :]}"

@@ -298,11 +298,7 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
     """The factors of that one of the equations that falls apart best, None where none does."""
     products = [p.factor()[1] for p in equations]
     reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
-    return min(reducible, key=_badness, default=None)
-
-
-def _badness(factors: Sequence[fmpq_mpoly]) -> tuple[int, int]:
-    return (max(degree(p) for p in factors), sum(len(p) for p in factors))
+    return min(reducible, key=lambda one: (max(map(degree, one)), sum(map(len, one))), default=None)
 
 
 def _at(factor: fmpq_poly, form: fmpq_mpoly) -> fmpq_mpoly:
@@ -324,17 +320,16 @@ def groebner(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
     context = equations[0].context()
     integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
 
-    vector = fmpz_mpoly_vec([_integral(p, integers) for p in equations], integers)
+    cleared = []
+    for p in equations:
+        below = common_denominator(p)
+        cleared.append(integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()}))
+    vector = fmpz_mpoly_vec(cleared, integers)
     result: Any = vector.buchberger_naive(GROEBNER_LIMITS)
     basis, done = result
     if not done:
         return None
     return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in basis.autoreduction()]
-
-
-def _integral(p: fmpq_mpoly, integers: fmpz_mpoly_ctx) -> Any:
-    below = common_denominator(p)
-    return integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()})
 
 
 def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:

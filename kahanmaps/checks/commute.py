@@ -173,9 +173,30 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
     if len(pairs) > tried:
         notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
-        findings.append(_inverse_finding(associates[0], settings, orbit))
-    if any(factor.degree > 1 for factor in member.factors):
-        findings.append(_splitting_field_finding(member))
+        # Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse.
+        only, inverse = associates[0].system, associates[0].system.scaled(-1)
+        findings.append(
+            judge(
+                "the Kahan maps of f_0 and -f_0, its only rational associated system, commute "
+                "(they are inverse to each other)",
+                commutativity(only, inverse, settings.eps, ("f_0", "-f_0")),
+                settings,
+                theorems.commuting_by_splitting(only, inverse),
+                orbit,
+                formula="Phi_f(., eps) o Phi_f(., -eps) = id",
+                source="petrera-suris-2016, eq. (eq: reversible)",
+            )
+        )
+    irrational = [f"({factor})" for factor in member.factors if factor.degree > 1]
+    if irrational:
+        proof = theorems.commuting_over_splitting_field(member)
+        reason = Evidence(theorems.METHOD, "the hypotheses of the theorem do not all hold, which decides nothing")
+        claim = (
+            f"over the splitting field of chi, where {', '.join(irrational)} splits, the Kahan maps of all "
+            f"associated systems commute pairwise"
+        )
+        verdict = Verdict.UNDECIDED if proof is None else Verdict.PROVED
+        findings.append(Finding(claim, verdict, proof or reason, source=SOURCE))
     control = _control(member, settings, orbit)
     if not control.is_as_expected:
         notes.append(
@@ -200,33 +221,6 @@ def _pair_finding(
         return Finding(claim, Verdict.PROVED, proof, formula=formula, source=SOURCE)
     identity = commutativity(first.system, second.system, settings.eps, names)
     return judge(claim, identity, settings, proof, orbit, formula=formula, source=SOURCE)
-
-
-def _inverse_finding(only: AssociatedSystem, settings: Settings, orbit: OrbitRun) -> Finding:
-    """Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse."""
-    inverse = only.system.scaled(-1)
-    return judge(
-        "the Kahan maps of f_0 and -f_0, its only rational associated system, commute (they are inverse to each other)",
-        commutativity(only.system, inverse, settings.eps, ("f_0", "-f_0")),
-        settings,
-        theorems.commuting_by_splitting(only.system, inverse),
-        orbit,
-        formula="Phi_f(., eps) o Phi_f(., -eps) = id",
-        source="petrera-suris-2016, eq. (eq: reversible)",
-    )
-
-
-def _splitting_field_finding(member: FamilyMember) -> Finding:
-    proof = theorems.commuting_over_splitting_field(member)
-    irrational = [f"({factor})" for factor in member.factors if factor.degree > 1]
-    claim = (
-        f"over the splitting field of chi, where {', '.join(irrational)} splits, the Kahan maps of all "
-        f"associated systems commute pairwise"
-    )
-    if proof is not None:
-        return Finding(claim, Verdict.PROVED, proof, source=SOURCE)
-    reason = Evidence(theorems.METHOD, "the hypotheses of the theorem do not all hold, which decides nothing")
-    return Finding(claim, Verdict.UNDECIDED, reason, source=SOURCE)
 
 
 def _control(member: FamilyMember, settings: Settings, orbit: OrbitRun) -> Finding:

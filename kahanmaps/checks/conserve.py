@@ -176,16 +176,26 @@ def check_integrals(
     tried = _TRIED if file.dim <= 16 else _TRIED_IN_HIGH_DIMENSION
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
+        claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
         if _is_constant(integral, settings):
-            findings.append(_no_integral(integral, settings, source))
+            at = "" if settings.eps is None else f" at eps = {settings.eps}"
+            reason = Evidence(
+                "constant", f"it is a constant{at}: every map conserves constants, so this is no integral"
+            )
+            is_claimed = isinstance(integral, ClaimedIntegral)  # others do not count
+            formula = integral.formula
+            findings.append(
+                Finding(claim, Verdict.UNDECIDED, reason, formula=formula, source=source, applies=is_claimed)
+            )
             continue
         if proof is not None and k >= tried and file.dim > 16:
-            claim = f"{integral.name} is conserved"
-            findings.append(Finding(claim, Verdict.PROVED, proof, formula=integral.formula, source=source))
+            findings.append(
+                Finding(f"{integral.name} is conserved", Verdict.PROVED, proof, formula=integral.formula, source=source)
+            )
             continue
         findings.append(
             judge(
-                f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}",
+                claim,
                 conservation(file.map, integral, settings.eps),
                 settings,
                 proof,
@@ -200,15 +210,6 @@ def check_integrals(
         notes.append(f"of the proved integrals the first {tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())
     return Report("integrals", tuple(findings), context, notes, ended_early=settings.cut_short(orbit))
-
-
-def _no_integral(integral: PhaseFunction, settings: Settings, source: str) -> Finding:
-    """What is said of a constant in the place of an integral; it does not count where nobody claimed it."""
-    at = "" if settings.eps is None else f" at eps = {settings.eps}"
-    reason = Evidence("constant", f"it is a constant{at}: every map conserves constants, so this is no integral")
-    claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
-    is_claimed = isinstance(integral, ClaimedIntegral)
-    return Finding(claim, Verdict.UNDECIDED, reason, formula=integral.formula, source=source, applies=is_claimed)
 
 
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
@@ -245,7 +246,7 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
 
 
 def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:
-    """Modified H in both normalisations, and K~_s for every rational associated system: the whole class shares them."""
+    """Modified H in both normalizations, K~_s for every rational associated system, and those of the commutant."""
     # Where there are many factors the K~ of several minus signs are combinations of those listed.
     associates = theorems.listed_associates(member)
     base = associates[0]
@@ -257,16 +258,11 @@ def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidenc
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
         found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
-    return [*found, *_commutant_integrals(member)]
-
-
-def _commutant_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:
-    """m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots."""
+    # m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots.
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
-    found: list[tuple[PhaseFunction, Evidence | None, str]] = []
     for k in range(1, member.m):
-        integral = CommutantIntegral(hamiltonian, member.A, k, letter)
+        commutant = CommutantIntegral(hamiltonian, member.A, k, letter)
         name = "A^T" if k == 1 else f"(A^T)^{k}"
-        found.append((integral, theorems.commutant_integral(hamiltonian, integral, name), ""))
+        found.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
     return found

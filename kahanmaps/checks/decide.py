@@ -289,7 +289,8 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
         found = identity.at(ground, point, at_eps)
         witness = witness_of(identity, ground, point, at_eps, found) if found is not None else None
         if witness is not None:
-            where = f"fails at a rational point of height at most {_height(candidate)}, exactly"
+            height = max(max(abs(int(entry.p)), int(entry.q)) for entry in candidate)
+            where = f"fails at a rational point of height at most {height}, exactly"
             return Decision(Verdict.REFUTED, Evidence("exact rational point", where, {}), witness)
     return None
 
@@ -329,7 +330,3 @@ def _draw_eps(identity: Identity, field: PrimeField, rng: random.Random) -> Any:
         eps = field.random(rng)
         if eps != 0:
             return eps
-
-
-def _height(point: tuple[fmpq, ...]) -> int:
-    return max(max(abs(int(entry.p)), int(entry.q)) for entry in point)

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
 
 
-def _as_it_is(file: SystemFile, text: str) -> Any:
-    return text
-
-
 @dataclass(frozen=True)
 class ClaimOption:
     """The option of a command that takes a claim; `read` makes of its text what the check takes as `extra`.
@@ -31,7 +27,7 @@ class ClaimOption:
     flag: str
     metavar: str
     help: str
-    read: Callable[[SystemFile, str], Any] = _as_it_is
+    read: Callable[[SystemFile, str], Any] = lambda file, text: text
     many: bool = False
 
 

@@ -107,11 +107,15 @@ def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evid
 
 def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
     """Over the splitting field of chi every choice of signs gives a B_s with B_s^2 = I, by Chinese remainders."""
+    at_A = QQ.identity(member.dim)
+    for factor in member.factors:
+        at_A = at_A * evaluate_at_matrix(factor.polynomial, member.A) ** factor.multiplicity
+    vanishes = not any(entry != 0 for entry in at_A.entries())
     return evidence(
         "Theorem 9 of Petrera and Suris over the splitting field",
         [
             *member_hypotheses(member),
-            ("chi(A) = 0, so that B_s^2 = I for the Chinese remainders B_s of the signs", _annihilates(member)),
+            ("chi(A) = 0, so that B_s^2 = I for the Chinese remainders B_s of the signs", vanishes),
         ],
     )
 
@@ -199,14 +203,6 @@ def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
     gram = F * F.transpose()
     C = gram.solve(F * G.transpose()).transpose()
     return C if C * F == G else None
-
-
-def _annihilates(member: FamilyMember) -> bool:
-    value = QQ.identity(member.dim)
-    for factor in member.factors:
-        for _ in range(factor.multiplicity):
-            value = value * evaluate_at_matrix(factor.polynomial, member.A)
-    return not any(entry != 0 for entry in value.entries())
 
 
 def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:

@@ -90,18 +90,34 @@ class DocumentReader(CompositionReader):
                 f"found {found} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
             )
         self._read_parameters()
-        name = self._read_name()
+        name = self.document.get("name", self._default_name())
+        if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
+            # It stands in the first line of many outputs, where nothing may break the line or color the terminal.
+            self._mistake(
+                "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
+            )
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
         map_, hamiltonian, member = self._read_section(kind, self._table(kind) if kind else None)
-        claims = self._read_integrals()
+        claims = {}
+        for name_of_claim, value in (self._table("integrals") or {}).items():
+            if not name_of_claim.isprintable():
+                self._mistake(f"integrals.{quoted(name_of_claim)}", "expected a printable name")
+            elif (claim := self._claim(f"integrals.{name_of_claim}", value)) is not None:
+                claims[name_of_claim] = claim
         in_iterates = {name: function for name, function in claims.items() if iterates_in(*function.names)}
         integrals = {name: function for name, function in claims.items() if name not in in_iterates}
         density = self._read_density()
         self._read_catalog()
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        document = self._normalised()
+        # With its name and the parameters that hold, long integers as text (JSON needs them so).
+        document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
+        document = {"name": name, **document}
+        if self.parameters:
+            document["parameters"] = {key: format_number(value) for key, value in self.parameters.items()}
+        if self.root is not None:
+            document.setdefault("parameters", {})[self.root[0]] = str(self.root[1])
         return Contents(
             name,
             kind,
@@ -115,15 +131,6 @@ class DocumentReader(CompositionReader):
             tuple(notes),
             in_iterates,
         )
-
-    def _read_name(self) -> Any:
-        name = self.document.get("name", self._default_name())
-        if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
-            # It stands in the first line of many outputs, where nothing may break the line or colour the terminal.
-            self._mistake(
-                "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
-            )
-        return name
 
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
@@ -152,7 +159,14 @@ class DocumentReader(CompositionReader):
         if hamiltonian is not None:
             map_ = Kahan(hamiltonian.system)
         elif map_ is not None:
-            map_ = self._algebraic(kind, map_)
+            if self.root is not None:
+                parameter, root = self.root
+
+                def at_number(value: fmpq) -> BirationalMap:  # for floats
+                    overrides = {**self.overrides, parameter: value}
+                    return DocumentReader(self.document, self.where, overrides, self.other).read().map
+
+                map_ = AlgebraicMap(map_, root, at_number)
             self.variables = map_.variables  # a polarised map has more of them
             for clash in set(self.variables) & set(self.parameters):
                 self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
@@ -204,7 +218,12 @@ class DocumentReader(CompositionReader):
                 given = number(given)
                 root = parse_root(given) if isinstance(given, str) else given if isinstance(given, Root) else None
                 if root is not None:
-                    self._read_root(name, root)
+                    if self.root is not None:
+                        raise InputError("found a second algebraic parameter, expected at most one")
+                    if root.degree == 1:
+                        self.parameters[name] = -root.polynomial[0]
+                    else:
+                        self.root = name, root
                     continue
                 if isinstance(given, list | dict):
                     raise InputError(f"found {show(given)}, expected a number")
@@ -223,25 +242,6 @@ class DocumentReader(CompositionReader):
                 known = ", ".join(self.parameters) or "none"
                 hint = suggestion(name, list(self.parameters))
                 self._mistake("parameters", f"unknown parameter {quoted(name)}, this system has: {known}{hint}")
-
-    def _read_root(self, name: str, root: Root) -> None:
-        if self.root is not None:
-            raise InputError("found a second algebraic parameter, expected at most one")
-        if root.degree == 1:
-            self.parameters[name] = -root.polynomial[0]
-        else:
-            self.root = name, root
-
-    def _algebraic(self, kind: str, map_: BirationalMap) -> BirationalMap:
-        """The map with the algebraic parameter in it, if there is one; its value is put in anew for floats."""
-        if self.root is None:
-            return map_
-        name, root = self.root
-
-        def at_number(value: fmpq) -> BirationalMap:
-            return DocumentReader(self.document, self.where, {**self.overrides, name: value}, self.other).read().map
-
-        return AlgebraicMap(map_, root, at_number)
 
     def _read_variables(self, kind: str) -> None:
         given = self.document.get("variables")
@@ -407,17 +407,6 @@ class DocumentReader(CompositionReader):
             self._mistake(f"family.{key}", message)
             return None
 
-    def _read_integrals(self) -> dict[str, RationalFunction]:
-        claims = {}
-        for name, value in (self._table("integrals") or {}).items():
-            if not name.isprintable():
-                self._mistake(f"integrals.{quoted(name)}", "expected a printable name")
-                continue
-            claim = self._claim(f"integrals.{name}", value)
-            if claim is not None:
-                claims[name] = claim
-        return claims
-
     def _read_density(self) -> RationalFunction | None:
         if "density" not in self.document:
             return None
@@ -451,13 +440,3 @@ class DocumentReader(CompositionReader):
                             "catalog.sources", f"unknown source {quoted(str(item))}, expected a key of sources.py"
                         )
         read_structured_facts(section, self.variables, self._mistake)
-
-    def _normalised(self) -> dict[str, Any]:
-        """The document with its name and the parameters that hold, long integers as text (JSON needs them so)."""
-        document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
-        document = {"name": self.document.get("name", self._default_name()), **document}
-        if self.parameters:
-            document["parameters"] = {name: format_number(value) for name, value in self.parameters.items()}
-        if self.root is not None:
-            document.setdefault("parameters", {})[self.root[0]] = str(self.root[1])
-        return document

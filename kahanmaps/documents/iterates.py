@@ -63,7 +63,13 @@ def parse_with_iterates(
     if not isinstance(text, str) or "~" not in text:
         return parse_rational_function(text, (*variables, *others), constants)
     formula, *behind = _at_commas(text)
-    definitions = dict(_definition(piece) for piece in behind)
+    definitions = {}
+    for piece in behind:
+        name, equals, value = (part.strip() for part in piece.partition("="))
+        if not equals or not is_name(name):
+            expected = "expected what a letter stands for: F0 = x*y~"
+            raise InputError(f"found {quoted(piece.strip())} behind a comma, {expected}")
+        definitions[name] = value
     outer, inner = iterates_in(formula), iterates_in(*definitions.values())
     count = outer + (inner if definitions else 0)
     if count > MAX_ITERATES:
@@ -105,10 +111,3 @@ def _at_commas(text: str) -> list[str]:
         else:
             pieces[-1] += character
     return pieces
-
-
-def _definition(text: str) -> tuple[str, str]:
-    name, equals, formula = (piece.strip() for piece in text.partition("="))
-    if not equals or not is_name(name):
-        raise InputError(f"found {quoted(text.strip())} behind a comma, expected what a letter stands for: F0 = x*y~")
-    return name, formula

@@ -53,16 +53,13 @@ class TomlKind(NamedTuple):
             # Python's own limit on digits applies to integers written without quotes, before we see them.
             return tomllib.loads(decoded, parse_float=lambda number: number.replace("_", ""))
         except (RecursionError, ValueError) as error:
-            raise self.error(where, [("TOML", _reason(error))]) from error
-
-
-def _reason(error: RecursionError | ValueError) -> str:
-    if isinstance(error, UnicodeDecodeError):
-        return f"not UTF-8 text: {error.reason} at byte {error.start}"
-    if isinstance(error, tomllib.TOMLDecodeError):
-        return str(error)
-    hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
-    return f"cannot be read: {hint}"
+            hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
+            reason = f"cannot be read: {hint}"
+            if isinstance(error, UnicodeDecodeError):
+                reason = f"not UTF-8 text: {error.reason} at byte {error.start}"
+            elif isinstance(error, tomllib.TOMLDecodeError):
+                reason = str(error)
+            raise self.error(where, [("TOML", reason)]) from error
 
 
 def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:
@@ -80,17 +77,17 @@ def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[
             lines.append(f"{key} = {_toml_value(document[key])}")
     for section in sections:
         if section in document and document[section] is not None:
-            plain = {key: value for key, value in document[section].items() if not _is_tables(value)}
+            plain = {
+                key: value
+                for key, value in document[section].items()
+                if not (isinstance(value, list) and value and all(isinstance(item, dict) for item in value))
+            }
             lines += ["", f"[{section}]", *_lines(plain)]
             for key, tables in document[section].items():
                 if key not in plain:
                     for table in tables:
                         lines += ["", f"[[{section}.{_toml_key(key)}]]", *_lines(table)]
     return "\n".join(lines) + "\n"
-
-
-def _is_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
 
 def _lines(table: Mapping[str, Any]) -> list[str]:

@@ -95,7 +95,11 @@ def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
     for polynomial, multiplicity in found:
         monic = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
         factors.append(Factor(monic, multiplicity // 2))
-    return tuple(sorted(factors, key=_order))
+
+    def order(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
+        return factor.degree, (-factor.polynomial[0],) if factor.degree == 1 else tuple(factor.polynomial.coeffs())
+
+    return tuple(sorted(factors, key=order))
 
 
 def chi(A: fmpq_mat) -> fmpq_poly:
@@ -207,12 +211,6 @@ def symplectic_inverse(S: fmpq_mat) -> fmpq_mat:
     """S^{-1} = J^{-1} S^T J for symplectic S."""
     J = standard_structure(S.nrows())
     return -(J * S.transpose() * J)
-
-
-def _order(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
-    if factor.degree == 1:
-        return (1, (-factor.polynomial[0],))
-    return (factor.degree, tuple(factor.polynomial.coeffs()))
 
 
 def _show(number: fmpq) -> str:

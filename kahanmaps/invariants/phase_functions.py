@@ -134,7 +134,13 @@ def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
 def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
     names = names_of(polynomials[0])
     coefficients = [c for polynomial in polynomials for c in coefficients_in(polynomial, dim)]
-    found = [_without_eps(c) if "eps" in names[dim:] else c for c in coefficients]
+    found = coefficients
+    if "eps" in names[dim:]:  # the last variable: the highest power of it that divides each is taken out
+        least = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
+        found = [
+            c.context().from_dict({(*m[:-1], int(m[-1]) - low): value for m, value in c.terms()})
+            for c, low in zip(coefficients, least, strict=True)
+        ]
     symbols = {name for c in found for name in names if name not in c.unused_gens()}
     if len(symbols) == 1:
         # In one symbol the common zeros are those of the greatest common divisor.
@@ -143,10 +149,3 @@ def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
         return ""
     texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in found))
     return f"{', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0"
-
-
-def _without_eps(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-    """Divided by the highest power of eps, its last variable, that divides it."""
-    least = min(int(monomial[-1]) for monomial in polynomial.monoms())
-    terms = {(*monomial[:-1], int(monomial[-1]) - least): value for monomial, value in polynomial.terms()}
-    return polynomial.context().from_dict(terms)

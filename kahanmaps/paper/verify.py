@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count
@@ -205,7 +206,13 @@ class Verifier:
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
-            found.append(_last_word(found, without))
+            tried = {"claims": len({finding.place["key"] for finding in found})}
+            text = f"{len(found)} controls of {tried['claims']} claims, all refuted at exact points"
+            if without or not found:
+                text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
+            verdict = Verdict.UNDECIDED if without or not found else Verdict.PROVED
+            claimed = "every claim fails on some input that breaks one of its hypotheses"
+            found.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
         return found
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
@@ -375,8 +382,9 @@ class Verifier:
             return normal_form_proof(claim.key, blocks, order) if claim.symplectic else None
         if not needs - {"roots"} and (self.roots is not None or "roots" not in needs):
             objects = self.exact_point("roots" in needs, 0)
-            if objects is not None and equation.degree == 0 and _holds(claim, objects):
-                return Evidence("exact", "both sides are the same over Q", {})
+            with suppress(*UNDEFINED):
+                if objects is not None and equation.degree == 0 and evaluate(claim, objects).holds:
+                    return Evidence("exact", "both sides are the same over Q", {})
         if claim.symplectic and self.member.is_generic:
             evidence = normal_form_proof(claim.key, blocks, order)
             if evidence is not None:
@@ -427,7 +435,9 @@ class Verifier:
                     if not same(objects.K, left, right):
                         raise Contradiction(f"{claim.place}: {claim.title}: two balls that must overlap do not")
                     for a, b in zip(entries(left), entries(right), strict=True):
-                        widest = max(widest, _log2_radius(objects.K.convert(a) - objects.K.convert(b)))
+                        distance = abs(objects.K.convert(a) - objects.K.convert(b)).abs_upper()
+                        if distance != 0:
+                            widest = max(widest, float(distance.log().mid()) / math.log(2))
         except (PrecisionLost, *UNDEFINED):
             return Evidence("complex balls", f"balls of {bits} bits are too wide to compare", {"bits": bits})
         text = f"over complex balls of {bits} bits the sides overlap"
@@ -620,34 +630,9 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     )
 
 
-def _last_word(found: Sequence[Finding], without: Sequence[str]) -> Finding:
-    """Whether every claim that was looked at was refuted by some control."""
-    claims_tried = len({finding.place["key"] for finding in found})
-    claim = "every claim fails on some input that breaks one of its hypotheses"
-    if without or not found:
-        text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
-        return Finding(claim, Verdict.UNDECIDED, Evidence("controls", text, {"claims": claims_tried}))
-    text = f"{len(found)} controls of {claims_tried} claims, all refuted at exact points"
-    return Finding(claim, Verdict.PROVED, Evidence("controls", text, {"claims": claims_tried}))
-
-
 def _common_factor(chi: fmpq_poly, coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
     """The monic gcd of chi and these elements of Q[t]/chi: the roots at which all of them vanish."""
     common = chi
     for coefficient in coefficients:
         common = common.gcd(coefficient)
     return common
-
-
-def _holds(claim: Claim, objects: PaperObjects) -> bool:
-    """Whether a claim is defined and holds."""
-    try:
-        return evaluate(claim, objects).holds
-    except UNDEFINED:
-        return False
-
-
-def _log2_radius(ball: Any) -> float:
-    """log2 of an upper bound for |ball|."""
-    bound = abs(ball).abs_upper()
-    return -math.inf if bound == 0 else float(bound.log().mid()) / math.log(2)

@@ -25,8 +25,8 @@ def command(shell: str | None) -> None:
       ~/.zshrc                     eval "$(kahanmaps completion zsh)"
       ~/.config/fish/config.fish   kahanmaps completion fish | source
 
-    In zsh the line comes after compinit. Completed are commands, options and their values, systems (names of the
-    catalogue, .toml files, folders), and after -p the parameters of the system.
+    In zsh the line comes after compinit. Completed are commands, options and their values, and systems (names of the
+    catalogue, .toml files, folders).
     """
     from click.shell_completion import get_completion_class
 

@@ -117,7 +117,10 @@ def _tokens(text: str) -> Iterator[Token]:
         match = _TOKEN.match(text, column)
         if match is None:
             hint = _WRITE.get(text[column], "use numbers, names and + - * / ^ ( )")
-            raise ExpressionError(f"found the character {_describe(text[column])}, {hint}", text, column)
+            found = repr(text[column])
+            if not (text[column].isascii() and text[column].isprintable()):
+                found = f"U+{ord(text[column]):04X} {unicodedata.name(text[column], '')}".rstrip()
+            raise ExpressionError(f"found the character {found}, {hint}", text, column)
         yield Token(match[0], match.lastgroup or match[0], column)
         column = match.end()
     yield Token("", _END, len(text))
@@ -235,13 +238,6 @@ def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
     return ExpressionError(f"{found}, expected an operator between them: write {example}", text, column)
 
 
-def _describe(character: str) -> str:
-    if character.isascii() and character.isprintable():
-        return repr(character)
-    name = unicodedata.name(character, "")
-    return f"U+{ord(character):04X} {name}".rstrip()
-
-
 class _Arithmetic:
     """The operations of one expression, each refused where it would pass a limit.
 
@@ -352,7 +348,8 @@ class _Arithmetic:
         if exponent is None:
             raise self.refusal("found an exponent with variables in it, expected an integer", column)
         if exponent.q != 1 or abs(exponent.p) > self.limits.exponent:
-            found = f"found the exponent {_show(exponent)}"
+            bits = exponent.height_bits()
+            found = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
             raise self.refusal(f"{found}, expected an integer of size at most {self.limits.exponent}", column)
         n = int(exponent.p)
         number = _constant(base)
@@ -526,7 +523,3 @@ def _constant(value: _Value) -> fmpq | None:
 def _bits(integer: fmpz) -> int:
     """The least b >= 0 with |integer| <= 2**b: 0 for 1 and -1, so that a product by them does not grow."""
     return int((abs(integer) - 1).bit_length()) if integer else 0
-
-
-def _show(number: fmpq) -> str:
-    return str(number) if number.height_bits() < 100 else f"of about {number.height_bits() * 1000 // 3322} digits"

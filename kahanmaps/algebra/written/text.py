@@ -202,7 +202,9 @@ def format_polynomial(polynomial: fmpq_mpoly) -> str:
             coefficient = -coefficient
         elif pieces:
             pieces.append(" + ")
-        pieces.append(_term(coefficient, monomial, names))
+        powers = [n if k == 1 else f"{n}^{k}" for n, k in zip(names, monomial, strict=True) if k]
+        product = "*".join(powers if coefficient.p == 1 and powers else [str(coefficient), *powers])
+        pieces.append(f"{product}/{coefficient.q}" if coefficient.p == 1 and powers and coefficient.q != 1 else product)
     return "".join(pieces) or "0"
 
 
@@ -300,30 +302,14 @@ def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _
 
 def sides(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
     """The positive number and the powers, short ones first, of a product that stand above a line, and below it."""
+
+    def size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
+        return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
+
     return [
-        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=_size))
+        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=size))
         for sign, number in ((1, abs(int(constant.p))), (-1, int(constant.q)))
     ]
-
-
-def _size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
-    """The number of terms, and then the order of the ring."""
-    return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
-
-
-def _term(coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> str:
-    """One term with a positive coefficient, such as `2/3*x*y^2` or `x^3/3`."""
-    factors = [
-        name if exponent == 1 else f"{name}^{exponent}"
-        for name, exponent in zip(names, monomial, strict=True)
-        if exponent
-    ]
-    if not factors:
-        return str(coefficient)
-    if coefficient.p != 1:
-        return "*".join([str(coefficient), *factors])
-    product = "*".join(factors)
-    return product if coefficient.q == 1 else f"{product}/{coefficient.q}"
 
 
 def _check_expression(text: object, variables: Sequence[str], constants: Mapping[str, fmpq]) -> None:

@@ -136,31 +136,23 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
         name = reference if made is None else made[0]
         if made is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
-        if not _is_path(reference):
+        has_ending = "." in reference and "(" not in reference  # that of files, or one that was mistyped
+        has_separator = any(mark in reference for mark in (os.sep, os.altsep) if mark)
+        if not (has_ending or has_separator or os.path.exists(reference)):
             raise _unknown(reference)
     return read_system(reference, parameters)
-
-
-def _is_path(text: str) -> bool:
-    separators = [mark for mark in (os.sep, os.altsep) if mark]
-    is_file = "." in text and "(" not in text  # with the ending of files, or one that was mistyped
-    return is_file or any(mark in text for mark in separators) or os.path.exists(text)
 
 
 def _unknown(name: str) -> InputError:
     if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
-    close = _close_names(name)
+    wanted = name.lower().replace("-", "_").replace(" ", "_")
+    known = (*names(), *map_names())
+    close = difflib.get_close_matches(wanted, known, 3)
+    # Or names that contain what was written, e.g. "volterra".
+    close += [other for other in known if len(wanted) > 2 and wanted in other and other not in close]
+    close = close[:3]
     meant = f", did you mean {' or '.join(close)}?" if close else ":"
     return InputError(
         f"found the unknown system {name!r}{meant} {_LIST_THEM}; a file is given by its path, e.g. ./{name}{_ENDING}"
     )
-
-
-def _close_names(name: str) -> list[str]:
-    """Up to three names that look alike or contain what was written, e.g. "volterra"."""
-    wanted = name.lower().replace("-", "_").replace(" ", "_")
-    known = (*names(), *map_names())
-    alike = difflib.get_close_matches(wanted, known, 3)
-    longer = [other for other in known if len(wanted) > 2 and wanted in other and other not in alike]
-    return [*alike, *longer][:3]

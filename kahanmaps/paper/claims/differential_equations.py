@@ -76,7 +76,8 @@ def functions_P_and_Q(o: PaperObjects) -> Pairs:
 @claim("(102)", "s0", "s_0 = 1 - eps^2 (p_0 - q_1 - q_2 - q_3) = 1", only_m=3, breaks=("B",))
 def function_s0(o: PaperObjects) -> Pairs:
     """s_0 is 1, that is p_0 = q_1 + q_2 + q_3"""
-    yield _s0(o), o.K.one
+    squared = o.eps * o.eps
+    yield o.K.one - squared * o.p0(o.x) + squared * o.sum([o.q(i, o.x) for i in o.each]), o.K.one
 
 
 @claim("(102)", "s0", "p_0 = (4-m) tr f'^2/8, sum q_i = (m-2) tr f'^2/8", breaks=("B",), distinct_roots=True)
@@ -369,11 +370,6 @@ def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
 def P_times(o: PaperObjects, value: Any) -> Any:
     """-6 P_0 times a number."""
     return o.P0(o.x) * value * o.number(-6)
-
-
-def _s0(o: PaperObjects) -> Any:
-    squared = o.eps * o.eps
-    return o.K.one - squared * o.p0(o.x) + squared * o.sum([o.q(i, o.x) for i in o.each])
 
 
 def _product_rule(o: PaperObjects, v: Any) -> Any:

@@ -94,7 +94,9 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
 
 def _words(o: PaperObjects, ones: Sequence[Slot]) -> str:
     names = [f"{letter}{i + 1}" for letter in "uv" for i in range(o.m)]
-    terms = ["*".join(_power(names[i], e) for i, e in enumerate(place) if e) for kind, place in ones if kind == "H"]
+    terms = [
+        "*".join(names[i] + f"^{e}" * (e > 1) for i, e in enumerate(place) if e) for kind, place in ones if kind == "H"
+    ]
     text = f"m = {o.m}, H = {' + '.join(terms)}"
     brackets = [f"{{{names[i]}, {names[j]}}}" for kind, (i, j) in _pairs(ones) if kind == "J"]
     return f"{text}, {' = '.join(brackets)} = 1 the only brackets" if brackets else text
@@ -102,10 +104,6 @@ def _words(o: PaperObjects, ones: Sequence[Slot]) -> str:
 
 def _pairs(ones: Sequence[Slot]) -> Iterator[tuple[str, tuple[int, int]]]:
     return ((kind, (place[0], place[1])) for kind, place in ones if kind == "J")
-
-
-def _power(name: str, exponent: int) -> str:
-    return name if exponent == 1 else f"{name}^{exponent}"
 
 
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) -> PaperObjects:
@@ -151,11 +149,6 @@ def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
 Small = tuple[list[Slot], Callable[[Sequence[Slot]], PaperObjects]]
 
 
-def _steps() -> Small:
-    twice = QQ.identity(2) * fmpq(-2)
-    return _slots(1, (3,)), lambda ones: _objects(1, (1,), ones, associate_matrices=(twice,))
-
-
 def _any_structure() -> Small:
     pairs: list[Slot] = [("J", pair) for pair in itertools.combinations(range(4), 2)]
 
@@ -169,7 +162,10 @@ def _any_structure() -> Small:
 
 _SMALL: dict[str, Callable[[], Small]] = {
     "inhomogeneous": lambda: (_slots(1, (3, 2, 1)), lambda ones: _objects(1, (1,), ones)),
-    "steps": _steps,
+    "steps": lambda: (
+        _slots(1, (3,)),
+        lambda ones: _objects(1, (1,), ones, associate_matrices=(QQ.identity(2) * fmpq(-2),)),
+    ),
     "any-structure": _any_structure,
     "derogatory": lambda: (
         _slots(2, (3,), planar=False),
