@@ -37,6 +37,7 @@ def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) 
     """
     values = [rational(value) for value in eigenvalues]
     m = _require_m(len(values))
+    _require_size(size)
     rng = random.Random(integer(seed, "the seed"))
     normal = fmpq_mat(2 * m, 2 * m)
     for i, value in enumerate(values):
@@ -46,7 +47,9 @@ def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) 
     H = forms[0].context().constant(0)
     for i in range(m):
         u, v = forms[i], forms[m + i]
-        a, b, c, d = _planar_coefficients(rng, size)
+        a = b = c = d = 0
+        while _discriminant(a, b, c, d) == 0:  # or the map would not be a genuine one
+            a, b, c, d = (rng.randint(-size, size) for _ in range(4))
         H += a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3
     return FamilyMember(_hidden(normal, S), H)
 
@@ -167,15 +170,6 @@ def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> list[fmpq_mpol
             form = form + entry * x
         forms.append(form)
     return forms
-
-
-def _planar_coefficients(rng: random.Random, size: int) -> list[int]:
-    """A binary cubic with nonzero discriminant, so that its map is a genuine one."""
-    _require_size(size)
-    while True:
-        a, b, c, d = (rng.randint(-size, size) for _ in range(4))
-        if _discriminant(a, b, c, d) != 0:
-            return [a, b, c, d]
 
 
 def _planar_coefficients_over(chi: fmpq_poly, rng: random.Random, size: int) -> list[list[int]]:

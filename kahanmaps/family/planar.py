@@ -217,7 +217,11 @@ class NormalForm(Displayed):
             raise AssertionError("normal form: the sizes of A, H and S differ")
         if any(coefficient.degree() >= m for coefficient in self.coefficients):
             raise AssertionError("normal form: a coefficient of h is not reduced modulo chi")
-        if self.A.transpose() * self.S != self.S * _twice(_companion(self.chi)):
+        # Multiplication by t in the basis 1, t, ..., t^(m-1), for both coordinates.
+        block = [[-self.chi[i] if j == m - 1 else fmpq(i == j + 1) for j in range(m)] for i in range(m)]
+        zeros = [fmpq(0)] * m
+        times_t = fmpq_mat([[*row, *zeros] for row in block] + [[*zeros, *row] for row in block])
+        if self.A.transpose() * self.S != self.S * times_t:
             raise AssertionError("normal form: t does not act as A^T")
         values = self._functional_of_powers(fmpq_poly([1]), 2 * m - 1)
         gram = [[((i < m) - (j < m)) * values[i % m + j % m] for j in range(n)] for i in range(n)]
@@ -225,7 +229,10 @@ class NormalForm(Displayed):
             raise AssertionError("normal form: S^T J S is not the Gram matrix of l")
         a, b, c, d = self.coefficients
         table = [self._functional_of_powers(third, 3 * m - 2) for third in (6 * a, 2 * b, 2 * c, 6 * d)]
-        for i, third in enumerate(_along_columns(third_derivatives(self.H), self.S)):
+        # The trilinear form in the coordinates z: one matrix for each column of S.
+        turned, tensors = self.S.transpose(), third_derivatives(self.H)
+        for i, column in enumerate(turned.tolist()):
+            third = turned * combination_of(column, tensors) * self.S
             expected = [
                 table[(i >= m) + (j >= m) + (k >= m)][i % m + j % m + k % m] for j in range(n) for k in range(n)
             ]
@@ -340,13 +347,6 @@ def _coefficients(chi: fmpq_poly, S: fmpq_mat, tensors: list[fmpq_mat]) -> Quadr
     return third(0, 0, 0) / 6, third(0, 0, 1) / 2, third(0, 1, 1) / 2, third(1, 1, 1) / 6
 
 
-def _along_columns(tensors: list[fmpq_mat], S: fmpq_mat) -> Iterator[fmpq_mat]:
-    """The trilinear form in the coordinates z: one matrix for each column of S."""
-    transposed = S.transpose()
-    for column in transposed.tolist():
-        yield transposed * combination_of(column, tensors) * S
-
-
 def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
     """The columns v, t v, ..., t^{m-1} v."""
     columns = [vector]
@@ -357,18 +357,6 @@ def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
 
 def _unit(n: int, i: int) -> fmpq_mat:
     return fmpq_mat(n, 1, [int(i == j) for j in range(n)])
-
-
-def _companion(chi: fmpq_poly) -> fmpq_mat:
-    """Multiplication by t in the basis 1, t, ..., t^(m-1)."""
-    m = chi.degree()
-    return fmpq_mat([[-chi[i] if j == m - 1 else fmpq(i == j + 1) for j in range(m)] for i in range(m)])
-
-
-def _twice(block: fmpq_mat) -> fmpq_mat:
-    m = block.nrows()
-    zeros = [fmpq(0)] * m
-    return fmpq_mat([[*row, *zeros] for row in block.tolist()] + [[*zeros, *row] for row in block.tolist()])
 
 
 def _bits(number: fmpq) -> int:

@@ -117,13 +117,14 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     _require_size(J.nrows())
     n = J.nrows()
     inverse = J.inv()
-    conditions = [_integral(third * J) for third in third_derivatives(H)]
+    conditions: list[fmpz_mat] = [(third * J).numer_denom()[0] for third in third_derivatives(H)]
     # A few combinations of the conditions nearly always say as much as all of them.
     rng = random.Random(n)
     few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (few, conditions):
         found = _skew_solutions(chosen, n)
-        if all(_is_symmetric(S * condition) for S in found for condition in conditions):
+        products = (S * condition for S in found for condition in conditions)
+        if all(product == product.transpose() for product in products):
             break
     return _reduced([inverse * fmpq_mat(S) for S in found])
 
@@ -280,13 +281,16 @@ def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq
     if len(own) == 1:
         return _Part(E, E * 0, _T)
     # In a commutative algebra the trace form has the rank of its semisimple part, the number of roots to be found.
-    target = _semisimple_dimension(own) if _commute(own) else 0
+    is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(own, 2))
+    target = _semisimple_dimension(own) if is_commutative else 0
     found: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
     for tried, X in enumerate(_candidates(own)):
         if len(pieces := _projections(X, E)) > 1:
             return pieces
         polynomial = _factors_on(X, E)[0].polynomial
-        length = _powers_needed(polynomial, X, E) * polynomial.degree()
+        value, power, length = evaluate_at_matrix(polynomial, X) * E, E, 0
+        while power != 0 * power:  # the least k with polynomial(X)^k E = 0, times the degree
+            power, length = power * value, length + polynomial.degree()
         for Y, minimal in _variants(X, E, polynomial):
             height = sum(map(_bits, minimal.coeffs()))
             found.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
@@ -346,23 +350,11 @@ def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple
     yield X, polynomial
 
 
-def _powers_needed(polynomial: fmpq_poly, X: fmpq_mat, E: fmpq_mat) -> int:
-    """The least k with polynomial(X)^k E = 0."""
-    value, power, k = evaluate_at_matrix(polynomial, X) * E, E, 0
-    while not _is_zero(power):
-        power, k = power * value, k + 1
-    return k
-
-
 def _semisimple_dimension(basis: Sequence[fmpq_mat]) -> int:
     """The rank of tr(X Y): of a commutative algebra modulo its nilpotent elements."""
     flat = fmpq_mat([X.entries() for X in basis])
     turned = fmpq_mat([X.transpose().entries() for X in basis])
     return rank(QQ, flat * turned.transpose())
-
-
-def _commute(basis: Sequence[fmpq_mat]) -> bool:
-    return all(X * Y == Y * X for X, Y in itertools.combinations(basis, 2))
 
 
 def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
@@ -445,21 +437,8 @@ def _other_names(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{letters}{i + 1}" for i in range(len(names)))
 
 
-def _integral(matrix: fmpq_mat) -> fmpz_mat:
-    numerators: fmpz_mat = matrix.numer_denom()[0]
-    return numerators
-
-
-def _is_symmetric(matrix: fmpz_mat) -> bool:
-    return bool(matrix == matrix.transpose())
-
-
 def _identity(n: int) -> fmpq_mat:
     return fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
-
-
-def _is_zero(matrix: fmpq_mat) -> bool:
-    return not any(entry != 0 for entry in matrix.entries())
 
 
 def _bits(number: fmpq) -> int:
