@@ -85,10 +85,7 @@ def from_forms(variables: Sequence[str], forms: Sequence[fmpq_mat], B: fmpq_mat,
 
 @st.composite
 def systems(
-    draw: Any,
-    dims: Sequence[int] = (1, 2, 3),
-    entries: st.SearchStrategy[Any] | None = None,
-    homogeneous: bool = False,
+    draw: Any, dims: Sequence[int] = (1, 2, 3), entries: st.SearchStrategy[Any] | None = None, homogeneous: bool = False
 ) -> QuadraticSystem:
     """Quadratic systems with every coefficient drawn from `entries` (small rationals unless given)."""
     one = rationals(6) if entries is None else entries

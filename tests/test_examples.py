@@ -25,8 +25,7 @@ LONG = {"08_the_paper", "10_cluster_batch"}
 
 
 @pytest.mark.parametrize(
-    "script",
-    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in LONG), id=path.stem) for path in SCRIPTS],
+    "script", [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in LONG), id=path.stem) for path in SCRIPTS]
 )
 def test_an_example_prints_what_stands_beside_it(script, tmp_path):
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)

@@ -147,8 +147,7 @@ def test_no_files_import_each_other_in_a_circle():
 
 
 @pytest.mark.parametrize(
-    "back",
-    ["from kahanmaps.a.two import f", "from .two import f", "def g():\n    from kahanmaps.a import two"],
+    "back", ["from kahanmaps.a.two import f", "from .two import f", "def g():\n    from kahanmaps.a import two"]
 )
 def test_a_circle_is_found_whatever_hides_it(back):
     files = {"kahanmaps/a/one.py": back, "kahanmaps/a/two.py": "if TYPE_CHECKING:\n    from kahanmaps.a.one import g"}

@@ -11,13 +11,7 @@ from math import prod
 import pytest
 from flint import fmpq
 
-from kahanmaps import (
-    QuadraticSystem,
-    check_commute,
-    check_integrals,
-    find_integrals,
-    parse_rational_function,
-)
+from kahanmaps import QuadraticSystem, check_commute, check_integrals, find_integrals, parse_rational_function
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.written.text import parse_polynomial

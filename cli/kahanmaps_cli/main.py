@@ -57,9 +57,7 @@ SECTIONS = {
         "verify": ("verify", "Every statement of the paper, for a member with any m."),
         "family": ("family", "Make and look at members of the commuting family."),
     },
-    "Many experiments": {
-        "batch": ("batch", "Thousands of experiments: run, resume, summarise."),
-    },
+    "Many experiments": {"batch": ("batch", "Thousands of experiments: run, resume, summarise.")},
     "Pictures and pages": {
         "plot": ("plot", "Pictures: portraits, invariant curves, drift, growth."),
         "report": ("report", "A page about a system, member or batch: one HTML file."),

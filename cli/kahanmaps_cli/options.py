@@ -126,9 +126,7 @@ random_starts_options: Callable[[F], F] = stack(
 )
 
 symbolic_option: Callable[[F], F] = click.option(
-    "--symbolic",
-    metavar="NAMES",
-    help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).",
+    "--symbolic", metavar="NAMES", help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one)."
 )
 
 backward_option: Callable[[F], F] = click.option(
@@ -139,12 +137,7 @@ backward_option: Callable[[F], F] = click.option(
 def integral_option(help_text: str, flag: str = "--integral", into: str = "integrals") -> Callable[[F], F]:
     """--integral [NAME=]EXPR, repeatable; pairs of a name, which may be empty, and an expression."""
     return click.option(
-        flag,
-        into,
-        type=NameValue(name_is_optional=True),
-        multiple=True,
-        metavar="[NAME=]EXPR",
-        help=help_text,
+        flag, into, type=NameValue(name_is_optional=True), multiple=True, metavar="[NAME=]EXPR", help=help_text
     )
 
 
@@ -161,8 +154,7 @@ def error_bits_option(help_text: str) -> Callable[[F], F]:
 
 
 evidence_options: Callable[[F], F] = stack(
-    seed_option,
-    error_bits_option("Random points until the probability of error is below 2^-BITS."),
+    seed_option, error_bits_option("Random points until the probability of error is below 2^-BITS.")
 )
 
 verbose_option: Callable[[F], F] = click.option(

@@ -20,20 +20,7 @@ from operator import index
 from typing import Any, Self
 
 import flint
-from flint import (
-    acb,
-    acb_mat,
-    arb,
-    arb_mat,
-    fmpq,
-    fmpq_mat,
-    fmpz,
-    fmpz_mod,
-    fmpz_mod_ctx,
-    fmpz_mod_mat,
-    nmod,
-    nmod_mat,
-)
+from flint import acb, acb_mat, arb, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mod, fmpz_mod_ctx, fmpz_mod_mat, nmod, nmod_mat
 
 from kahanmaps.algebra.written.text import format_number, parse_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost

@@ -16,11 +16,7 @@ from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.measures import (
-    ClaimedDensity,
-    DeterminantDensity,
-    jacobian_determinant_sides,
-)
+from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, jacobian_determinant_sides
 from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.poisson import (
     GivenTensor,

@@ -125,11 +125,7 @@ _CHECKS = [
         "kahanmaps.checks.preserve:check_measure",
         "Is the measure dx/phi invariant?",
         "Is the measure dx/phi invariant under the map of SYSTEM?",
-        (
-            "paper_m3",
-            "lotka_volterra --eps 1/10",
-            "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y",
-        ),
+        ("paper_m3", "lotka_volterra --eps 1/10", "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y"),
         """
         Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)), and the
         [density] of the file; with --density that one instead.
@@ -142,11 +138,7 @@ _CHECKS = [
         "kahanmaps.checks.preserve:check_poisson",
         "Is J - eps^2 f'(x)^2 J, or a given tensor, invariant?",
         "Is Pi(x) = J - eps^2 f'(x)^2 J, or the tensor P of a file, a Poisson tensor that the map of SYSTEM preserves?",
-        (
-            "paper_m3",
-            "henon_heiles    # Hamiltonian, and it fails",
-            "lotka_volterra --tensor p.toml",
-        ),
+        ("paper_m3", "henon_heiles    # Hamiltonian, and it fails", "lotka_volterra --tensor p.toml"),
         """
         Both the transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are put to the test. Without --eps
         the question is asked for every eps. Without --tensor P is Pi, for Hamiltonian systems.

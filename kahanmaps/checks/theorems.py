@@ -210,10 +210,7 @@ def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
     return [
         ("H is a polynomial of degree at most 3", all(sum(m) <= 3 for m in hamiltonian.H.monoms())),
         ("J is constant and skew", bool(J.transpose() == -J)),
-        (
-            "f = J grad H",
-            hamiltonian.system.rhs == linear_combinations(J, hamiltonian.gradient),
-        ),
+        ("f = J grad H", hamiltonian.system.rhs == linear_combinations(J, hamiltonian.gradient)),
     ]
 
 

@@ -56,11 +56,7 @@ class PartReader:
     """A document with the names that hold in it and the mistakes found so far; what its parts are read with."""
 
     def __init__(
-        self,
-        document: dict[str, Any],
-        where: str,
-        overrides: Mapping[str, Any],
-        other: Other | None = None,
+        self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], other: Other | None = None
     ) -> None:
         """`other` looks up what parts of compositions name."""
         self.document = document

@@ -105,9 +105,7 @@ def _up_to(text: str, variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
 
 
 def read_structured_facts(
-    section: Mapping[str, Any],
-    variables: Sequence[str] | None,
-    mistake: Callable[[str, str], None],
+    section: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
     """Look through the structured facts of a [catalog] section; `mistake(key, sentence)` is told what is wrong."""
     degrees = section.get("degrees", [1])
@@ -154,10 +152,7 @@ def _read_dynamical_degree(given: Any, mistake: Callable[[str, str], None]) -> N
 
 
 def _read_relation(
-    path: str,
-    table: Mapping[str, Any],
-    variables: Sequence[str] | None,
-    mistake: Callable[[str, str], None],
+    path: str, table: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
     for key in table:
         if key not in _RELATION_KEYS:

@@ -21,13 +21,7 @@ from kahanmaps.algebra.written.text import format_polynomial, format_univariate
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
-from kahanmaps.family.skew_hamiltonian import (
-    Factor,
-    chi,
-    evaluate_at_matrix,
-    factors_of_chi,
-    require_skew_hamiltonian,
-)
+from kahanmaps.family.skew_hamiltonian import Factor, chi, evaluate_at_matrix, factors_of_chi, require_skew_hamiltonian
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

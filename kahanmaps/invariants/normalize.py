@@ -13,13 +13,7 @@ from functools import reduce
 
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import (
-    RationalFunction,
-    coefficients_in,
-    degree_in,
-    primitive_part,
-    ring,
-)
+from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.written.text import format_rational_function
 from kahanmaps.documents.files import SystemFile
 

@@ -132,12 +132,7 @@ def linear_f(o: PaperObjects) -> PaperObjects:
     """H with its quadratic part only: linear maps that are functions of one matrix commute with any steps."""
     zero = o.zeros(o.n * o.n, o.n)
     inhomogeneous = o.inhomogeneous()
-    return inhomogeneous.changed(
-        third=zero,
-        gradient_of_linear_part=o.zeros(o.n, 1),
-        base=None,
-        draw=o.vector,
-    )
+    return inhomogeneous.changed(third=zero, gradient_of_linear_part=o.zeros(o.n, 1), base=None, draw=o.vector)
 
 
 @control("inhomogeneous", "H is not homogeneous")

@@ -306,14 +306,7 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
     value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
     signs = ((1,), (-1,))
     return PaperObjects(
-        K=K,
-        A=A,
-        third=third,
-        eps=value,
-        roots=(root,),
-        draw=random_draw(K, 2, rng),
-        sign_vectors=signs,
-        order=order,
+        K=K, A=A, third=third, eps=value, roots=(root,), draw=random_draw(K, 2, rng), sign_vectors=signs, order=order
     )
 
 

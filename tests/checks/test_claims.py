@@ -56,16 +56,7 @@ def test_a_search_has_no_truth_value_either():
 
 
 # By hand: refuted before undecided before supported before proved.
-@pytest.mark.parametrize(
-    ("verdicts", "expected"),
-    [
-        ([P], P),
-        ([P, S], S),
-        ([S, U], U),
-        ([P, S, U, R], R),
-        ([], U),
-    ],
-)
+@pytest.mark.parametrize(("verdicts", "expected"), [([P], P), ([P, S], S), ([S, U], U), ([P, S, U, R], R), ([], U)])
 def test_verdicts_combine_to_the_weakest(verdicts, expected):
     assert combined(verdicts) is expected
 

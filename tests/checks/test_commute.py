@@ -10,16 +10,7 @@ from functools import cache
 from math import comb
 
 import pytest
-from check_helpers import (
-    QUICK,
-    commute_at,
-    exact,
-    file_of,
-    half_step,
-    only,
-    system_of,
-    verify_commute_witness,
-)
+from check_helpers import QUICK, commute_at, exact, file_of, half_step, only, system_of, verify_commute_witness
 from flint import fmpq, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
 from hypothesis import assume, given

@@ -24,14 +24,7 @@ from kahanmaps.algebra.bounds import BoundField, Size
 from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.checks import decide as decide_module
 from kahanmaps.checks.claims import Verdict
-from kahanmaps.checks.decide import (
-    Identity,
-    decide,
-    log2_error,
-    random_prime_field,
-    small_points,
-    witness_of,
-)
+from kahanmaps.checks.decide import Identity, decide, log2_error, random_prime_field, small_points, witness_of
 from kahanmaps.errors import SingularMatrix, SingularStep
 
 SUPPORTED, REFUTED, UNDECIDED = Verdict.SUPPORTED, Verdict.REFUTED, Verdict.UNDECIDED
@@ -140,9 +133,7 @@ def test_beyond_degree_2_to_the_60_there_is_no_bound(degree, poles):
 
 
 @given(
-    st.lists(rationals(50), min_size=1, max_size=6),
-    st.lists(rationals(50), min_size=1, max_size=6),
-    st.integers(0, 5),
+    st.lists(rationals(50), min_size=1, max_size=6), st.lists(rationals(50), min_size=1, max_size=6), st.integers(0, 5)
 )
 def test_two_polynomials_are_refuted_exactly_when_they_differ(first, second, seed):
     def value(coefficients):

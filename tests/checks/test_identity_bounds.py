@@ -114,11 +114,7 @@ def test_conservation_of_an_integral_of_the_commutant_is_bounded(hamiltonian, A,
     check(conservation(system, CommutantIntegral(hamiltonian, A, 2), eps))
 
 
-CLAIMS = [
-    "x^2/3 + eps*y",
-    "x*y/(2*x - 3/5*y) + eps/7",
-    "1/(x^3 + eps^4*y)",
-]
+CLAIMS = ["x^2/3 + eps*y", "x*y/(2*x - 3/5*y) + eps/7", "1/(x^3 + eps^4*y)"]
 
 
 @pytest.mark.parametrize("eps", [None, fmpq(10**9 + 7, 998244353)])

@@ -30,10 +30,7 @@ FALSE = identity_of(lambda x, field: x + field.one)
 # True at 1 and 2, on an orbit that random points do not meet.
 FALSE_BUT_ON_AN_ORBIT = identity_of(lambda x, field: x + (x - field.one) * (x - field.convert(2)))
 POLE_FIRST = Identity(
-    1,
-    lambda field, point, eps: None if point[0] == field.one else ([point[0]], [field.convert(2)]),
-    None,
-    subject=(),
+    1, lambda field, point, eps: None if point[0] == field.one else ([point[0]], [field.convert(2)]), None, subject=()
 )
 
 

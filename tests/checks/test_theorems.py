@@ -8,14 +8,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from check_helpers import (
-    commute_at,
-    exact,
-    hamiltonian_of,
-    hamiltonians,
-    side_by_side,
-    system_of,
-)
+from check_helpers import commute_at, exact, hamiltonian_of, hamiltonians, side_by_side, system_of
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, LOTKA_VOLTERRA, matrices, points, rationals, systems
 from hypothesis import assume, given

@@ -122,9 +122,5 @@ def test_bash_completes_with_the_script(tmp_path):
     try kahanmaps orbit euler_top -p a1 = 2 --ste
     """
     outcome = shell(script, tmp_path, PATH=f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    assert outcome.out.splitlines() == [
-        "complete -o nosort -F _kahanmaps_completion kahanmaps",
-        "euler_top",
-        "--steps",
-    ]
+    assert outcome.out.splitlines() == ["complete -o nosort -F _kahanmaps_completion kahanmaps", "euler_top", "--steps"]
     assert outcome.err == ""

@@ -24,8 +24,7 @@ def report(verdict: Verdict, ended_early: bool = False, control: Verdict = Verdi
 
 
 @pytest.mark.parametrize(
-    ("verdict", "status"),
-    [(Verdict.PROVED, 0), (Verdict.SUPPORTED, 0), (Verdict.REFUTED, 1), (Verdict.UNDECIDED, 3)],
+    ("verdict", "status"), [(Verdict.PROVED, 0), (Verdict.SUPPORTED, 0), (Verdict.REFUTED, 1), (Verdict.UNDECIDED, 3)]
 )
 def test_every_verdict_has_its_exit_status(verdict, status):
     assert exit_status(report(verdict)) == status

@@ -118,13 +118,7 @@ def blocks(*jordan: tuple[int, int]) -> fmpq_mat:
 
 @pytest.mark.parametrize(
     ("jordan", "dimension"),
-    [
-        ([(1, 2)], 8),
-        ([(1, 2), (2, 1)], 12),
-        ([(1, 1), (1, 1), (2, 1)], 24),
-        ([(1, 2), (1, 1)], 24),
-        ([(1, 1)] * 3, 56),
-    ],
+    [([(1, 2)], 8), ([(1, 2), (2, 1)], 12), ([(1, 1), (1, 1), (2, 1)], 24), ([(1, 2), (1, 1)], 24), ([(1, 1)] * 3, 56)],
 )
 def test_the_dimension_is_4m_for_jordan_blocks_and_larger_only_for_a_derogatory_A(jordan, dimension):
     A = blocks(*jordan)

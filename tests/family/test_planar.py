@@ -48,7 +48,7 @@ NOT_SPLIT = {
     "m = 4, partly split": draw_with_chi((t - 1) * (2 * t - 1) * (t**2 + t + 3), 1),
 }
 MINUS = {  # signs pick another system than f_0
-    "m = 3, partly split, -+": replace(NOT_SPLIT["m = 3, partly split"], signs=(-1, 1)),
+    "m = 3, partly split, -+": replace(NOT_SPLIT["m = 3, partly split"], signs=(-1, 1))
 }
 MEMBERS = SPLIT | NOT_SPLIT | MINUS
 FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}

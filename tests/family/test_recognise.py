@@ -113,10 +113,7 @@ def test_a_is_as_simple_as_it_can_be():
     assert found.A == fmpq_mat(4, 4, [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1])
 
 
-@given(
-    st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]),
-    st.integers(0, 10**6),
-)
+@given(st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]), st.integers(0, 10**6))
 def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
     member = draw_with_eigenvalues(eigenvalues, seed % 5)
     S = random_symplectic(member.m, random.Random(seed))

@@ -13,14 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.skew_hamiltonian import (
-    chi,
-    defects,
-    diagnosis,
-    factors_of_chi,
-    is_generic,
-    random_symplectic,
-)
+from kahanmaps.family.skew_hamiltonian import chi, defects, diagnosis, factors_of_chi, is_generic, random_symplectic
 from kahanmaps.systems.hamiltonian import standard_structure
 
 t = fmpq_poly([0, 1])

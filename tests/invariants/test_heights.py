@@ -22,12 +22,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.invariants.heights import (
-    HeightGrowth,
-    decimal_text,
-    height,
-    height_growth,
-)
+from kahanmaps.invariants.heights import HeightGrowth, decimal_text, height, height_growth
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.steps import NormalSteps
@@ -129,10 +124,7 @@ def test_systems_of_the_catalogue_grow_as_theory_says(name):
         assert abs(found.constant / Fraction(constant) - 1) < Fraction(1, 500)
 
 
-@pytest.mark.parametrize(
-    ("name", "factor"),
-    [("lorenz", Fraction(3)), ("lotka_volterra", Fraction(2))],
-)
+@pytest.mark.parametrize(("name", "factor"), [("lorenz", Fraction(3)), ("lotka_volterra", Fraction(2))])
 def test_exponential_growth_ends_at_the_budget_with_the_growth_of_the_degrees_as_its_ratio(name, factor):
     system = load(name).system
     found = growth(system, START[: system.dim], 64)

@@ -87,11 +87,7 @@ def command(system: str | None, **options: Any) -> int:
             progress=progress,
         )
         what = lib.VerifyOptions(
-            options["sections"] or None,
-            options["order"],
-            options["ball_bits"],
-            options["controls"],
-            options["beyond"],
+            options["sections"] or None, options["order"], options["ball_bits"], options["controls"], options["beyond"]
         )
         if options["beyond"] and not options["controls"]:
             report = lib.survivors(3 if drawn["m"] is None else drawn["m"], settings)

@@ -245,12 +245,7 @@ class _Arithmetic:
     """
 
     def __init__(
-        self,
-        text: str,
-        ring: fmpq_mpoly_ctx | None,
-        constants: Mapping[str, fmpq],
-        limits: Limits,
-        quotients: bool,
+        self, text: str, ring: fmpq_mpoly_ctx | None, constants: Mapping[str, fmpq], limits: Limits, quotients: bool
     ) -> None:
         self.text = text
         self.ring = ring

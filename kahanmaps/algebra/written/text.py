@@ -128,11 +128,7 @@ def format_point(point: Sequence[fmpq]) -> str:
 
 
 def parse_polynomial(
-    text: str,
-    variables: Sequence[str],
-    constants: Mapping[str, fmpq] = NO_CONSTANTS,
-    *,
-    limits: Limits = LIMITS,
+    text: str, variables: Sequence[str], constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS
 ) -> fmpq_mpoly:
     """The polynomial in `ring(variables)` that `text` spells; `constants` are names that stand for numbers.
 
@@ -154,11 +150,7 @@ def parse_polynomial(
 
 
 def parse_rational_function(
-    text: str,
-    variables: Sequence[str],
-    constants: Mapping[str, fmpq] = NO_CONSTANTS,
-    *,
-    limits: Limits = LIMITS,
+    text: str, variables: Sequence[str], constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS
 ) -> RationalFunction:
     """The quotient of polynomials in `ring(variables)` that `text` spells; common factors stay as they are written.
 

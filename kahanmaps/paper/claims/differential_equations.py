@@ -297,13 +297,7 @@ def ansatz_for_the_inverse(o: PaperObjects) -> Pairs:
     yield o.Pi(o.x) * ansatz, right
 
 
-@claim(
-    "Theorem 12",
-    "",
-    "det Pi = (s_1 ... s_m)^2",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Theorem 12", "", "det Pi = (s_1 ... s_m)^2", breaks=("H", "B"), distinct_roots=True)
 def non_degenerate_tensor(o: PaperObjects) -> Pairs:
     """Pi is non-degenerate where the map is defined: the structure is symplectic"""
     product = o.K.one

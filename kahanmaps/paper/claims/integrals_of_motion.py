@@ -61,10 +61,7 @@ def two_forms_of_H_tilde(o: PaperObjects) -> Pairs:
 
 
 @claim(
-    "Sect. 7",
-    "",
-    "J f'^k = -(nabla^2 H J ... J nabla^2 H), symmetric for odd k, skew for even k",
-    breaks=("f", "J"),
+    "Sect. 7", "", "J f'^k = -(nabla^2 H J ... J nabla^2 H), symmetric for odd k, skew for even k", breaks=("f", "J")
 )
 def terms_of_the_series(o: PaperObjects) -> Pairs:
     """The matrices in the series of H~; so the terms with even k vanish"""
@@ -115,11 +112,7 @@ def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
 
 
 @claim(
-    "Sect. 7",
-    "",
-    "2 x^T J f = -2 x^T nabla H = -6 H, the same for K",
-    breaks=("f", "inhomogeneous"),
-    blockwise=True,
+    "Sect. 7", "", "2 x^T J f = -2 x^T nabla H = -6 H, the same for K", breaks=("f", "inhomogeneous"), blockwise=True
 )
 def leading_terms(o: PaperObjects) -> Pairs:
     """The leading terms of H~ and K~"""

@@ -56,11 +56,7 @@ def hamiltonians_are_independent(o: PaperObjects) -> Pairs:
 
 
 @claim(
-    "Sect. 1",
-    "",
-    "H~_i = eps^{-1} x^T J (A^T)^i x~ is conserved",
-    breaks=("H", "f", "inhomogeneous"),
-    blockwise=True,
+    "Sect. 1", "", "H~_i = eps^{-1} x^T J (A^T)^i x~ is conserved", breaks=("H", "f", "inhomogeneous"), blockwise=True
 )
 def perturbed_hamiltonians_are_conserved(o: PaperObjects) -> Pairs:
     """The map of f_0 has integrals H~_0, ..., H~_{m-1}, perturbations of the H_i"""

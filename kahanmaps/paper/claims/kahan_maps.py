@@ -225,13 +225,7 @@ def invariant_measure(o: PaperObjects) -> Pairs:
         yield o.det(system.jacobian_of_step(system.f, o.x)) * o.det(before), o.det(after)
 
 
-@claim(
-    "Sect. 2",
-    "",
-    "n = 2: dPhi J dPhi^T det(I - eps f'(x)) = det(I - eps f'(x~)) J",
-    only_m=1,
-    breaks=("f", "map"),
-)
+@claim("Sect. 2", "", "n = 2: dPhi J dPhi^T det(I - eps f'(x)) = det(I - eps f'(x~)) J", only_m=1, breaks=("f", "map"))
 def measure_means_symplectic_in_the_plane(o: PaperObjects) -> Pairs:
     """In the plane an invariant measure is the same as symplecticity"""
     jacobian = o.jacobian_of_step(o.f, o.x)

@@ -405,10 +405,7 @@ def _first_order(o: PaperObjects) -> tuple[Any, Any]:
 def _two_sums(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:
     derivative = o.second(o.f, o.unit(l))
     eighth = o.number(1, 8)
-    return (
-        o.trace(B.transpose() * derivative * o.df) * eighth,
-        o.trace(B.transpose() * o.df * derivative) * eighth,
-    )
+    return (o.trace(B.transpose() * derivative * o.df) * eighth, o.trace(B.transpose() * o.df * derivative) * eighth)
 
 
 def _derivative_of_square(o: PaperObjects, v: Any) -> Any:
