@@ -10,7 +10,6 @@ from fractions import Fraction
 import pytest
 from check_helpers import QUICK, file_of, hamiltonian_of, system_of
 
-import kahanmaps as km
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness, combined
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
@@ -19,7 +18,6 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.version import __version__
 
@@ -46,13 +44,6 @@ def test_a_result_has_no_truth_value_and_says_what_to_ask_instead(result):
     with pytest.raises(TypeError, match=r"truth value of a (Verdict|Finding|Report) is ambiguous: use \.holds"):
         bool(result)
     assert result.holds in (True, False, None)
-
-
-def test_a_search_has_no_truth_value_either():
-    with pytest.raises(TypeError, match="truth value of a DegreeGrowth is ambiguous: use one of its attributes"):
-        bool(degree_growth(system_of("x", "x^2"), max_terms=2))
-    with pytest.raises(TypeError, match="truth value of an IntegralSearch is ambiguous"):
-        bool(km.find_integrals("euler_top", eps="1/5", max_degree=1))
 
 
 # By hand: refuted before undecided before supported before proved.

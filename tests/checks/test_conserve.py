@@ -22,7 +22,7 @@ from check_helpers import (
     verify_witness,
 )
 from flint import fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
+from helpers import EULER_TOP, LOTKA_VOLTERRA
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -292,14 +292,6 @@ def test_an_orbit_alone_never_makes_a_claim_proved_or_supported():
     found = check_claim(system_of("x y", "y", "x*y"), "x", Settings(eps="1/10", start=(2, 0), steps=5))
     assert found.verdict is REFUTED
     assert found.also[-1].summary.startswith("held exactly at 6 points")
-
-
-@pytest.mark.parametrize(("asked", "told"), [(True, True), (False, False)])
-def test_an_orbit_cut_short_counts_only_where_it_was_asked_for(asked, told):
-    how = Settings(steps=30, max_digits=100, orbit_is_asked=asked)
-    report = check_integrals(file_of(LORENZ, I="1"), how)
-    assert report.to_json()["orbit"]["status"] == "budget"
-    assert report.ended_early is told
 
 
 # Wrong use

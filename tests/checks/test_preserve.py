@@ -143,15 +143,6 @@ def test_a_density_that_is_right_at_one_eps_is_supported_there_only(eps, verdict
     assert check_density(PLANE.system, "1 - 2*eps*q", Settings(eps=eps, steps=2)).verdict is verdict
 
 
-def test_a_density_of_the_caller_comes_first_and_alone_unless_the_known_ones_are_requested():
-    own = file_of(LOTKA_VOLTERRA, phi="x*y")
-    assert verdicts(check_measure(own, QUICK, claim("x", "x y"))) == [REFUTED]
-    report = check_measure(own, QUICK, claim("x", "x y"), known=True)
-    assert verdicts(report) == [REFUTED, SUPPORTED]
-    assert report.verdict is REFUTED
-    assert verdicts(check_measure(file(PLANE), QUICK, "q")) == [REFUTED]
-
-
 @pytest.mark.parametrize(
     ("phi", "variables", "message"),
     [
@@ -164,14 +155,6 @@ def test_a_density_of_the_caller_comes_first_and_alone_unless_the_known_ones_are
 def test_what_is_no_density_is_wrong_use(phi, variables, message):
     with pytest.raises(InputError, match=message):
         check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi and claim(phi, variables))
-
-
-def test_a_density_for_every_eps_says_at_which_eps_it_is_none():
-    report = check_measure(file_of(LOTKA_VOLTERRA), QUICK, claim("(10*eps - 1)*(eps + 2)*x*y", "x y"))
-    assert only(report).claim == "the measure dx/phi is invariant, where 10*eps^2 + 19*eps - 2 is not 0"
-    assert report.verdict in (SUPPORTED, PROVED)
-    plain = check_measure(file_of(LOTKA_VOLTERRA), QUICK, claim("x*y", "x y"))
-    assert only(plain).claim == "the measure dx/phi is invariant"
 
 
 # The Poisson tensor

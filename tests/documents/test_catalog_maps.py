@@ -16,7 +16,6 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.maps.inverse import inverse_rows
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 every_map = pytest.mark.parametrize("name", map_names())
@@ -108,21 +107,3 @@ def test_five_steps_of_lyness_and_eight_of_todd_close_for_a_1():
         laboratory = Laboratory(load(name, {"a": 1}))
         assert {len(map_.orbit(20)) for map_ in laboratory.maps} == {period}
         assert {len(map_.orbit(20)) for map_ in Laboratory(load(name)).maps} == {20}
-
-
-@pytest.mark.parametrize("name", [name for name in map_names() if "inverse" in FILES[name].document.get("map", {})])
-def test_elimination_finds_the_inverse_that_is_written_down(name):
-    map_ = FILES[name].map
-    found = inverse_rows(map_.rows)
-    assert [(row[k], row[-1]) for k, row in enumerate(found)] == [
-        (row[k] / row[k].leading_coefficient(), row[-1] / row[k].leading_coefficient())
-        for k, row in enumerate(_lowest(map_.backward))
-    ]
-
-
-def _lowest(rows):
-    found = []
-    for k, row in enumerate(rows):
-        common = row[k].gcd(row[-1])
-        found.append([entry / common for entry in row])
-    return found

@@ -5,15 +5,13 @@ file), and nothing else.
 """
 
 import random
-import tomllib
-from datetime import date
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
-from helpers import rationals, table, together
-from hypothesis import example, given, settings
+from helpers import table, together
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
@@ -83,11 +81,6 @@ def keys(text: str | bytes, **parameters: object) -> list[str]:
     return [key for key, _ in mistakes(text, **parameters)]
 
 
-def only_mistake(text: str | bytes, **parameters: object) -> tuple[str, str]:
-    (found,) = mistakes(text, **parameters)
-    return found
-
-
 # Reading
 
 
@@ -151,27 +144,6 @@ def test_an_override_replaces_a_parameter_of_the_file(value):
     assert file.system.rhs[0] == parse_polynomial("x*y - x/2", ["x", "y"])
 
 
-def test_files_that_say_different_things_are_not_equal():
-    different = [
-        SYSTEM,
-        SYSTEM.replace("rotor", "motor"),
-        SYSTEM.replace("2/3", "3/2"),
-        SYSTEM.replace("+ 1", "+ 2"),
-        SYSTEM.replace("I1", "I2"),
-        SYSTEM.replace("a*x + eps", "a*x"),
-        SYSTEM.replace('phi = "1 - ', 'phi = "2 - '),
-        SYSTEM[: SYSTEM.index("[density]")],
-        HAMILTONIAN,
-        HAMILTONIAN.replace("+ z", ""),
-        STANDARD,
-        FAMILY,
-        FAMILY.replace("signs = [1, -1]", ""),
-    ]
-    read = [parse_system(text) for text in different]
-    assert all((read[i] == read[j]) == (i == j) for i in range(len(read)) for j in range(len(read)))
-    assert read[0] != SYSTEM
-
-
 # Round trips
 
 
@@ -190,27 +162,6 @@ def test_every_member_of_the_family_reads_back_equal(m):
     again = parse_system(file.to_toml())
     assert again == file
     assert again.member == file.member
-
-
-printable = st.text().filter(str.isprintable)
-
-
-@given(
-    name=printable,
-    claims=st.dictionaries(printable, st.sampled_from(["x", "eps*x^2/(1 - x)", "a/7"]), max_size=3),
-    value=rationals(10**12),
-)
-@example(name='"""', claims={}, value=fmpq(0))
-@example(name="'\\' [system]", claims={"[system]": "x", "": "a/7", ".": "x"}, value=fmpq(1))
-@example(name="Ω 🌀", claims={"τ": "x", "a.b": "x", "#": "x", "_-": "x"}, value=fmpq(-1, 3))
-def test_hostile_names_read_back_equal(name, claims, value):
-    document = {"name": name, "variables": ["x"], "parameters": {"a": "1"}, "system": {"rhs": ["a*x"]}}
-    model = parse_system('variables = ["x"]\n[parameters]\na = 1\n[system]\nrhs = ["a*x"]\n', parameters={"a": value})
-    functions = {key: parse_rational_function(text, ["x", "eps"], {"a": value}) for key, text in claims.items()}
-    document |= {"parameters": {"a": str(value)}, "integrals": claims}
-    file = SystemFile(name, "system", {"a": value}, model.map, None, None, functions, None, document)
-    assert parse_system(file.to_toml()) == file
-    assert tomllib.loads(file.to_toml())["name"] == name
 
 
 # Mistakes
@@ -252,22 +203,6 @@ def test_a_wrong_file_is_told_its_mistakes_by_key(text, expected, words):
 @pytest.mark.parametrize(("text", "expected"), LARGE.values(), ids=LARGE)
 def test_what_is_large_or_no_text_is_told_as_well(text, expected):
     assert keys(text) == expected
-
-
-def test_the_message_names_the_file_counts_the_mistakes_and_lists_them():
-    with pytest.raises(SystemFileError) as caught:
-        parse_system('variables = ["x"]\n[system]\nrhs = ["x^3", "y"]\n', "pair.toml")
-    first, *rest = str(caught.value).splitlines()
-    assert first == "pair.toml: 3 mistakes"
-    assert rest[0] == "  system.rhs[1]: found a polynomial of degree 3, expected at most 2"
-    assert rest[1].endswith('write discretization = "polarised" into [system] of a file')
-    assert rest[2].startswith("  system.rhs[2]: found the unknown name 'y'")
-    assert rest[-1] == "  system.rhs: found 2 right-hand sides, expected 1, one for each variable"
-
-
-@pytest.mark.parametrize("value", [0.5, True, None, [1], "half", "1/0", date(2024, 1, 1)])
-def test_an_override_that_is_no_exact_number_is_a_mistake_of_that_parameter(value):
-    assert only_mistake(SYSTEM, a=value)[0] == "parameters.a"
 
 
 # Files that cannot be read

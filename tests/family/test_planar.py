@@ -69,15 +69,6 @@ def discriminant(a, b, c, d):
 # The coordinates.
 
 
-@over_members
-def test_points_and_pairs_of_elements_correspond(member, form):
-    for x in samples(member.dim):
-        X, Y = form.coordinates(x)
-        assert max(X.degree(), Y.degree()) < member.m
-        assert form.point(X, Y) == x
-        assert form.coordinates(form.point(X + 5 * form.chi, Y)) == (X, Y)
-
-
 # The system.
 
 

@@ -22,7 +22,7 @@ from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.cubics import belongs, default_variables, third_derivatives
+from kahanmaps.family.cubics import default_variables, third_derivatives
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.recognise import (
@@ -205,26 +205,6 @@ def test_nilpotent_structure_is_found_and_not_generic(power):
     )
     assert evaluate_at_matrix(t ** (power - 1), nilpotent) != nilpotent * 0 == evaluate_at_matrix(t**power, nilpotent)
     assert found.text == (f"H does not split: A, not scalar, with A Hess(H) = Hess(H) A^T has chi = (t - 1)^{power}")
-
-
-def test_a_part_that_cannot_be_split_keeps_a_repeated_root():
-    """A planar part beside one of dimension 4 without structure."""
-    H = "x1^3 + x4^3 + x2^3 + x5^3 + x3^3 + x6^3 + x2*x3*x5"
-    found = found_in(moved(cubic(H, 6), random_symplectic(3, random.Random(4))))
-    assert (found.is_generic, found.dimension) == (False, 2)
-    assert sorted(factor.multiplicity for factor in found.member.factors) == [1, 2]
-
-
-@pytest.mark.parametrize("n", [2, 6])
-@pytest.mark.parametrize("H", ["0", "x1^3", "x1^2*x2", "(x1+x2)^3"])
-def test_a_cubic_of_few_variables_is_found(n, H):
-    hamiltonian = cubic(H, n)
-    found = found_in(hamiltonian)
-    assert belongs(found.A, hamiltonian.H)
-    if H in ("0", "x1^3", "(x1+x2)^3"):  # one variable, or none: one plane that matters, or none
-        assert found.is_generic
-        form, x = normal_form(found.member), random_point(n, 1)
-        assert form.point(*form.step(*form.coordinates(x), 1)) == KahanMap(hamiltonian.system, 1).step(x)
 
 
 # Systems of which not even H is given.

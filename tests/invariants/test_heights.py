@@ -242,22 +242,6 @@ def test_the_constant_of_a_parabola_is_its_leading_coefficient(a, b, c, n, every
 # Decisions
 
 
-@pytest.mark.parametrize("power", [3, 8])
-@pytest.mark.parametrize("shift", [0, 5])
-def test_higher_powers_are_neither_quadratic_nor_exponential(power, shift):
-    for n in range(5, 90):
-        assert of_heights([3 * k**power + shift for k in range(n + 1)]).kind is U
-
-
-@pytest.mark.parametrize("factor", ["3/2", 2, "9/4", 3, 5])
-def test_geometric_growth_is_exponential_as_soon_as_it_is_plain(factor):
-    g = Fraction(factor)
-    longest = next(n for n in range(99) if g**n > 10**5)
-    for n in range(8 if g < 2 else 5, longest):
-        if g ** (n // 4) >= 2:
-            assert of_heights([int(9 * g**k) for k in range(n + 1)]).kind is E
-
-
 @pytest.mark.parametrize(
     ("heights", "why"),
     [
@@ -292,10 +276,3 @@ def test_wrong_input_is_refused(wrong, message):
     options = {name: value for name, value in vars(given).items() if name not in ("start", "steps")}
     with pytest.raises(InputError, match=message):
         growth(load("weierstrass").system, given.start, given.steps, **options)
-
-
-def test_an_eps_longer_than_the_budget_ends_an_orbit_before_its_first_step():
-    found = height_growth(KahanMap(load("paper_m3").system, fmpq(1, 10**3000)), [1] * 6, 60, max_digits=2000)
-    assert (found.end.status, found.end.steps, found.heights) == ("budget", 0, (1,))
-    assert "eps or the start has more digits than the budget of 2000" in found.end.message
-    assert height_growth(KahanMap(load("riccati").system, fmpq(1, 10**3000)), [1], 1, max_digits=4000).end.is_whole
