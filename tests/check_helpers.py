@@ -42,32 +42,35 @@ class Dual:
     b: Fraction
 
     def __add__(self, other: Any) -> Dual:
-        other = _dual(other)
+        other = dual(other)
         return Dual(self.a + other.a, self.b + other.b)
 
     def __sub__(self, other: Any) -> Dual:
-        other = _dual(other)
+        other = dual(other)
         return Dual(self.a - other.a, self.b - other.b)
 
     def __mul__(self, other: Any) -> Dual:
-        other = _dual(other)
+        other = dual(other)
         return Dual(self.a * other.a, self.a * other.b + self.b * other.a)
 
     def __truediv__(self, other: Any) -> Dual:
-        other = _dual(other)
+        other = dual(other)
         return Dual(self.a / other.a, (self.b * other.a - self.a * other.b) / other.a**2)
 
-    def __radd__(self, other: Any) -> Dual:
-        return _dual(other) + self
+    def __neg__(self) -> Dual:
+        return Dual(-self.a, -self.b)
 
     def __rsub__(self, other: Any) -> Dual:
-        return _dual(other) - self
+        return dual(other) - self
 
-    def __rmul__(self, other: Any) -> Dual:
-        return _dual(other) * self
+    def __rtruediv__(self, other: Any) -> Dual:
+        return dual(other) / self
+
+    __radd__, __rmul__ = __add__, __mul__
 
 
-def _dual(value: Any) -> Dual:
+def dual(value: Any) -> Dual:
+    """The number as a dual one."""
     return value if isinstance(value, Dual) else Dual(Fraction(value), Fraction(0))
 
 

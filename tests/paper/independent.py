@@ -13,82 +13,18 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from check_helpers import Dual, dot, dual, solve_by_elimination, times, transposed, unit
+
 Vector = list[Any]
 Matrix = list[list[Any]]
 Polynomial = dict[tuple[int, ...], Fraction]
 
 
-@dataclass(frozen=True)
-class D:
-    """a + b d with d^2 = 0."""
-
-    a: Fraction
-    b: Fraction = Fraction(0)
-
-    def __add__(self, other: Any) -> D:
-        other = lift(other)
-        return D(self.a + other.a, self.b + other.b)
-
-    def __sub__(self, other: Any) -> D:
-        other = lift(other)
-        return D(self.a - other.a, self.b - other.b)
-
-    def __mul__(self, other: Any) -> D:
-        other = lift(other)
-        return D(self.a * other.a, self.a * other.b + self.b * other.a)
-
-    def __truediv__(self, other: Any) -> D:
-        other = lift(other)
-        return D(self.a / other.a, (self.b * other.a - self.a * other.b) / (other.a * other.a))
-
-    def __neg__(self) -> D:
-        return D(-self.a, -self.b)
-
-    def __rsub__(self, other: Any) -> D:
-        return lift(other) - self
-
-    def __rtruediv__(self, other: Any) -> D:
-        return lift(other) / self
-
-    __radd__, __rmul__ = __add__, __mul__
-
-
-def lift(value: Any) -> D:
-    return value if isinstance(value, D) else D(Fraction(value))
-
-
-def value_of(number: Any) -> Fraction:
-    return number.a if isinstance(number, D) else number
-
-
 # Linear algebra
-
-
-def unit(n: int) -> Matrix:
-    return [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
-
-
-def transposed(matrix: Matrix) -> Matrix:
-    return [list(column) for column in zip(*matrix, strict=True)]
-
-
-def dot(left: Sequence[Any], right: Sequence[Any]) -> Any:
-    total: Any = Fraction(0)
-    for a, b in zip(left, right, strict=True):
-        total = total + a * b
-    return total
 
 
 def apply(matrix: Matrix, vector: Sequence[Any]) -> Vector:
     return [dot(row, vector) for row in matrix]
-
-
-def times(*matrices: Matrix) -> Matrix:
-    product = matrices[0]
-    for matrix in matrices[1:]:
-        columns = transposed(matrix)
-        product = [[dot(row, column) for column in columns] for row in product]
-    return product
 
 
 def plus(left: Matrix, right: Matrix) -> Matrix:
@@ -113,29 +49,6 @@ def trace(matrix: Matrix) -> Any:
     return total
 
 
-def eliminated(matrix: Matrix, columns: Matrix) -> tuple[Matrix, Any]:
-    """matrix^{-1} columns and the determinant, by Gauss and Jordan."""
-    n = len(matrix)
-    rows = [[*row, *more] for row, more in zip(matrix, columns, strict=True)]
-    determinant: Any = Fraction(1)
-    for k in range(n):
-        pivot = next(i for i in range(k, n) if value_of(rows[i][k]) != 0)
-        if pivot != k:
-            rows[k], rows[pivot] = rows[pivot], rows[k]
-            determinant = -determinant
-        determinant = determinant * rows[k][k]
-        rows[k] = [entry / rows[k][k] for entry in rows[k]]
-        for i in range(n):
-            if i != k:
-                factor = rows[i][k]
-                rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
-    return [row[n:] for row in rows], determinant
-
-
-def determinant(matrix: Matrix) -> Any:
-    return eliminated(matrix, unit(len(matrix)))[1]
-
-
 # Polynomials and derivatives
 
 
@@ -154,19 +67,19 @@ def evaluated(polynomial: Polynomial, x: Sequence[Any]) -> Any:
     return total
 
 
-def moved(x: Sequence[Fraction], k: int) -> list[D]:
+def moved(x: Sequence[Fraction], k: int) -> list[Dual]:
     """x + d e_k."""
-    return [D(entry, Fraction(int(i == k))) for i, entry in enumerate(x)]
+    return [Dual(entry, Fraction(int(i == k))) for i, entry in enumerate(x)]
 
 
 def gradient(function: Callable[[Sequence[Any]], Any], x: Sequence[Fraction]) -> Vector:
     """The gradient of a number-valued function."""
-    return [lift(function(moved(x, k))).b for k in range(len(x))]
+    return [dual(function(moved(x, k))).b for k in range(len(x))]
 
 
 def jacobi_matrix(function: Callable[[Sequence[Any]], Vector], x: Sequence[Fraction]) -> Matrix:
     """The Jacobi matrix of a vector-valued function."""
-    return transposed([[lift(entry).b for entry in function(moved(x, k))] for k in range(len(x))])
+    return transposed([[dual(entry).b for entry in function(moved(x, k))] for k in range(len(x))])
 
 
 # The paper
@@ -233,8 +146,7 @@ class Paper:
             whole = self.f([a + b for a, b in zip(x, e, strict=True)], B)
             polarised = [(w - a - b) * Fraction(1, 2) for w, a, b in zip(whole, at_x, self.f(e, B), strict=True)]
             columns.append([b - 2 * eps * q for b, q in zip(e, polarised, strict=True)])
-        solution, _ = eliminated(transposed(columns), [[entry] for entry in x])
-        return [row[0] for row in solution]
+        return solve_by_elimination(transposed(columns), list(x))
 
     def integral(self, x: Sequence[Any], B: Matrix | None = None) -> Any:
         """x^T J x^/eps, x^ the image under the map of J B nabla H."""
@@ -313,5 +225,5 @@ class Paper:
     def modified(self, x: Sequence[Any]) -> Any:
         """H + (2 eps/3) nabla H^T (I - eps f')^{-1} f."""
         matrix = plus(unit(self.n), scaled(-self.eps, self.df(x)))
-        increment, _ = eliminated(matrix, [[entry] for entry in self.f(x)])
-        return evaluated(self.H, x) + Fraction(2, 3) * self.eps * dot(self.nabla(x), [row[0] for row in increment])
+        increment = solve_by_elimination(matrix, self.f(x))
+        return evaluated(self.H, x) + Fraction(2, 3) * self.eps * dot(self.nabla(x), increment)
