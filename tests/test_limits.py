@@ -9,7 +9,7 @@ import pytest
 from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
 
 import kahanmaps as km
-from kahanmaps.checks import expand
+from kahanmaps.checks import judge
 from kahanmaps.laboratory import analysis, defaults
 from kahanmaps.laboratory.preserve import densities, hirota_kimura, search
 from kahanmaps.laboratory.preserve.darboux import darboux_spaces
@@ -109,7 +109,7 @@ def test_the_degrees_that_are_tried_in_each_dimension_are_those_of_the_documenta
         f"leave more than {hirota_kimura.MAX_INDEPENDENT} monomials",
         f"(at most {densities._MAX_DEGREE}, and {densities._MAX_UNKNOWNS} monomials)",
         f"Where they span more than {darboux_spaces.LARGEST_SPAN} dimensions",
-        f"multiplied out up to dimension {expand.MAX_DIMENSION} within",
+        f"multiplied out up to dimension {judge.MAX_DIMENSION} within",
         f"Degrees end at {defaults.ITERATE_DEGREE} (`--max-degree`) or after {defaults.SECONDS['degrees']:.0f} seconds",
         f"Above dimension {singularities.WRITTEN_DIMENSION} `degrees` takes random points",
         f"`singularities` goes up to dimension {singularities.MAX_DIMENSION}",

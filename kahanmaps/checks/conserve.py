@@ -16,8 +16,7 @@ from kahanmaps.checks import theorems
 from kahanmaps.checks.claimed import claimed_function, claimed_functions, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.expand import MAX_DIMENSION
-from kahanmaps.checks.judge import judge
+from kahanmaps.checks.judge import MAX_DIMENSION, judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file

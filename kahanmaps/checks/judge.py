@@ -2,15 +2,20 @@
 
 Proof and experiment are independent ways to the same answer, so each guards the other: a proved claim that fails at
 a point is a bug here, and is reported as one. A false claim may pass at random points, with the probability that the
-bound states; where both sides can be multiplied out, what comes out decides.
+bound states; where both sides can be multiplied out, what comes out decides: the code that evaluates an identity at
+points over Q and GF(p) runs over the field of rational functions, as far as a budget on products of terms goes.
 """
 
 from __future__ import annotations
 
+from kahanmaps.algebra.functions import DEFAULT_BUDGET, BudgetExceeded, FunctionField
 from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
 from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
-from kahanmaps.checks.expand import METHOD, NotEqual, expansion
 from kahanmaps.checks.settings import OrbitRun, Settings, along
+
+METHOD = "expansion"
+# Beyond this dimension the budget would only be spent in vain.
+MAX_DIMENSION = 6
 
 
 class Contradiction(AssertionError):
@@ -64,6 +69,47 @@ def _without_bound(evidence: Evidence) -> Evidence:
     """Points at which a proved claim was tried as well: what is proved is not false with any probability."""
     held = evidence.summary.partition("; false with probability")[0]
     return Evidence(evidence.method, held, {k: v for k, v in evidence.data.items() if k != "error_bound"})
+
+
+class NotEqual(ArithmeticError):
+    """Both sides were expanded and differ."""
+
+
+def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
+    """The evidence that both sides are equal as rational functions; None where the budget is exceeded.
+
+    `budget` bounds the products of terms; the default is smaller where coefficients are long.
+    Raises NotEqual where both sides were expanded and differ.
+    """
+    if budget is None:
+        if identity.dim > MAX_DIMENSION:
+            return None
+        # A product takes longer than in proportion to its bits once it has left the innermost caches.
+        bits = identity.bound[0].bits
+        budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
+    names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
+    modulus = None if identity.root is None else identity.root.polynomial.coeffs()
+    if modulus is not None:
+        names.append("root")
+    field = FunctionField(names, budget, modulus=modulus)
+    eps = field.variables[identity.dim] if identity.eps is None else field.convert(identity.eps)
+    try:
+        sides = identity.at(field, field.variables[: identity.dim], eps)
+        if sides is None:
+            return None
+        left, right = sides
+        if len(left) != len(right) or not all(field.equal(a, b) for a, b in zip(left, right, strict=True)):
+            raise NotEqual("the two sides, expanded, are different rational functions")
+    except BudgetExceeded:
+        return None
+    scope = " of x, multiplied out"
+    if identity.has_eps:
+        scope = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
+    return Evidence(
+        METHOD,
+        f"both sides are the same rational function{f', {identity.scope}' if identity.scope else scope}",
+        {"products_of_terms": budget - field.budget, "eps": "every" if identity.eps is None else str(identity.eps)},
+    )
 
 
 def settle(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:

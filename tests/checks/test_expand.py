@@ -10,7 +10,7 @@ from kahanmaps.checks import judge
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.decide import Decision, Identity
-from kahanmaps.checks.expand import NotEqual, expansion
+from kahanmaps.checks.judge import NotEqual, expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.integrals import ClaimedIntegral
 

@@ -14,8 +14,7 @@ from kahanmaps.algebra.functions import DEFAULT_BUDGET
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides, decide
-from kahanmaps.checks.expand import MAX_DIMENSION
-from kahanmaps.checks.judge import settle
+from kahanmaps.checks.judge import MAX_DIMENSION, settle
 from kahanmaps.invariants.integrals import integral_condition
 from kahanmaps.invariants.measures import density_condition, jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap

@@ -29,7 +29,7 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.expand import MAX_DIMENSION
+from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile

@@ -28,7 +28,7 @@ from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_factored, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.expand import MAX_DIMENSION
+from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
