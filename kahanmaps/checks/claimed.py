@@ -15,7 +15,9 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.poisson import GivenTensor
 
 
-def settings_and_claim(settings: Settings | Any, extra: Any, eps: Any, time_step: Any) -> tuple[Settings, Any]:
+def settings_and_claim(
+    settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None
+) -> tuple[Settings, Any]:
     """The two in this order, at an eps or time step if one is given: a claim may stand in the place of the settings."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step), extra
