@@ -36,15 +36,6 @@ def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
 # show
 
 
-def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
-    shown = kahanmaps("family show", pair, "--normal-form --json").json
-    form = shown.pop("normal_form")
-    assert shown == kahanmaps("family show", pair, "--json").json
-    assert set(form) == {"chi", "h", "D", "S", "h_in_powers_of_t", "parts"}
-    assert (form["chi"], [len(c) for c in form["h_in_powers_of_t"]]) == (shown["chi"], [2, 2, 2, 2])
-    assert [(part["root"], part["weight"]) for part in form["parts"]] == [("-2", "-1/3"), ("1", "1/3")]
-
-
 def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
     kahanmaps("family new --eigenvalues 1,1 -q -o", tmp_path / "a.toml")
     refused = kahanmaps("plot invariant-curves", tmp_path / "a.toml", "--start 1,0,0,1 --eps 1/20 -o x.svg")

@@ -98,18 +98,6 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
     assert "it would be written over" in outcome.err
 
 
-def test_associated_systems_are_not_written_over_the_one_they_belong_to(kahanmaps, tmp_path):
-    kahanmaps("family new --m 2 --seed 1 --name a -q -o", tmp_path / "a.toml")
-    assert kahanmaps("family associated --write-to", tmp_path, tmp_path / "a.toml").status == 0
-    (one, *_) = written = sorted(tmp_path.glob("a-*.toml"))
-    one.unlink()
-    one.hardlink_to(tmp_path / "a.toml")
-    before = {path: path.read_bytes() for path in written}
-    outcome = kahanmaps("family associated --write-to", tmp_path, tmp_path / "a.toml")
-    assert (outcome.status, {path: path.read_bytes() for path in written}) == (2, before)
-    assert "it would be written over" in outcome.err
-
-
 # Whole files
 
 

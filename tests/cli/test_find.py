@@ -7,7 +7,6 @@ import shlex
 import pytest
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.version import __version__
 
 
 def without_claims(name):
@@ -101,24 +100,6 @@ def test_the_commuting_systems_of_a_member_that_does_not_say_so_can_be_pasted(ka
 
 
 # JSON
-
-
-def test_json_is_one_object_with_all_that_is_needed_to_search_again(kahanmaps):
-    command = "find-integrals euler_top --symbolic a1 --seed 5 --json -q"
-    outcome = kahanmaps(command)
-    found = outcome.json
-    assert (outcome.status, outcome.err) == (0, "")
-    assert [found[key] for key in ("command", "version", "system", "symbols", "eps", "time_step", "seed")] == [
-        "find-integrals", __version__, "euler_top", ["a1"], "every", "every", 5
-    ]  # fmt: skip
-    assert found["parameters"] == {"a1": "1", "a2": "-2", "a3": "1"}
-    assert found["convention"] == "eps is the paper's epsilon, the time step is 2 eps"
-    assert (found["found"], found["codimension"], found["reason"], found["note"]) == (2, 2, "", "")
-    assert found["relations"]["nullities"] == [0, 2]
-    assert [one["verdict"] for one in found["integrals"]] == ["proved", "proved"]
-    assert all(prime.isdigit() for prime in found["primes"])
-    assert found["document"]["variables"] == ["x1", "x2", "x3"]
-    assert kahanmaps(command).json == found
 
 
 def test_integrals_of_the_flow(kahanmaps):
