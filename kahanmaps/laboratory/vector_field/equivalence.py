@@ -23,7 +23,6 @@ from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.documents.catalog import load, names, titles
-from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
