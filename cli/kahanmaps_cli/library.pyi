@@ -83,7 +83,7 @@ from kahanmaps.experiments.results.store import Found as Found
 from kahanmaps.experiments.results.store import Planned as Planned
 from kahanmaps.experiments.results.store import Store as Store
 from kahanmaps.experiments.results.summary import summarise as summarise
-from kahanmaps.experiments.running.children import TRIES as TRIES
+from kahanmaps.experiments.running.local import TRIES as TRIES
 from kahanmaps.experiments.running.run import Batch as Batch
 from kahanmaps.experiments.running.run import executor_for as executor_for
 from kahanmaps.experiments.running.run import plan as plan

@@ -21,7 +21,7 @@ from cli_helpers import COMMAND, environment, shell, terminal
 from helpers import quick
 
 import kahanmaps as km
-from kahanmaps.experiments.running.children import LocalChildren
+from kahanmaps.experiments.running.local import LocalWorkers
 
 FAULTS = Path(__file__).parent.parent / "experiments"
 SPACE = """
@@ -295,7 +295,7 @@ def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_
     def pressed(interrupt: Callable[[], None]) -> Iterator[None]:
         with monkeypatch.context() as patched:
             patched.setattr("kahanmaps_cli.screen.progress.click.echo", lambda *_, **__: told.append("in the handler"))
-            patched.setattr("kahanmaps.experiments.running.children.LocalChildren.in_flight", 2)
+            patched.setattr("kahanmaps.experiments.running.local.LocalWorkers.in_flight", 2)
             interrupt()
         yield
 
@@ -322,7 +322,7 @@ def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batc
     assert [line["number"] for line in lines if line["record"] == "result"] == [0, 2]
     (group,) = batch("summary", "--db", "study.db", "--json").json["groups"]
     assert (group["tasks"], group["missing"], sum(group["outcomes"].values())) == (3, 1, 2)
-    monkeypatch.setattr("kahanmaps.experiments.running.run.LocalChildren", partial(LocalChildren, tries=1))
+    monkeypatch.setattr("kahanmaps.experiments.running.run.LocalWorkers", partial(LocalWorkers, tries=1))
     again = batch("run", spec, "--jsonl")
     assert again.status == 3
     (record,) = map(json.loads, again.out.splitlines())
@@ -337,7 +337,8 @@ def test_a_second_ctrl_c_is_immediate(batch):
         [*COMMAND, "batch", "run", "study.toml", "-j", "2"], stderr=subprocess.PIPE, text=True, env=environment()
     )
     threads = Path(f"/proc/{process.pid}/task")
-    while sum(len(file.read_text().split()) for file in threads.glob("*/children")) < 2:
+    # Two workers, and the process in which Python keeps account of its semaphores.
+    while sum(len(file.read_text().split()) for file in threads.glob("*/children")) < 3:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     assert any("finishing 2 tasks in flight" in line for line in process.stderr or ())

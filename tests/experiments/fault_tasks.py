@@ -124,10 +124,20 @@ def _large() -> dict[str, Any]:
     return {"digits": "7" * 3_000_000, "hash_seed": os.environ["PYTHONHASHSEED"]}
 
 
-def _deaf() -> dict[str, Any]:
-    os.closerange(3, 256)  # the pipes to the parent among them
-    time.sleep(60)
-    return {}
+def _awkward() -> dict[str, Any]:
+    class Awkward(Exception):
+        def __init__(self, reason: str, more: str) -> None:  # what `pickle` cannot make again
+            super().__init__(reason)
+
+    raise Awkward("for a reason", "and more")
+
+
+def _leave() -> dict[str, Any]:
+    sys.exit("I leave")
+
+
+def _exit_0() -> dict[str, Any]:
+    os._exit(0)
 
 
 def _twins() -> dict[str, Any]:
@@ -174,12 +184,14 @@ FAULTS = {
     11: _chatter,
     12: _exit,
     13: _large,
-    14: _deaf,
+    14: _awkward,
     15: _twins,
+    16: _exit_0,
     17: _reader,
     18: _not_plain,
     19: _verdict_of_no_text,
     20: _starter,
     21: _not_loaded,
     22: _openblas,
+    23: _leave,
 }

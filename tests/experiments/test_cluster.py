@@ -15,7 +15,6 @@ import time
 from collections import Counter
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from small_databases import exported
@@ -23,8 +22,8 @@ from small_databases import exported
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Limits, Outcome, Task
 from kahanmaps.experiments.running import cluster
-from kahanmaps.experiments.running.children import TRIES
 from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
+from kahanmaps.experiments.running.local import TRIES
 from kahanmaps.experiments.running.run import run
 
 pytest.importorskip("distributed")
@@ -49,7 +48,6 @@ for job in read["jobs"]:
         time.sleep(options.get("sleep", 0))
     result = {
         "documents": read["documents"], "jobs": len(read["jobs"]), "limits": job["limits"], "pid": os.getpid(),
-        "seed": os.environ.get("PYTHONHASHSEED"), "tasks": os.environ.get("KAHANMAPS_TASKS"),
         "home": os.environ.get("OF_THE_WORKER"), "padding": "x" * options.get("size", 0),
     }
     record = {
@@ -242,7 +240,7 @@ def test_a_job_is_done_at_the_second_try_with_its_limits_in_the_environment_of_t
     (job,) = jobs_of(1, die=9, once=str(tmp_path / "been-here"), size=1 << 20, limits=Limits(7.5, 10**9))
     (record,) = done(workers, [job])
     assert record.result["limits"] == {"time": 7.5, "memory": 10**9}
-    assert [record.result[name] for name in ("seed", "home")] == ["0", "kept"]
+    assert record.result["home"] == "kept"
     assert len(record.result["padding"]) == 1 << 20
 
 
@@ -308,8 +306,7 @@ def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own
     assert all(record.is_ok for record in records)
 
 
-def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
-    monkeypatch.setattr(cluster, "SILENCE", 0.25)
+def test_workers_may_come_later_and_are_waited_for_aloud(own):
     said = []
     workers = own.workers(talk=said.append)
     try:
@@ -317,16 +314,10 @@ def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
         workers.submit(job)
         assert workers.wait(1.5) == []
         assert said == [f"waiting for workers: the scheduler at {own.file} has none"]
-        with monkeypatch.context() as later:  # again after twice the time, and so on
-            workers._silent_since = 1.0
-            for quarters in range(40):
-                later.setattr(cluster, "time", SimpleNamespace(monotonic=lambda now=1 + quarters / 4: now))
-                workers._say_if_nobody_works()
-                assert len(said) == 1 + sum(quarters >= word for word in (2, 4, 8, 16, 32))
-        workers._silent_since = None
         own.worker(threads=3, nanny=False)
         assert len(done(workers, [])) == 1
-        until(lambda: workers.wait(0.1) == [] and workers._dask.threads == 3)
+        until(lambda: workers.wait(0.1) == [] and workers._threads == 3)
+        assert len(said) == 1
     finally:
         workers.close()
 

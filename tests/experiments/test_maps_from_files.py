@@ -6,7 +6,7 @@ import pytest
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.store import Store
-from kahanmaps.experiments.running.child import perform
+from kahanmaps.experiments.running.local import perform
 from kahanmaps.experiments.running.run import run
 from kahanmaps.experiments.spec import parse_spec
 

@@ -1,1 +1,1 @@
-"""Running experiments: in this process, in children, on a cluster."""
+"""Running experiments: in worker processes on this machine, or on a cluster."""

@@ -1,8 +1,12 @@
 """Tasks on a dask cluster that is running already: groups of them go out, records come back.
 
-What a worker of dask is asked to do is the standard library's `subprocess.run`, on our group command, with JSON on its
-standard input. So nothing of ours is needed on the scheduler or inside the workers, and a task that dies takes nothing
-with it. A group is a few seconds of work, since the scheduler needs about as long for a millisecond as for an hour.
+    python -m kahanmaps.experiments.running.cluster < group.json
+
+is what a worker of dask runs for a group, by the standard library's `subprocess.run`: nothing of ours is needed on the
+scheduler or inside the workers, and a task that dies takes nothing with it. The input is {"documents": {DIGEST: TEXT},
+"jobs": [{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}; every job gives one line, its record, as soon as
+it is there, and the exit status is 0 whatever the tasks did. A group is a few seconds of work, since the scheduler
+needs about as long for a millisecond as for an hour.
 
 Nothing here touches the database: a record is handed back by `wait`, once, and is safe when the caller has stored it.
 """
@@ -10,31 +14,40 @@ Nothing here touches the database: a record is handed back by `wait`, once, and 
 from __future__ import annotations
 
 import json
+import logging
 import os
+import re
+import select
 import subprocess
 import sys
 import time
-from collections import defaultdict, deque
+import uuid
+import warnings
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
-from itertools import count
+from importlib import import_module
+from pathlib import Path
+from threading import Thread
+from typing import IO, Any
 
 from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.experiments.results.records import Documents, Executor, Job, Outcome, Record
-from kahanmaps.experiments.running.children import TRIES, ending
-from kahanmaps.experiments.running.dask_client import DaskClient, Result, told
+from kahanmaps.experiments.results.records import Documents, Executor, Job, Limits, Outcome, Record, Task, canonical
+from kahanmaps.experiments.running.local import GROUP_SECONDS, TAIL, TRIES, LocalWorkers, ending
+from kahanmaps.processes import end_with_parent
 
-GROUP_MODULE = "kahanmaps.experiments.running.group"
+MODULE = "kahanmaps.experiments.running.cluster"
 PASSED_ON = ("KAHANMAPS_TASKS", "PYTHONPATH")  # variables that mean the same to the workers as to us
 
 START_UP = 60.0  # seconds a group may take beyond the limits of its jobs, on a cold and busy worker,
 START_UP_OF_A_JOB = 5.0  # and for each job in it
 LARGEST_GROUP = 200  # jobs
-MEMORY_OF_MEANS = 20  # a mean follows a batch that goes from cheap tasks to dear ones
 UNFIT_AFTER = 3  # groups that ended by themselves without a record, when there has never been one
-TAIL = 2000  # characters of standard error kept
-SILENCE = 3.0  # seconds without a worker before a word is said; then again, ever more rarely
+LOOK_EVERY = 2.0  # seconds between two looks at who the workers are
+_ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
 
 
 class ClusterLost(KahanmapsError):
@@ -45,43 +58,6 @@ class WorkersUnfit(ClusterLost):
     """Raised when the set-up is wrong: the workers cannot run tasks at all, whichever these are."""
 
 
-Tried = tuple[Job, int]  # a job, and how many tries of it alone have failed
-
-
-@dataclass
-class JobGroup:
-    """Jobs that one command does, by key; what has come back is taken out."""
-
-    jobs: dict[str, Tried] = field(default_factory=dict)
-    documents: dict[str, str] = field(default_factory=dict)
-    seconds: float = 0.0
-
-    @property
-    def timeout(self) -> float | None:
-        """How long the command may take: what its jobs may, and a generous start; None if one of them is unlimited."""
-        times = [job.limits.time for job, _ in self.jobs.values()]
-        return None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
-
-    @property
-    def text(self) -> bytes:
-        """What the group command reads."""
-        jobs = [{"task": job.task.text, "limits": asdict(job.limits)} for job, _ in self.jobs.values()]
-        return json.dumps({"documents": self.documents, "jobs": jobs}).encode()
-
-
-@dataclass
-class Mean:
-    """The seconds that a record of one kind of task takes, on average over the last ones."""
-
-    seconds: float
-    seen: int = 0
-
-    def learn(self, seconds: float) -> None:
-        """One record more."""
-        self.seen = min(self.seen + 1, MEMORY_OF_MEANS)
-        self.seconds += (seconds - self.seconds) / self.seen
-
-
 class ClusterWorkers(Executor):
     """Runs jobs on the workers of an existing dask scheduler.
 
@@ -89,10 +65,9 @@ class ClusterWorkers(Executor):
     certificates are those of dask's own configuration. dask's parties unpickle what they are sent, so each of them can
     run code on all others: scheduler and workers have to be trusted, and closed to everybody else.
 
-    `command` is what a worker runs for a group, by default `python -m kahanmaps.experiments.running.group` with this
-    interpreter, which the workers have to find at the same path. A group takes about `group_seconds`, by what the last
-    tasks of the same kind took, and has at most 200 jobs. `talk` is told, now and then, what is being
-    waited for.
+    `command` is what a worker runs for a group, by default this module with the interpreter `python`, which the workers
+    have to find at the same path as we do. A group takes about `group_seconds`, by what the last tasks of the same kind
+    took, and has at most 200 jobs. `talk` is told what is being waited for.
 
     At most two groups for each thread of the workers are under way, so that memory here does not depend on the number
     of tasks. What a group leaves undone is tried a few times more, each job alone, before it is lost.
@@ -105,28 +80,28 @@ class ClusterWorkers(Executor):
         *,
         command: Sequence[str] | None = None,
         python: str | None = None,
-        group_seconds: float = 5.0,
+        group_seconds: float = GROUP_SECONDS,
         talk: Callable[[str], None] | None = None,
         connect_seconds: float = 10.0,
     ) -> None:
         self.address = address
-        self._command = _with_environment(command or [python or sys.executable, "-m", GROUP_MODULE])
         self._documents = documents
         self._group_seconds = group_seconds
-        # A kind of task of which nothing is known takes a whole group's time.
-        self._means: defaultdict[str, Mean] = defaultdict(lambda: Mean(group_seconds))
         self._talk = talk or (lambda text: None)
-        self._keys: set[str] = set()  # of jobs in flight
-        self._open = JobGroup()
-        self._again: deque[Tried] = deque()  # jobs to be tried alone
-        self._groups: dict[int, JobGroup] = {}  # at the scheduler
-        self._numbers = count()
-        self._unfit = 0  # groups that ended by themselves before any record
-        self._untold: set[str] = set()  # the jobs of these groups
-        self._is_proven = False  # a record has come from the workers
-        self._silent_since: float | None = None
-        self._next_word = SILENCE
-        self._dask = DaskClient(address, connect_seconds)
+        # `env=` of subprocess.run would replace all that the worker has instead.
+        passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
+        self._command = ["/usr/bin/env", *passed, *(command or [python or sys.executable, "-m", MODULE])]
+        self._tries: dict[str, int] = {}  # of the jobs in flight, by key: how often each alone has failed
+        self._open: list[Job] = []
+        self._again: deque[Job] = deque()  # to be tried alone
+        self._groups: dict[Any, list[Job]] = {}  # futures at the scheduler
+        self._means: dict[str, float] = {}  # seconds of a task, by kind, over the last ones
+        self._unfit: set[str] | None = set()  # jobs of groups that ended by themselves; None: a record has come
+        self._unfit_groups = 0
+        self._client = connect(address, connect_seconds)
+        self._results = import_module("distributed").as_completed(loop=self._client.loop)
+        self._threads, self._looked, self._is_told = 0, -LOOK_EVERY, False
+        self._look()
 
     @property
     def is_free(self) -> bool:
@@ -136,17 +111,17 @@ class ClusterWorkers(Executor):
     @property
     def in_flight(self) -> int:
         """How many jobs have been submitted and not yet handed back."""
-        return len(self._keys)
+        return len(self._tries)
 
     def submit(self, job: Job) -> None:
         """Take a job into the open group, which is sent when it is full, or by `wait` when a worker might idle."""
-        if job.task.key in self._keys:
+        if job.task.key in self._tries:
             raise InputError(f"task {job.task.key} is in flight already: submit it again when its record is back")
-        if self._open.seconds + self._means[job.task.kind].seconds / 2 > self._group_seconds:
-            self._send_open()
-        self._add(self._open, job)
-        self._keys.add(job.task.key)
-        if len(self._open.jobs) >= LARGEST_GROUP or self._open.seconds >= self._group_seconds:
+        self._tries[job.task.key] = 0
+        self._open.append(job)
+        # A kind of task of which nothing is known takes a whole group's time.
+        seconds = sum(self._means.get(job.task.kind, self._group_seconds) for job in self._open)
+        if len(self._open) >= LARGEST_GROUP or seconds >= self._group_seconds:
             self._send_open()
 
     def wait(self, timeout: float) -> list[Record]:
@@ -158,24 +133,22 @@ class ClusterWorkers(Executor):
         deadline = time.monotonic() + timeout
         while True:
             while self._again and len(self._groups) < self._window:
-                group = JobGroup()
-                self._add(group, *self._again.popleft())
-                self._send(group)
+                self._send([self._again.popleft()])
             # If every thread has a group waiting for it, there is time to fill the open one.
             if len(self._groups) < self._window:
                 self._send_open()
-            left = deadline - time.monotonic()
-            results = self._dask.drained(min(max(left, 0.0), 1.0))
-            if records := [record for result in results for record in self._taken(result)]:
-                return records
-            if self._dask.lost is not None:
+            while not (is_ready := self._results.has_ready()) and time.monotonic() < deadline and self._is_connected:
+                time.sleep(0.01)
+            futures = self._results.next_batch(block=False) if is_ready else []
+            self._look()
+            if not self._is_connected:
                 raise ClusterLost(
-                    f"the scheduler at {self.address} is lost ({self._dask.lost}): what was recorded is safe; "
+                    f"the scheduler at {self.address} is lost (the connection was closed): what was recorded is safe; "
                     "run the same command again once the scheduler is back"
                 )
-            if not results and left <= 0:
-                return []
-            self._say_if_nobody_works()
+            records = [record for future in futures for record in self._taken(future)]
+            if records or time.monotonic() >= deadline:
+                return records
 
     def close(self) -> None:
         """End at once, whether or not the scheduler is still there; it and its workers stay. May be called twice.
@@ -183,89 +156,112 @@ class ClusterWorkers(Executor):
         What is in flight is forgotten. Groups that a worker has begun are not killed, since a running call cannot be
         taken back: they go on to their end, and their results are dropped.
         """
-        self._dask.close()
-        self._keys.clear()
+        # A scheduler that is gone must not hold us up, and there is nothing to be done about its last words.
+        with suppress(Exception), warnings.catch_warnings(action="ignore"):
+            self._client.close(timeout=2)
+        self._tries.clear()
         self._groups.clear()
 
     @property
     def _window(self) -> int:
         """How many groups may be at the scheduler: one that runs and one that waits for each thread."""
-        return max(2, 2 * self._dask.threads)
+        return max(2, 2 * self._threads)
 
-    def _add(self, group: JobGroup, job: Job, tries: int = 0) -> None:
-        """Put a job into the group, with the documents that it needs."""
-        group.documents |= {name: self._documents(name) for name in job.task.documents if name not in group.documents}
-        group.jobs[job.task.key] = job, tries
-        group.seconds += self._means[job.task.kind].seconds
+    @property
+    def _is_connected(self) -> bool:
+        return bool(self._client.status == "running")
+
+    def _look(self) -> None:
+        """Count the workers' threads now and then, and say once when there are none."""
+        if not self._is_connected or time.monotonic() - self._looked < LOOK_EVERY / (1 if self._threads else 4):
+            return
+        self._looked = time.monotonic()
+        with suppress(Exception):  # a scheduler that is lost meanwhile
+            self._threads = sum(self._client.nthreads().values())
+            if not self._threads and not self._is_told:
+                self._talk(f"waiting for workers: the scheduler at {self.address} has none")
+            self._is_told = not self._threads
 
     def _send_open(self) -> None:
-        if self._open.jobs:
-            group, self._open = self._open, JobGroup()
-            self._send(group)
+        if self._open:
+            jobs, self._open = self._open, []
+            self._send(jobs)
 
-    def _send(self, group: JobGroup) -> None:
-        """Hand a group to the scheduler. Never raises: a scheduler that is gone is told by `wait`."""
-        number = next(self._numbers)
-        self._groups[number] = group
-        text, group.documents = group.text, {}
-        self._dask.submit(number, self._command, text, group.timeout)
+    def _send(self, jobs: list[Job]) -> None:
+        """Hand a group to the scheduler. One that is gone is told by `wait`."""
+        documents = {name: self._documents(name) for job in jobs for name in job.task.documents}
+        group = {"documents": documents, "jobs": [{"task": j.task.text, "limits": asdict(j.limits)} for j in jobs]}
+        times = [job.limits.time for job in jobs]
+        # The limits of a task are kept by the command: this is for a command that hangs.
+        timeout = None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
+        # distributed warns of arguments beyond 10 MB: a single document may be as large.
+        with suppress(Exception), warnings.catch_warnings(action="ignore"):
+            future = self._client.submit(
+                subprocess.run,
+                self._command,
+                input=json.dumps(group).encode(),
+                capture_output=True,
+                timeout=timeout,
+                pure=False,
+                key=f"kahanmaps-{uuid.uuid4().hex}",
+            )
+            self._groups[future] = jobs
+            self._results.add(future)
 
-    def _taken(self, result: Result) -> list[Record]:
+    def _taken(self, future: Any) -> list[Record]:
         """The records that a group has printed; jobs without one are put up for another try, alone, or lost."""
-        group = self._groups.pop(result.number)
-        is_alone, timeout = len(group.jobs) == 1, group.timeout
+        left = {job.task.key: job for job in self._groups.pop(future)}
+        is_alone = len(left) == 1
+        output: Any
+        try:
+            output = future.result()
+            message = f"the worker's command {ending(output.returncode)}"
+            message += " and no record" if output.returncode == 0 else ""
+            is_unfit = output.returncode >= 0
+        except subprocess.TimeoutExpired as error:
+            output, is_unfit = error, False
+            message = f"the worker's command did not end within {error.timeout:g} s"
+        except Exception as error:
+            output, is_unfit = None, "KilledWorker" not in type(error).__name__
+            message = f"the worker could not run its command: {told(error)}"
+        with suppress(Exception):
+            future.release()
         records: list[Record] = []
-        # The group command keeps the limits of a task and tells its death in a record: what becomes of the command
-        # itself is the machine's doing, and no result.
-        failures: list[tuple[Job, int, Record]] = []
-        for line in result.output("stdout").split(b"\n"):
+        failures: list[tuple[Job, Record]] = []
+        for line in (getattr(output, "stdout", None) or b"").split(b"\n"):
             record = record_on(line)
-            if record is None or record.key not in group.jobs:  # a record that is printed twice is handed back once
+            if record is None or record.key not in left:  # a record that is printed twice is handed back once
                 continue
-            job, tries = group.jobs.pop(record.key)
-            self._is_proven = True
+            job = left.pop(record.key)
+            self._unfit = None
             if record.outcome is Outcome.LOST:
-                failures.append((job, tries + 1, record))
-            else:
-                self._means[job.task.kind].learn(record.seconds)
-                records.append(record)
-        if group.jobs:
-            message, is_unfit = _failure_of(result, timeout)
-            stderr = result.output("stderr").decode(errors="replace")[-TAIL:]
-            if is_unfit and not self._is_proven:
-                self._unfit += 1
-                self._untold |= group.jobs.keys()
-                self._require_fit(message, stderr)
-            for key, (job, tries) in group.jobs.items():
-                failures.append((job, tries + is_alone, Record(key, Outcome.LOST, message=message, stderr=stderr)))
+                self._tries[record.key] += 1
+                failures.append((job, record))
+                continue
+            mean = self._means.setdefault(job.task.kind, record.seconds)
+            self._means[job.task.kind] += (record.seconds - mean) / 10
+            records.append(record)
+        stderr = (getattr(output, "stderr", None) or b"").decode(errors="replace")[-TAIL:]
+        for key, job in left.items():
+            self._tries[key] += is_alone
+            failures.append((job, Record(key, Outcome.LOST, message=message, stderr=stderr)))
+        if left and is_unfit and self._unfit is not None:
+            # A missing installation must not be told as thousands of lost tasks, nor one deadly task as the former.
+            self._unfit |= left.keys()
+            self._unfit_groups += 1
+            if self._unfit_groups >= UNFIT_AFTER and self._tries.keys() <= self._unfit:
+                command = " ".join(self._command)
+                sentence = f"the workers cannot run {command!r}: {message}, and none has ever printed a record"
+                raise WorkersUnfit(f"{sentence}\n{stderr.strip()}".strip())
         finished = datetime.now(UTC).isoformat(timespec="seconds")
-        self._again.extend((job, tries) for job, tries, _ in failures if tries < TRIES)
-        records += [replace(record, finished=finished) for _, tries, record in failures if tries >= TRIES]
-        self._keys.difference_update(record.key for record in records)
+        for job, record in failures:
+            if self._tries[record.key] < TRIES:
+                self._again.append(job)
+            else:
+                records.append(replace(record, finished=finished))
+        for record in records:
+            del self._tries[record.key]
         return records
-
-    def _require_fit(self, message: str, stderr: str) -> None:
-        """A missing installation must not be told as thousands of lost tasks, nor one deadly task as the former."""
-        if self._unfit >= UNFIT_AFTER and self._keys <= self._untold:
-            command = " ".join(self._command)
-            sentence = f"the workers cannot run {command!r}: {message}, and none has ever printed a record"
-            raise WorkersUnfit(f"{sentence}\n{stderr.strip()}" if stderr.strip() else sentence)
-
-    def _say_if_nobody_works(self) -> None:
-        now = time.monotonic()
-        if self._dask.threads or not self._keys:
-            self._silent_since, self._next_word = None, SILENCE
-            return
-        self._silent_since = self._silent_since or now
-        if now - self._silent_since >= self._next_word:
-            self._next_word = 2 * self._next_word
-            self._talk(f"waiting for workers: the scheduler at {self.address} has none")
-
-
-def _with_environment(command: Sequence[str]) -> list[str]:
-    """The command with our variables set. `env=` of subprocess.run would replace all that the worker has instead."""
-    passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
-    return ["/usr/bin/env", "PYTHONHASHSEED=0", *passed, *command]
 
 
 def record_on(line: bytes) -> Record | None:
@@ -278,12 +274,84 @@ def record_on(line: bytes) -> Record | None:
         return None
 
 
-def _failure_of(result: Result, timeout: float | None) -> tuple[str, bool]:
-    """Why a group ended without all its records, and whether it ended by itself, as if it could not be run at all."""
-    if result.process is not None:
-        status = result.process.returncode
-        return f"the worker's command {ending(status)}" + (" and no record" if status == 0 else ""), status >= 0
-    if isinstance(result.error, subprocess.TimeoutExpired):
-        return f"the worker's command did not end within {timeout or 0:g} s", False
-    why = told(result.error)
-    return f"the worker could not run its command: {why}", "KilledWorker" not in why
+def told(error: BaseException | None) -> str:
+    """An exception on one line."""
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+
+
+def connect(address: str, timeout: float) -> Any:
+    """A client of the scheduler, whose log is silent; or InputError with a sentence."""
+    try:
+        client = import_module("distributed").Client  # which takes a second to import
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"a cluster needs the package distributed, which is not there ({error}): pip install 'kahanmaps[cluster]'"
+        ) from None
+    path, chosen = Path(address), address
+    if "://" not in address and (path.is_file() or address.endswith(".json")):
+        # distributed would wait for the file for ever.
+        try:
+            chosen = str(json.loads(path.read_text(encoding="utf-8"))["address"])
+        except OSError as error:
+            raise InputError(f"cannot read the scheduler file {address}: {error.strerror}") from None
+        except (ValueError, LookupError, TypeError):
+            raise InputError(f"{address} is not the file that `dask scheduler --scheduler-file` writes") from None
+    elif not _ADDRESS.fullmatch(address):
+        raise InputError(
+            f"{address!r} is not the address of a scheduler: write tcp://host:port, or the path of a scheduler file"
+        )
+    for name in ("distributed", "tornado", "tornado.application"):
+        logging.getLogger(name).handlers = [logging.NullHandler()]
+        logging.getLogger(name).propagate = False
+    made: Future[Any] = Future()
+
+    def make() -> None:
+        try:
+            # Of other versions of some package: our tasks are the standard library's, whose version may differ.
+            with warnings.catch_warnings(action="ignore"):
+                made.set_result(client(chosen, timeout=timeout, set_as_default=False, name="kahanmaps"))
+        except BaseException as error:
+            made.set_exception(error)
+
+    # In a thread: distributed itself waits for ever where something listens that is no scheduler.
+    Thread(target=make, daemon=True).start()
+    try:
+        return made.result(timeout + 1)
+    except Exception as error:
+        raise InputError(
+            f"no dask scheduler answers at {address} within {timeout:g} s ({told(error)}): "
+            "is the address right, and does `dask scheduler` run there?"
+        ) from error
+
+
+# The command on a worker
+
+
+def do_group(source: IO[str], target: IO[str]) -> None:
+    """Do the jobs that `source` describes, one after the other.
+
+    A job whose process is killed from outside is lost at once: whoever has sent it tries it again, elsewhere maybe.
+    """
+    group = json.load(source)
+    workers = LocalWorkers(1, group["documents"].__getitem__, tries=1)
+    try:
+        for job in group["jobs"]:
+            workers.submit(Job(Task.from_text(job["task"]), Limits(**job["limits"])))
+            while workers.in_flight:
+                for record in workers.wait(60.0):
+                    target.write(canonical(record.to_json()) + "\n")
+                    target.flush()
+    finally:
+        workers.close()
+
+
+if __name__ == "__main__":
+    end_with_parent(os.getppid())
+    if hasattr(select, "poll"):
+        # The parent may have died before it could be known who that is: then nobody reads.
+        reader = select.poll()
+        reader.register(sys.stdout.fileno(), 0)
+        if any(events & select.POLLERR for _, events in reader.poll(0)):
+            os._exit(1)
+    do_group(sys.stdin, sys.stdout)

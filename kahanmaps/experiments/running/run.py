@@ -15,7 +15,7 @@ from pathlib import Path
 
 from kahanmaps.experiments.results.records import Documents, Executor, Job, Record
 from kahanmaps.experiments.results.store import Planned, Store
-from kahanmaps.experiments.running.children import GROUP_SECONDS, LocalChildren
+from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _TICK = 0.1  # seconds after which an interrupt is noticed, and it is said that nothing has come
@@ -104,7 +104,7 @@ def executor_for(
     another one; `talk` is told what the cluster is waiting for.
     """
     if scheduler is None:
-        return LocalChildren(jobs, documents, group_seconds=group_seconds)
+        return LocalWorkers(jobs, documents, group_seconds=group_seconds)
     from kahanmaps.experiments.running.cluster import ClusterWorkers
 
     return ClusterWorkers(scheduler, documents, python=python, group_seconds=group_seconds, talk=talk)

@@ -1,0 +1,446 @@
+"""Worker processes: whatever a task does to its worker, the others are done and it gets the right record.
+
+Whose doing a death is decides what becomes of the task: a fault of its own (SIGSEGV, SIGABRT, ...) is recorded, a kill
+from outside (SIGTERM, SIGKILL, ...) is tried again, and at last lost, which is no result. The tasks are those of
+fault_tasks.py. Negative controls: even seeds, which are done.
+"""
+
+import errno
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from signal import Signals
+from typing import Any
+
+import pytest
+from helpers import quick
+from small_databases import exported
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.running import local
+from kahanmaps.experiments.running.cluster import do_group
+from kahanmaps.experiments.running.local import TRIES, LocalWorkers, WorkersError, failure, is_from_outside, perform
+from kahanmaps.experiments.running.run import Batch, run
+
+pytestmark = pytest.mark.usefixtures("fault_tasks")
+HERE = Path(__file__).parent
+KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
+INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE, AWKWARD, TWINS, EXIT_0 = range(8, 17)
+READER, NOT_PLAIN, VERDICT_OF_NO_TEXT, STARTER, NOT_LOADED, OPENBLAS, LEAVE = range(17, 24)
+ALWAYS = 99
+Started = Callable[..., LocalWorkers]
+
+
+@pytest.fixture(autouse=True)
+def _tries(monkeypatch, tmp_path):
+    (tmp_path / "tries").mkdir()
+    monkeypatch.setenv("FAULT_TRIES", str(tmp_path / "tries"))
+
+
+@pytest.fixture
+def start() -> Iterator[Started]:
+    """An executor that ends with the test, with some jobs begun."""
+    started: list[LocalWorkers] = []
+
+    def make(jobs: int, *begun: Job) -> LocalWorkers:
+        started.append(LocalWorkers(jobs, {}.__getitem__))
+        for job in begun:
+            started[-1].submit(job)
+        return started[-1]
+
+    yield make
+    for workers in started:
+        workers.close()
+
+
+def fault(order: int, seed: int = 1, limits: Limits | None = None) -> Job:
+    return Job(Task("fault", None, {"order": order, "seed": seed}), limits or Limits(20.0, 400_000_000))
+
+
+def pause(milliseconds: int, seed: int = 0, limits: Limits | None = None) -> Job:
+    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or Limits(20.0))
+
+
+def signalled(number: int, times: int) -> Job:
+    return Job(Task("signalled", None, {"order": int(number), "seed": times}), Limits(20.0))
+
+
+def tries(folder: Path, number: int, times: int) -> int:
+    """How often the task has been begun."""
+    return (folder / "tries" / f"{int(number)}-{times}").stat().st_size
+
+
+def done(jobs: Sequence[Job], workers: int = 2, **settings: Any) -> dict[str, Record]:
+    """The records by key; every job has one and only one."""
+    found: list[Record] = []
+    for records in Batch(jobs, LocalWorkers(workers, {}.__getitem__, **settings)):
+        found += records
+    assert sorted(record.key for record in found) == sorted(job.task.key for job in jobs)
+    return {record.key: record for record in found}
+
+
+def pids_of(workers: LocalWorkers) -> list[int]:
+    """The processes at work, once they wait for tasks or have one."""
+    at_work = [worker for worker, _ in workers._running.values()]
+    deadline = time.monotonic() + 20
+    while not all(worker.is_ready for worker in at_work):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return [worker.process.pid for worker in at_work if worker.process is not None and worker.process.pid is not None]
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is such a process, not counting the dead that nobody has looked at yet."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until_gone(pids: Sequence[int]) -> None:
+    deadline = time.monotonic() + 5
+    while any(map(is_running, pids)):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+# What a task does to its worker
+
+
+@pytest.fixture(scope="module")
+def faulty(fault_tasks) -> dict[int, Record]:
+    """What became of a task of each fault but that which hangs, with as many between them that are done."""
+    orders = [order for order in range(1, LEAVE + 1) if order != HANG]
+    records = done([fault(order, seed) for order in orders for seed in (0, 1)], tries=2)
+    assert all(records[fault(order, 0).task.key].is_ok for order in orders)
+    return {order: records[fault(order).task.key] for order in orders}
+
+
+@pytest.mark.parametrize(
+    ("order", "outcome", "message"),
+    [
+        (KILL, Outcome.LOST, "signal 9 (SIGKILL)"),
+        (ABORT, Outcome.CRASHED, "signal 6 (SIGABRT)"),
+        (SEGFAULT, Outcome.CRASHED, "signal 11 (SIGSEGV)"),
+        (EXIT, Outcome.CRASHED, "ended with status 7"),
+        (EXIT_0, Outcome.CRASHED, "ended with status 0"),  # of which pebble takes no notice
+        (PYTHON_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (FLINT_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (GMP_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (NOT_LOADED, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (OPENBLAS, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (INPUT_ERROR, Outcome.FAILED, "found nothing, expected something"),
+        (BUG, Outcome.FAILED, "ZeroDivisionError"),
+        (AWKWARD, Outcome.FAILED, "Awkward: for a reason"),  # pickled, it would break a pool of pebble
+        (LEAVE, Outcome.FAILED, "SystemExit: I leave"),
+        (NOT_A_NUMBER, Outcome.FAILED, "the result cannot be kept"),
+        (NOT_PLAIN, Outcome.FAILED, "the result cannot be kept: Object of type set"),
+        (VERDICT_OF_NO_TEXT, Outcome.FAILED, "found the verdict ['proved'], expected a text"),
+        (CHATTER, Outcome.OK, ""),
+        (LARGE, Outcome.OK, ""),
+        (TWINS, Outcome.OK, ""),
+        (READER, Outcome.OK, ""),
+        (STARTER, Outcome.OK, ""),
+    ],
+)
+def test_what_a_task_does_to_its_worker_is_told_of_this_task_alone(faulty, order, outcome, message):
+    record = faulty[order]
+    assert record.outcome is outcome
+    assert message in record.message
+    assert (record.result is None) == (outcome is not Outcome.OK)
+
+
+def test_the_end_of_what_a_worker_printed_is_kept(faulty):
+    assert faulty[KILL].stderr == "about to die of 9"
+    assert "Unable to allocate memory" in faulty[FLINT_BOMB].stderr
+    assert faulty[BUG].stderr.rstrip().endswith("ZeroDivisionError: integer division or modulo by zero")
+
+
+def test_answers_of_megabytes_come_whole_with_where_and_how_they_came_about(faulty):
+    record = faulty[LARGE]
+    assert record.result == {"digits": "7" * 3_000_000, "hash_seed": "0"}  # so that sets have one order everywhere
+    assert os.environ["PYTHONHASHSEED"] == "123"
+    assert record.host
+    assert set(record.versions) == {"kahanmaps", "python", "python-flint", "flint"}
+    assert record.finished.endswith("+00:00")
+    assert 0 < record.seconds < 5
+    assert record.peak_memory is None or record.peak_memory > 10_000_000
+
+
+def test_what_a_task_has_started_ends_with_its_worker(faulty):
+    assert faulty[STARTER].result is not None
+    wait_until_gone([faulty[STARTER].result["pid"]])
+
+
+def test_a_task_that_hangs_is_killed_when_its_time_is_over_and_what_was_printed_before_is_not_told():
+    chatter, hang, other = fault(CHATTER), fault(HANG, limits=Limits(time=0.2)), fault(HANG, 0)
+    records = done([chatter, hang, other], workers=1)
+    record = records[hang.task.key]
+    assert (record.outcome, record.stderr) == (Outcome.TIMEOUT, "")
+    assert record.message == "not done within 0.2 seconds"
+    assert records[other.task.key].is_ok
+
+
+@pytest.mark.parametrize(
+    ("error", "is_memory"),
+    [
+        (MemoryError(), True),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), True),
+        (ImportError("libgmp.so: failed to map segment from shared object"), True),
+        (ImportError("libflint.so: cannot allocate memory in static TLS block"), True),
+        (OSError(errno.EIO, "Input/output error"), False),
+        (ImportError("No module named 'numbers_of_mine'"), False),
+        (ValueError("cannot allocate memory"), False),  # somebody's words, not the system's
+    ],
+)
+def test_an_error_that_comes_of_a_want_of_memory_is_told_as_such(error, is_memory):
+    caused, met = InputError("found no numbers"), ValueError("no value")
+    caused.__cause__, met.__context__ = error, error
+    for raised in (error, caused, met):
+        found = failure(raised)
+        if is_memory:
+            assert found == {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
+        else:
+            assert found["outcome"] is Outcome.FAILED
+            assert ("stderr" in found) is (raised is not caused)  # a traceback, where nobody raised it on purpose
+
+
+# One worker for many tasks
+
+
+def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
+    records = done([pause(300, seed, Limits(time=1.0)) for seed in range(6)], workers=1)
+    assert all(record.is_ok for record in records.values())  # 1.8 seconds in one worker
+
+
+def test_what_earlier_tasks_left_belongs_to_the_memory_of_a_task():
+    jobs = [
+        Job(Task("use", None, {"steps": steps, "seed": seed}), Limits(20.0, 60_000_000))
+        for seed, steps in enumerate((40, 48, 54, 65, 68, 72))
+    ]
+    among, alone = done(jobs, workers=1), done(jobs, workers=1, group_seconds=0.0)
+    assert {key: record.outcome for key, record in among.items()} == {key: r.outcome for key, r in alone.items()}
+    assert {record.outcome for record in alone.values()} == {Outcome.OK, Outcome.OUT_OF_MEMORY}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no limit of memory")
+def test_the_limit_of_memory_ends_with_the_task_so_that_its_result_can_be_told():
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    try:
+        found = perform(Task("family-space", {"family": {"draw": "eigenvalues", "m": 2, "seed": 0}}, {}), 1 << 40, {})
+        after = resource.getrlimit(resource.RLIMIT_AS)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+    assert found["outcome"] is Outcome.OK
+    assert after == (before[1], before[1])
+
+
+def test_an_error_nobody_expected_is_tried_again_in_a_fresh_worker():
+    jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), Limits(20.0)) for seed in range(2)]
+    assert all(record.is_ok for record in done(jobs, workers=1).values())
+
+
+@pytest.mark.parametrize(("group_seconds", "workers"), [(60.0, 1), (0.0, 3)])
+def test_a_worker_serves_tasks_until_it_has_worked_for_some_seconds(monkeypatch, group_seconds: float, workers: int):
+    started = []
+    monkeypatch.setattr(local, "_Worker", lambda make=local._Worker: started.append(make()) or started[-1])
+    done([pause(1, seed) for seed in range(3)], workers=1, group_seconds=group_seconds)
+    assert len(started) == workers
+
+
+# Deaths
+
+
+def test_the_signals_of_a_task_itself_are_those_of_faults_and_limits():
+    own = "SIGSEGV SIGABRT SIGFPE SIGBUS SIGILL SIGSYS SIGTRAP SIGXCPU SIGXFSZ"
+    assert {number.name for number in Signals if not is_from_outside(-number)} == set(own.split())
+    assert not any(map(is_from_outside, (None, 0, 1, 7, 137)))
+
+
+def test_a_task_whose_worker_is_killed_from_outside_again_and_again_is_lost_and_not_crashed(tmp_path: Path):
+    kill, quit_ = signalled(signal.SIGKILL, ALWAYS), signalled(signal.SIGQUIT, TRIES - 1)
+    records = done([kill, quit_])
+    lost = records[kill.task.key]
+    assert (lost.outcome, lost.result, lost.is_ok) == (Outcome.LOST, None, False)
+    assert lost.message == "the child was killed by signal 9 (SIGKILL), from outside or for want of memory"
+    assert records[quit_.task.key].is_ok
+    assert tries(tmp_path, signal.SIGKILL, ALWAYS) == tries(tmp_path, signal.SIGQUIT, TRIES - 1) == TRIES
+
+
+def test_a_fault_is_recorded_as_a_crash_when_it_comes_again(tmp_path: Path):
+    once, always = signalled(signal.SIGSEGV, 1), signalled(signal.SIGABRT, ALWAYS)
+    records = done([once, always], workers=1)
+    assert records[once.task.key].is_ok
+    assert records[always.task.key].outcome is Outcome.CRASHED
+    assert tries(tmp_path, signal.SIGABRT, ALWAYS) == 2
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
+def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start: Started, number: int):
+    workers = start(1, pause(300, 0))
+    for seed in (1, 2):
+        (pid,) = pids_of(workers)
+        if seed == 1:
+            os.kill(pid, number)
+        records = []
+        while workers.in_flight:
+            records += workers.wait(5.0)
+        assert [record.is_ok for record in records] == [True]
+        for worker in workers._idle:
+            os.kill(worker.process.pid, number)
+        workers.submit(pause(1, seed))
+    assert [record.is_ok for record in workers.wait(20.0) or workers.wait(20.0)] == [True]
+
+
+@pytest.mark.parametrize("seconds", quick([0.0, 0.05, 0.15], [0.05]))
+def test_ctrl_c_does_not_reach_a_worker_that_begins(start: Started, seconds: float):
+    """There Python has no place for it: it ended in a fatal error with status 1, or in RuntimeError."""
+    workers = start(1, pause(1))
+    ((worker, _),) = workers._running.values()
+    assert worker.process is not None
+    assert worker.process.pid is not None
+    time.sleep(seconds)
+    os.kill(worker.process.pid, signal.SIGINT)
+    (record,) = workers.wait(20.0)
+    assert record.is_ok
+    assert workers._idle == [worker]
+
+
+def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_kills_them(start: Started):
+    workers = start(2)
+    assert workers.is_free
+    workers.submit(fault(HANG))
+    workers.submit(pause(60_000))
+    assert not workers.is_free
+    pids, begin = pids_of(workers), time.monotonic()
+    assert len(pids) == workers.in_flight == 2
+    workers.close()
+    workers.close()
+    assert time.monotonic() - begin < 15  # otherwise they would work until the time of their tasks is over, 20 s
+    assert not any(map(is_running, pids))
+
+
+def test_workers_that_cannot_start_are_told_once(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("KAHANMAPS_TASKS", "no_such_module_anywhere")
+    with pytest.raises(WorkersError, match="no_such_module_anywhere"):
+        done([pause(1, seed) for seed in range(5)])
+
+
+PARENT = """
+import sys
+sys.path[:0] = sys.argv[1:]
+from test_local import *
+workers = LocalWorkers(2, {}.__getitem__)
+workers.submit(fault(HANG)); workers.submit(pause(60_000))
+print(*pids_of(workers), flush=True)
+workers.wait(60)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a worker ends when its task does")
+def test_no_worker_outlives_a_parent_that_is_killed():
+    """One of them hangs as in a long call of FLINT."""
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, HERE, HERE.parent], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    pids = [int(word) for word in parent.stdout.readline().split()]
+    assert [is_running(pid) for pid in pids] == [True, True]
+    parent.kill()
+    wait_until_gone(pids)
+    parent.communicate()
+
+
+def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(tmp_path: Path):
+    """multiprocessing would run the script again in each worker, and that one start workers of its own."""
+    text = '[experiments.a]\ntask = "pause"\naxes = {seed = "0..3"}'
+    (tmp_path / "script.py").write_text(f"import kahanmaps as km\nprint(len(list(km.run({text!r}, jobs=2))))\n")
+    ran = subprocess.run([sys.executable, tmp_path / "script.py"], capture_output=True, text=True, timeout=60)
+    assert (ran.stdout, ran.stderr) == ("4\n", "")
+
+
+# What remains of it
+
+
+def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path: Path):
+    jobs = [signalled(signal.SIGTERM, ALWAYS), signalled(signal.SIGTERM, 0)]
+    limits = {"time": 20, "memory": None}
+    text = json.dumps({"documents": {}, "jobs": [{"task": job.task.text, "limits": limits} for job in jobs]})
+    said = io.StringIO()
+    do_group(io.StringIO(text), said)
+    assert [json.loads(line)["outcome"] for line in said.getvalue().splitlines()] == ["lost", "ok"]
+    assert tries(tmp_path, signal.SIGTERM, ALWAYS) == 1
+
+
+def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path):
+    db, spec = tmp_path / "results.db", '[experiments.a]\ntask = "signalled"\naxes = { order = [15], seed = [0, 99] }\n'
+    records = list(run(spec, db))
+    assert sorted(str(record.outcome) for record in records) == ["lost", "ok"]
+    with Store.open(db, readonly=True) as store:
+        (status,) = store.status()
+        assert (status.missing, status.outcomes) == (1, {Outcome.OK: 1})
+        assert [row.record is None for row in store.rows(missing=True)] == [False, True]
+        lost = [store.find(record.key)[0] for record in records if record.outcome is Outcome.LOST]
+        assert [(found.record, found.attempts) for found in lost] == [(None, 0)]
+    (tmp_path / "tries" / "15-99").write_text("x" * 99)  # from here on it lives
+    again = list(run(spec, db))
+    assert [str(record.outcome) for record in again] == ["ok"]
+    list(run(spec, tmp_path / "calm.db"))
+    assert exported(db) == exported(tmp_path / "calm.db")
+
+
+def test_a_task_that_is_lost_when_it_is_tried_again_keeps_the_failure_it_had(tmp_path: Path):
+    with Store.open(tmp_path / "results.db", create=True) as store:
+        task = signalled(9, ALWAYS).task
+        store.plan("one", "one", Limits(), [task], {})
+        store.add([Record(task.key, Outcome.FAILED, message="before")])
+        store.add([Record(task.key, Outcome.LOST)])
+        (found,) = store.find(task.key)
+        assert (found.record.outcome, found.record.message, found.attempts) == (Outcome.FAILED, "before", 1)
+
+
+@pytest.mark.parametrize(
+    ("number", "first"),
+    [(Signals.SIGTERM, "workers"), (Signals.SIGINT, "parent"), (Signals.SIGKILL, "parent")],
+)
+def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: Path, number: Signals, first: str):
+    text = '[experiments.pause]\ntask = "pause"\noptions = { steps = 60 }\naxes = { seed = "0..29" }\n'
+    (tmp_path / "spec.toml").write_text(text)
+    command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
+    process = subprocess.Popen(
+        [*command, "-q"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 20
+    while not stored(tmp_path / "wild.db"):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    threads = Path(f"/proc/{process.pid}/task")  # two workers, and the process with which Python keeps its semaphores
+    children = [int(pid) for file in threads.glob("*/children") for pid in file.read_text().split()]
+    assert len(children) >= 2
+    for pid in [process.pid, *children] if first == "parent" else [*children, process.pid]:
+        os.kill(pid, number)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == (130 if number in (signal.SIGINT, signal.SIGTERM) else -number), err
+    wait_until_gone(children)
+    with Store.open(tmp_path / "wild.db", readonly=True) as store:
+        (status,) = store.status()
+    assert set(status.outcomes) == {Outcome.OK}
+    assert status.missing > 0
+    list(run(text, tmp_path / "wild.db", jobs=2))
+    list(run(text, tmp_path / "calm.db", jobs=2))
+    assert exported(tmp_path / "wild.db") == exported(tmp_path / "calm.db")
+
+
+def stored(db: Path) -> int:
+    if not db.exists():
+        return 0
+    with Store.open(db, readonly=True) as store:
+        return sum(sum(one.outcomes.values()) for one in store.status())
