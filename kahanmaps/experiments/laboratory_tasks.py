@@ -19,7 +19,7 @@ from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import Result, Whole, fields, task
+from kahanmaps.experiments.registry import Result, Whole, fields, summary, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
@@ -27,24 +27,20 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.growth.degrees import DegreeGrowth
     from kahanmaps.laboratory.preserve.densities import DensitySearch
     from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+    from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch
     from kahanmaps.laboratory.singular.singularities import SingularityRun
+    from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
+    from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
+POISSON = {"symbolic": "symbols", "max_degree": "degree"}
 _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are known for all iterates
 
 
-@task("degrees", reports=True)
-def degrees(
-    system: SystemFile,
-    eps: Any = None,
-    terms: int | None = None,
-    max_degree: int = 20_000,
-    seconds: int = 10,
-    seed: int = 0,
-) -> Whole:
+@summary(
+    "degrees", "growth.degrees:degree_growth", of="map", eps=None, terms=None, max_degree=20_000, seconds=10, seed=0
+)
+def degrees(found: DegreeGrowth) -> Result:
     """The degrees of the iterates: the kind of growth, the dynamical degree, a recurrence."""
-    from kahanmaps.laboratory.growth.degrees import degree_growth
-
-    found = degree_growth(system.map, eps, seconds=seconds, max_terms=terms, max_degree=max_degree, seed=seed)
     return {
         "status": found.ended,
         **_growth(found),
@@ -52,7 +48,7 @@ def degrees(
         "degrees": list(found.degrees),
         "reached": len(found.degrees) - 1,
         "ending": found.message,
-    }, found
+    }
 
 
 @task("scan", reports=True)
@@ -60,6 +56,7 @@ def scan_parameters(
     system: SystemFile,
     over: list[str],
     eps: Any = None,
+    by: str = "degrees",  # nothing else any more; it stays for the keys of earlier databases
     terms: int | None = None,
     primes: list[int] | None = None,
     seconds: int = 120,
@@ -82,19 +79,11 @@ def scan_parameters(
     }, found
 
 
-@task("find-integrals", reports=True)
-def integrals(
-    system: SystemFile,
-    eps: Any = None,
-    symbolic: list[str] | None = None,
-    max_degree: int | None = None,
-    seconds: int = 60,
-    seed: int = 0,
-) -> Whole:
+@summary(
+    "find-integrals", "preserve.integrals:find_integrals", eps=None, symbolic=None, max_degree=None, seconds=60, seed=0
+)
+def integrals(found: IntegralSearch) -> Result:
     """Integrals in closed form with their verdict, and how many there are at least, by theorems and by orbits."""
-    from kahanmaps.laboratory.preserve.integrals import find_integrals
-
-    found = find_integrals(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
     return {
         "verdict": _weakest(verdict for _, verdict in found.formulas),
         "status": _state_of_integrals(found),
@@ -104,22 +93,14 @@ def integrals(
         "nullities": list(found.profile.nullities),
         "period": found.profile.period,
         "reason": found.reason,
-    }, found
+    }
 
 
-@task("find-density", reports=True)
-def density(
-    system: SystemFile,
-    eps: Any = None,
-    symbolic: list[str] | None = None,
-    max_degree: int | None = None,
-    seconds: int = 30,
-    seed: int = 0,
-) -> Whole:
+@summary(
+    "find-density", "preserve.densities:find_densities", eps=None, symbolic=None, max_degree=None, seconds=30, seed=0
+)
+def density(found: DensitySearch) -> Result:
     """The densities phi of least degree, or a product of powers, for which the measure dx/phi is invariant."""
-    from kahanmaps.laboratory.preserve.densities import find_densities
-
-    found = find_densities(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
     return {
         "verdict": _weakest(one.verdict for one in found.densities),
         "status": _state_of_densities(found),
@@ -128,22 +109,21 @@ def density(
         "formulas": [one.text for one in found.densities],
         "period": found.period,
         "reason": found.reason,
-    }, found
+    }
 
 
-@task("find-poisson", reports=True)
-def poisson(
-    system: SystemFile,
-    eps: Any = None,
-    symbolic: list[str] | None = None,
-    max_degree: int | None = None,
-    seconds: int = 30,
-    seed: int = 0,
-) -> Whole:
+@summary(
+    "find-poisson",
+    "preserve.poisson.poisson_tensors:find_poisson",
+    renamed=POISSON,
+    eps=None,
+    symbolic=None,
+    max_degree=None,
+    seconds=30,
+    seed=0,
+)
+def poisson(found: PoissonSearch) -> Result:
     """The Poisson tensors with polynomial entries: how many, their ranks, Casimirs among the integrals."""
-    from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-
-    found = find_poisson(system, max_degree, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
     return {
         "verdict": _weakest(one.verdict for one in found.tensors),
         "status": "found" if found.tensors else "none" if found.reason.startswith("no tensor") else "open",
@@ -154,15 +134,12 @@ def poisson(
         "jacobi": [str(one.jacobi) for one in found.tensors],
         "casimirs": [list(one.casimirs) for one in found.tensors],
         "reason": found.reason,
-    }, found
+    }
 
 
-@task("find-symmetry", reports=True)
-def symmetry(system: SystemFile, seconds: int = 30) -> Whole:
+@summary("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", seconds=30)
+def symmetry(found: Symmetries) -> Result:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
-    from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
-
-    found = linear_symmetries(system.system, seconds=seconds)
     return {
         "verdict": str(Verdict.PROVED if found.complete else Verdict.UNDECIDED),
         "status": "complete" if found.complete else "undecided",
@@ -173,21 +150,20 @@ def symmetry(system: SystemFile, seconds: int = 30) -> Whole:
         "scaling": found.scaling is not None,
         "generators": [one.text for one in found.generators],
         "open": found.undecided,
-    }, found
+    }
 
 
-@task("find-commuting", reports=True)
-def commuting(
-    system: SystemFile,
-    shape: str = "linear",
-    seconds: int = 60,
-    seed: int = 0,
-    error_bits: int = DEFAULT_ERROR_BITS,
-) -> Whole:
+@summary(
+    "find-commuting",
+    "symmetry.commuting:commuting_systems",
+    of="system",
+    shape="linear",
+    seconds=60,
+    seed=0,
+    error_bits=DEFAULT_ERROR_BITS,
+)
+def commuting(found: CommutingSystems) -> Result:
     """The quadratic systems whose Kahan map commutes with this one at the same eps, for every eps."""
-    from kahanmaps.laboratory.symmetry.commuting import commuting_systems
-
-    found = commuting_systems(system.system, shape, seed=seed, error_bits=error_bits, seconds=seconds)
     return {
         "verdict": str(found.verdict),
         "status": "complete" if found.complete else "undecided",
@@ -199,22 +175,14 @@ def commuting(
         "systems": [one.rhs for one in found.nontrivial],
         "irrational": found.irrational,
         "open": found.undecided,
-    }, found
+    }
 
 
-@task("analyze", reports=True)
-def analysis(
-    system: SystemFile,
-    eps: Any = None,
-    symbolic: list[str] | None = None,
-    seconds: int | None = None,
-    seed: int = 0,
-) -> Whole:
+@summary("analyze", "analysis:analyze", eps=None, symbolic=None, seconds=None, seed=0)
+def analysis(found: Analysis) -> Result:
     """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.system_normal_form import SystemNormalForm
-    from kahanmaps.laboratory.analysis import analyze
 
-    found = analyze(system, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
     final, confined = found.conclusion, {run.verdict for run in found.singularities}
     unfinished = _unfinished(found)
     return {
@@ -231,7 +199,7 @@ def analysis(
         "sentence": final.sentence,
         "unfinished": unfinished,
         "skipped": found.skipped,
-    }, found
+    }
 
 
 @task("singularities")

@@ -204,6 +204,7 @@ VOCABULARY = {
         whole("max_degree", "the largest degree that is tried", most=10**6),
         Option("symbolic", "parameters that formulas contain, e.g. a1,a2", _read_names, lambda text: text.split(",")),
         Option("over", "parameters that vary, e.g. a1,a2", _read_names_or_eps, lambda text: text.split(",")),
+        choice("by", "what a scan looks for: smaller degrees", ("degrees",)),
         whole_numbers(
             "primes", "modulo which members are tried, three at least", "primes from 5 on", range(5, 1 << 13)
         ),

@@ -5,7 +5,12 @@
         '''The space of cubics that belong to A.'''
 
 The names of the parameters are names of `options.VOCABULARY`; a default makes an option optional, and `system`, if
-it is there, is the system. A result is plain data; "verdict" in it becomes the verdict of the record.
+it is there, is the system. A result is plain data; "verdict" in it becomes the verdict of the record. What a function
+of the laboratory finds, with these options and these defaults, is a task that only says what is kept of it:
+
+    @summary("find-density", "preserve.densities:find_densities", eps=None, seconds=30, seed=0)
+    def density(found: DensitySearch) -> Result:
+        '''The densities phi for which the measure dx/phi is invariant.'''
 
 Tasks of one's own live in modules named in the environment variable KAHANMAPS_TASKS (separated by commas), which every
 child imports.
@@ -29,6 +34,8 @@ REPORT = "report"
 Result = dict[str, Any]
 Whole = tuple[Result, Any]  # a result and what it is of, of which `to_json` says all
 Function = Callable[..., Result | Whole]
+Summary = Callable[[Any], Result]
+ARGUMENTS = {"symbolic": "symbols", "terms": "max_terms"}  # options that the laboratory calls otherwise
 
 # What a task needs its system to be.
 SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
@@ -99,6 +106,34 @@ def task(name: str, needs: str = SYSTEM, *, reports: bool = False) -> Callable[[
             options[REPORT], defaults[REPORT] = VOCABULARY[REPORT], False
         _KINDS[name] = TaskKind(name, summary, function, options, defaults, needs if takes_system else None, reports)
         return function
+
+    return register
+
+
+def summary(
+    name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENTS, **defaults: Any
+) -> Callable[[Summary], Summary]:
+    """Register what a function of the laboratory ("module:name", loaded when it is called) finds, as a kind of task.
+
+    It is given the file of the system, or this attribute of it, and the options, some `renamed`. Their `defaults` stand
+    here, not in the library, since they belong to the keys of tasks.
+    """
+
+    def register(summarize: Summary) -> Summary:
+        def perform(system: Any, **options: Any) -> Whole:
+            module, _, attribute = function.partition(":")
+            asked = getattr(system, of) if of else system
+            given = {renamed.get(key, key): value for key, value in options.items() if value is not None}
+            found = getattr(import_module(f"kahanmaps.laboratory.{module}"), attribute)(asked, **given)
+            return summarize(found), found
+
+        parameters = [inspect.Parameter("system", inspect.Parameter.POSITIONAL_ONLY)]
+        for key, default in defaults.items():
+            parameters.append(inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default))
+        perform.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        perform.__doc__, perform.__module__ = summarize.__doc__, summarize.__module__
+        task(name, reports=True)(perform)
+        return summarize
 
     return register
 

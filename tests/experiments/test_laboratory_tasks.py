@@ -236,6 +236,7 @@ def test_a_scan_may_be_modulo_given_primes():
     [
         ("find-integrals", TOP, {"symbolic": "b"}, "b"),
         ("scan", TOP, {"over": "b"}, "found the symbol 'b'"),
+        ("scan", TOP, {"over": "a1", "by": "integrals"}, "expected one of degrees"),
         ("scan", TOP, {"over": "a1", "primes": "11,13"}, "expected at least three"),
         ("degrees", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
         ("singularities", TOP, {"steps": 0}, "found 0 steps, expected 1 to 10000"),

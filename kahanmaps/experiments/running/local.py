@@ -282,11 +282,26 @@ class _Context(SpawnContext):
 
     process: SpawnProcess | None = None
 
+    # Pebble asks for these two by these names.
+
     def Process(self, *args: Any, **keywords: Any) -> SpawnProcess:  # type: ignore[override]
         if self.process is not None:
             raise OSError("the worker has ended")  # which breaks the pool, as is meant
         self.process = _Process(*args, **keywords)
         return self.process
+
+    def RLock(self) -> Any:
+        return _NoLock()
+
+
+class _NoLock:
+    """The lock of a pipe that a single worker uses. A semaphore would outlive a parent that is killed."""
+
+    def acquire(self, block: bool = True, timeout: float | None = None) -> bool:
+        return True
+
+    def release(self) -> None:
+        pass
 
 
 class _Process(SpawnProcess):
