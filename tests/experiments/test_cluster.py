@@ -1,7 +1,7 @@
 """Tasks on a dask cluster: every record comes back exactly once, whatever dies on the way, and nothing hangs.
 
 Schedulers and workers are real ones, on 127.0.0.1. What the workers run is a script that reads and prints what the
-group command does, and misbehaves where a task asks it to.
+command of a group does, and misbehaves where a task asks it to; batches run the command itself.
 """
 
 import json
@@ -21,6 +21,7 @@ from small_databases import exported
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Limits, Outcome, Task
+from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running import cluster
 from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
 from kahanmaps.experiments.running.local import TRIES
@@ -61,7 +62,6 @@ for job in read["jobs"]:
 
 
 UNLIMITED = Limits()
-ROOT = Path(__file__).resolve().parents[2]
 
 
 class Machines:
@@ -353,26 +353,91 @@ def test_closing_twice_is_allowed_and_leaves_the_scheduler_and_its_workers(share
         again.close()
 
 
-# The group command itself
+# Batches
 
-
+HERE = Path(__file__).resolve().parent
 STUDY = """
-[experiments.space]
-task = "family-space"
-system = "family"
-axes = { m = 2 }
+limits = { time = "60 s", memory = "300 MB" }
+[experiments.pause]
+task = "pause"
+options = { steps = 10 }
+axes = { seed = "0..299" }
+[experiments.faults]
+task = "fault"
+axes = { order = [2, 5, 8], seed = "0..3" }
 [experiments.top]
 task = "check-integrals"
-system = "euler_top"
-axes = { eps = "1/3" }
+system = ["euler_top", "lorenz"]
+axes = { eps = ["1/10", "1/3"] }
 """
+SHORT = STUDY.replace("0..299", "0..2").replace("[2, 5, 8]", "[2, 8]").replace(', "1/3"', "")
 
 
-def test_a_batch_done_by_workers_has_the_results_of_one_at_home(shared, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    assert len(list(run(STUDY, tmp_path / "away.db", scheduler=str(shared.file)))) == 2
-    assert len(list(run(STUDY, tmp_path / "home.db"))) == 2
-    assert exported(tmp_path / "away.db") == exported(tmp_path / "home.db")
+@pytest.fixture
+def study(monkeypatch, tmp_path):
+    """Start `batch run` of STUDY on a scheduler, with the tasks of fault_tasks.py; wait until some tasks are done."""
+    monkeypatch.syspath_prepend(str(HERE))
+    monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (HERE, HERE.parents[1], HERE.parents[1] / "cli"))))
+    monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(STUDY)
+
+    def start(machines, number):
+        command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "study.toml", "--db", "away.db", "-q"]
+        command += ["--scheduler", str(machines.file), "--group-seconds", "0.3"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        until(lambda: recorded() >= number or process.poll() is not None, 60)
+        return process
+
+    return start
+
+
+def recorded():
+    """How many tasks have a record."""
+    try:
+        with Store.open("away.db", readonly=True) as store:
+            return sum(one.tasks - one.missing for one in store.status())
+    except InputError:  # there is none yet
+        return 0
+
+
+@pytest.mark.usefixtures("study")
+def test_a_batch_done_by_workers_has_the_results_of_one_at_home(shared):
+    away, home = list(run(SHORT, "away.db", scheduler=str(shared.file))), list(run(SHORT, "home.db", jobs=2))
+    assert len(away) == len(home) == 3 + 8 + 2
+    assert exported("away.db") == exported("home.db")
+
+
+@pytest.mark.slow
+def test_what_is_killed_on_a_cluster_changes_nothing(own, study):
+    first, _ = own.worker(1), own.worker(1)
+    batch = study(own, 20)
+    own.kill(first)  # a worker with its nanny, in the middle of its groups
+    own.worker(1)
+    until(lambda: recorded() >= 60, 60)
+    batch.send_signal(signal.SIGKILL)  # the coordinator
+    batch.communicate()
+    assert 60 <= recorded() < 316
+    batch = study(own, 0)
+    _, err = batch.communicate(timeout=100)
+    assert batch.returncode == 3, err  # some tasks fail, as meant
+    list(run("study.toml", "home.db", jobs=2))
+    assert exported("away.db") == exported("home.db")
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_is_a_sentence_and_the_batch_goes_on_elsewhere(own, study):
+    own.worker(2)
+    batch = study(own, 10)
+    own.kill(own.scheduler)
+    _, err = batch.communicate(timeout=60)
+    assert batch.returncode == 3
+    assert "what was recorded is safe" in err
+    assert "Traceback" not in err
+    assert recorded() >= 10
+    for db in ("away.db", "home.db"):
+        list(run("study.toml", db, jobs=2))
+    assert exported("away.db") == exported("home.db")
 
 
 # Before there is a cluster

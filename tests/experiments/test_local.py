@@ -422,7 +422,9 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
     while not stored(tmp_path / "wild.db"):
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    threads = Path(f"/proc/{process.pid}/task")  # two workers, and the process with which Python keeps account of semaphores
+    threads = Path(
+        f"/proc/{process.pid}/task"
+    )  # two workers, and the process with which Python keeps account of semaphores
     children = [int(pid) for file in threads.glob("*/children") for pid in file.read_text().split()]
     assert len(children) >= 2
     for pid in [process.pid, *children] if first == "parent" else [*children, process.pid]:

@@ -301,9 +301,9 @@ def connect(address: str, timeout: float) -> Any:
         raise InputError(
             f"{address!r} is not the address of a scheduler: write tcp://host:port, or the path of a scheduler file"
         )
-    for name in ("distributed", "tornado", "tornado.application"):
-        logging.getLogger(name).handlers = [logging.NullHandler()]
-        logging.getLogger(name).propagate = False
+    for name in list(logging.Logger.manager.loggerDict):  # each of them has a handler of its own
+        if name.split(".")[0] in ("distributed", "tornado"):
+            logging.getLogger(name).disabled = True
     made: Future[Any] = Future()
 
     def make() -> None:
