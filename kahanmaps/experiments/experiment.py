@@ -58,57 +58,32 @@ class Experiment:
 
         The first task has all that is the same in all of them, defaults too, which may change from version to version.
         """
-        axes = {name: _axis_data(values) for name, values in self.grid.axes.items()}
+        axes: dict[str, Any] = {}
+        for name, values in self.grid.axes.items():
+            axes[name] = list(values) if not isinstance(values, Values) else []
+            for piece in values.pieces if isinstance(values, Values) else ():
+                if isinstance(piece, RationalRange):  # as its ends, not spelt out
+                    read = values.option.read
+                    axes[name].append({"from": read(piece[0]), "to": read(piece[-1]), "count": len(piece)})
+                else:
+                    axes[name].append(list(piece))
         order = [list(group) for group in self.grid.groups]
         return canonical({"first": self[0].text, "axes": axes, "order": order})
 
     def __getitem__(self, index: int) -> Task:
         values = {**self.fixed, **self.grid[index]}
         recipe = values.pop("system", None)
-        if recipe is not None:
-            recipe = _complete(recipe, values)
+        if recipe is not None and "family" in recipe:
+            recipe = family_recipe(values)
+        elif recipe is not None:
+            given = {n.removeprefix(PARAMETERS): value for n, value in values.items() if n.startswith(PARAMETERS)}
+            recipe = {**recipe, "parameters": {**recipe["parameters"], **given}}
         options = {name: values.get(name, self.kind.defaults.get(name)) for name in self.kind.options}
         return Task(self.kind.name, recipe, options)
 
     def tasks(self) -> Iterator[Task]:
         """Its tasks in order, one at a time."""
         return (self[index] for index in range(self.size))
-
-
-def _complete(recipe: Mapping[str, Any], values: dict[str, Any]) -> dict[str, Any]:
-    """The recipe with what the values say of it."""
-    if "family" in recipe:
-        return family_recipe(values)
-    given = {name.removeprefix(PARAMETERS): value for name, value in values.items() if name.startswith(PARAMETERS)}
-    return {**recipe, "parameters": {**recipe["parameters"], **given}}
-
-
-def _axis_data(values: Sequence[Any]) -> Any:
-    """An axis as plain data, a range as its ends, not spelt out."""
-    if not isinstance(values, Values):
-        return list(values)
-    pieces: list[Any] = []
-    for piece in values.pieces:
-        if isinstance(piece, RationalRange):
-            read = values.option.read
-            pieces.append({"from": read(piece[0]), "to": read(piece[-1]), "count": len(piece)})
-        else:
-            pieces.append(list(piece))
-    return pieces
-
-
-def _require_rows(names: Sequence[str], axes: Mapping[str, Values]) -> None:
-    """Raises InputError for axes of a zip that are not equally long, or have the same values together twice."""
-    lengths = {name: len(axes[name]) for name in names}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise InputError(f"{told} values, expected as many in each: a zip takes them together")
-    if any(has_repeats(axes[name]) for name in names):
-        rows: dict[tuple[str, ...], int] = {}
-        for k in range(1, 1 + lengths[names[0]]):
-            row = tuple(repr(axes[name][k - 1]) for name in names)
-            if rows.setdefault(row, k) != k:
-                raise InputError(f"found the same values in places {rows[row]} and {k}: expected them once")
 
 
 class ExperimentReader:
@@ -142,7 +117,13 @@ class ExperimentReader:
         if kind is None:
             return None  # what an option means depends on the task
         fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
-        self._require_once()
+        places: dict[str, str] = {}
+        for option, place, _ in [entry for part in ("options", "axes") for entry in self.entries(part)]:
+            if option in places:
+                both = {place.rpartition(".")[2], places[option].rpartition(".")[2]}
+                hint = " (the time step is 2 eps)" if TIME_STEP in both and len(both) > 1 else ""
+                self.mistake(place, f"found {places[option]} as well, expected one of the two{hint}")
+            places.setdefault(option, place)
         zips = self._read_zips(axes)
         limits = self._read_limits(kind, fixed)
         self._require(kind)
@@ -186,56 +167,44 @@ class ExperimentReader:
         """The options that the spec gives, right or wrong, and where."""
         return {name: place for part in ("axes", "options") for name, place, _ in self.entries(part)}
 
-    def _require_once(self) -> None:
-        places: dict[str, str] = {}
-        for part in ("options", "axes"):
-            for name, place, _ in self.entries(part):
-                if name in places:
-                    both = {place.rpartition(".")[2], places[name].rpartition(".")[2]}
-                    hint = " (the time step is 2 eps)" if TIME_STEP in both and len(both) > 1 else ""
-                    self.mistake(place, f"found {places[name]} as well, expected one of the two{hint}")
-                places.setdefault(name, place)
-
     def _read_values(self, kind: TaskKind, part: str) -> dict[str, Values]:
         """The values in one of the tables, by canonical name; what is wrong is told and left out."""
         found: dict[str, Values] = {}
         for name, place, raw in self.entries(part):
             with self._at(place):
-                values = self._read_entry(kind, part, name, place, raw)
+                if name == "parameters" and self.has_parameters:
+                    raise InputError(f"found {show(raw)}, expected a table of parameters")
+                option = self._option(kind, name, place.removeprefix(f"{part}."))
+                if part == "options" and isinstance(raw, list):
+                    raise InputError("found a list, expected one value; lists and ranges go to axes")
+                values = self._read_one(place, option, raw)
+                if values is not None and part == "options" and len(values) > 1:
+                    raise InputError(f"found {len(values)} values, expected one; lists and ranges go to axes")
                 if values is not None:
                     found[name] = values
         return found
 
-    def _read_entry(self, kind: TaskKind, part: str, name: str, place: str, raw: Any) -> Values | None:
-        """The values of one option; None where what is wrong is told already. Raises InputError otherwise."""
-        if name == "parameters" and self.has_parameters:
-            raise InputError(f"found {show(raw)}, expected a table of parameters")
-        known = self._known_options(kind)
-        is_parameter = name.startswith(PARAMETERS) and self.has_parameters
-        option = self._parameter(name) if is_parameter else known.get(name)
-        if option is None:
-            names = [*known, *([TIME_STEP] if "eps" in known else [])]
-            expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
-            hint = suggestion(place.removeprefix(f"{part}."), names)
-            raise InputError(f"{kind.name} has no such option, expected one of {expected}{hint}")
-        if part == "options" and isinstance(raw, list):
-            raise InputError("found a list, expected one value; lists and ranges go to axes")
-        values = self._read_one(place, option, raw)
-        if values is not None and part == "options" and len(values) > 1:
-            raise InputError(f"found {len(values)} values, expected one; lists and ranges go to axes")
-        return values
-
-    def _parameter(self, name: str) -> Option:
-        """A parameter of the systems. Raises InputError where one of them has none of this name."""
-        key = name.removeprefix(PARAMETERS)
-        for file in self.files:
-            if key not in file.parameters:
-                known = ", ".join(file.parameters) or "none"
-                hint = suggestion(key, list(file.parameters))
-                raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
-        return exact(name, "a parameter of the system")
+    def _option(self, kind: TaskKind, name: str, written: str) -> Option:
+        """The option of this name, or the parameter of the systems. Raises InputError where there is none."""
+        if name.startswith(PARAMETERS) and self.has_parameters:
+            key = name.removeprefix(PARAMETERS)
+            for file in self.files:
+                if key not in file.parameters:
+                    known = ", ".join(file.parameters) or "none"
+                    hint = suggestion(key, list(file.parameters))
+                    raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
+            return exact(name, "a parameter of the system")
+        options = dict(kind.options)
+        if self.is_family or (self.has_parameters and not self.files):  # what cannot be found may have meant a member
+            options |= FAMILY | {"seed": VOCABULARY["seed"]}
+        if name in options:
+            return options[name]
+        names = [*options, *([TIME_STEP] if "eps" in options else [])]
+        expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
+        raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
 
     def _read_one(self, place: str, option: Option, raw: Any) -> Values | None:
+        """The values of one option; None where what is wrong is told already."""
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
@@ -250,13 +219,6 @@ class ExperimentReader:
         for position, sentence in mistakes:
             self.mistake(place + "".join(f"[{k}]" for k in position), sentence)
         return values
-
-    def _known_options(self, kind: TaskKind) -> dict[str, Option]:
-        known = dict(kind.options)
-        is_lost = self.has_parameters and not self.files
-        if self.is_family or is_lost:  # what cannot be found may have meant a member
-            known |= FAMILY | {"seed": VOCABULARY["seed"]}
-        return known
 
     def _written_zips(self) -> list[list[str] | None]:
         """Canonical names of the axes of each zip, None where one has not the right shape, which is told already."""
@@ -287,9 +249,19 @@ class ExperimentReader:
             for name in twice:
                 self.mistake(place, f"found {name} twice, expected every axis in one zip at most")
             if not unknown and not twice:
-                with self._at(place):
-                    _require_rows(names, axes)
                 zips.append(tuple(names))
+                lengths = {name: len(axes[name]) for name in names}
+                if len(set(lengths.values())) > 1:
+                    told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+                    self.mistake(place, f"{told} values, expected as many in each: a zip takes them together")
+                elif any(has_repeats(axes[name]) for name in names):
+                    rows: dict[tuple[str, ...], int] = {}
+                    for k in range(1, 1 + lengths[names[0]]):
+                        row = tuple(repr(axes[name][k - 1]) for name in names)
+                        if rows.setdefault(row, k) != k:
+                            told = f"found the same values in places {rows[row]} and {k}: expected them once"
+                            self.mistake(place, told)
+                            break
         return zips
 
     def _read_limits(self, kind: TaskKind, fixed: dict[str, Values]) -> Limits:

@@ -1,4 +1,4 @@
-"""The shape of a spec, which spec.schema.json describes: which keys there are and what kind of value each has.
+"""The shape of a spec: which keys there are and what kind of value each has.
 
 What the values mean depends on the task and is not checked here. Whoever reads the meaning of a part asks the document
 for it, and tells it what is wrong.
@@ -6,9 +6,8 @@ for it, and tells it what is wrong.
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ _TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
 _MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
 _MOST_SECONDS, _MOST_BYTES = 10**9, 10**18  # what system calls take
 _NONE = "none"
-_SYSTEM = '"family", a name of the catalogue, a path, or a list of these'
 
 Place = tuple[str | int, ...]
 
@@ -60,27 +58,43 @@ def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fract
     return amount
 
 
-def _read_system(value: Any) -> Any:
+def _read_system(value: Any) -> None:
     names = value if isinstance(value, list) else [value]
     if not all(isinstance(name, str) and name for name in names):
-        raise ValueError(f"found {show(value)}, expected {_SYSTEM}")
-    return value
+        raise ValueError(f'found {show(value)}, expected "family", a name of the catalogue, a path, or a list of these')
 
 
-# What has more than a type, by its format in the schema; each raises ValueError with a sentence.
-_READERS: Mapping[str, Callable[[Any], Any]] = {
-    "systems": _read_system,
-    "time-limit": read_time,
-    "memory-limit": read_memory,
-}
-_TYPES: Mapping[str, type] = {"string": str, "integer": int, "array": list, "object": dict}
+def _read_digits(value: Any) -> None:
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**63:
+        raise ValueError(f"found {show(value)}, expected a whole number of digits, at least 1")
+
+
+# A shape is a function that raises ValueError; or a type, what is expected in words, and the shape of what is in a list
+# or under every name of a table, or those under its only names.
+_ON_ERROR = (str, "refuse, or skip for systems that cannot be read")
+_LIMITS = (
+    dict,
+    "a table with time, memory, digits",
+    {"time": read_time, "memory": read_memory, "digits": _read_digits},
+)
+_ZIP = 'a list of lists of axes, e.g. [["m", "steps"]]'
+_EXPERIMENT = (
+    dict,
+    "a table",
+    {
+        "task": (str, "the name of a task, e.g. check-commute"),
+        "system": _read_system,
+        "options": (dict, "a table of options with their values"),
+        "axes": (dict, "a table of options with lists or ranges of values"),
+        "zip": (list, _ZIP, (list, _ZIP, (str, _ZIP))),
+        "on_error": _ON_ERROR,
+        "limits": _LIMITS,
+    },
+)
+_EXPERIMENTS = (dict, "at least one table [experiments.NAME]", _EXPERIMENT)
+_SPEC = {"name": (str, "text"), "on_error": _ON_ERROR, "limits": _LIMITS, "experiments": _EXPERIMENTS}
+_REQUIRED = ("experiments", "task")
 _OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
-
-
-def shape_schema() -> dict[str, Any]:
-    """The shape of a spec as a JSON schema, which is what a spec is checked against."""
-    found: dict[str, Any] = json.loads(Path(__file__).with_name("spec.schema.json").read_text(encoding="ascii"))
-    return found
 
 
 def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
@@ -89,55 +103,37 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
     """
-    schema = shape_schema()
-    found = _mistakes(document, schema, (), schema["$defs"], "")
+    found = _mistakes(document, (dict, "a table", _SPEC), ())
     return [(place, key_of(place), sentence) for place, sentence in found]
 
 
-def _mistakes(
-    value: Any, shape: Mapping[str, Any], place: Place, shared: Mapping[str, Any], expected: str
-) -> Iterator[tuple[Place, str]]:
-    """The places in a value that are not as a part of the schema says, and what is wrong there."""
-    shape = shared.get(shape.get("$ref", "").rpartition("/")[2], shape)
-    expected = shape.get("description", expected)
-    if reader := _READERS.get(shape.get("format", "")):
+def _mistakes(value: Any, shape: Any, place: Place) -> Iterator[tuple[Place, str]]:
+    """The places in a value that have not their shape, and what is wrong there."""
+    if callable(shape):
         try:
-            reader(value)
+            shape(value)
         except ValueError as error:
             yield place, str(error)
         return
-    is_right = isinstance(value, _TYPES[shape["type"]]) and not isinstance(value, bool)
-    if is_right and isinstance(value, int):
-        is_right = shape["minimum"] <= value <= shape["maximum"]
-    if not is_right or (isinstance(value, dict) and len(value) < shape.get("minProperties", 0)):
+    kind, expected, *inner = shape
+    if not isinstance(value, kind) or (shape is _EXPERIMENTS and not value):
         yield place, f"found {show(value)}, expected {expected}"
-    elif isinstance(value, list):
-        for k, item in enumerate(value):
-            yield from _mistakes(item, shape["items"], (*place, k), shared, expected)
-    elif isinstance(value, dict):
-        yield from _mistakes_of_table(value, shape, place, shared)
-
-
-def _mistakes_of_table(
-    table: Mapping[str, Any], shape: Mapping[str, Any], place: Place, shared: Mapping[str, Any]
-) -> Iterator[tuple[Place, str]]:
-    known, others = shape.get("properties", {}), shape.get("additionalProperties", True)
-    for name, part in known.items():
-        if name in table:
-            yield from _mistakes(table[name], part, (*place, name), shared, "")
-        elif name in shape.get("required", ()):
-            yield (*place, name), f"missing, expected {part['description']}"
-    for name in (name for name in table if name not in known):
-        here = (*place, name)
-        if isinstance(others, dict):
-            yield from _mistakes(table[name], others, here, shared, "")
-        elif not others:
-            hint = (
-                " (a system file is for the other commands)"
-                if here in _OF_SYSTEM_FILES
-                else suggestion(name, list(known))
-            )
-            yield here, f"unknown key, expected one of {', '.join(known)}{hint}"
+        return
+    (parts,) = inner or [None]
+    if isinstance(parts, tuple):
+        for name, item in enumerate(value) if kind is list else value.items():
+            yield from _mistakes(item, parts, (*place, name))
+    elif parts is not None:
+        for name, part in parts.items():
+            if name in value:
+                yield from _mistakes(value[name], part, (*place, name))
+            elif name in _REQUIRED:
+                yield (*place, name), f"missing, expected {part[1]}"
+        for name in (name for name in value if name not in parts):
+            here = (*place, name)
+            is_of_system = here in _OF_SYSTEM_FILES
+            hint = " (a system file is for the other commands)" if is_of_system else suggestion(name, list(parts))
+            yield here, f"unknown key, expected one of {', '.join(parts)}{hint}"
 
 
 def key_of(place: Place) -> str:
