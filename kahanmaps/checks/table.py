@@ -93,6 +93,7 @@ _CHECKS = [
         """,
         "they commute",
         is_of_pair=True,
+        for_batch="Do two Kahan maps commute, or all rational associated maps of a member of the family?",
     ),
     Check(
         "integrals",

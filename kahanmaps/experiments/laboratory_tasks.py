@@ -19,7 +19,7 @@ from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import Result, Whole, fields, summary, task
+from kahanmaps.experiments.registry import Result, Whole, analysis, fields, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
@@ -36,7 +36,7 @@ POISSON = {"symbolic": "symbols", "max_degree": "degree"}
 _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are known for all iterates
 
 
-@summary(
+@analysis(
     "degrees", "growth.degrees:degree_growth", of="map", eps=None, terms=None, max_degree=20_000, seconds=10, seed=0
 )
 def degrees(found: DegreeGrowth) -> Result:
@@ -79,7 +79,7 @@ def scan_parameters(
     }, found
 
 
-@summary(
+@analysis(
     "find-integrals", "preserve.integrals:find_integrals", eps=None, symbolic=None, max_degree=None, seconds=60, seed=0
 )
 def integrals(found: IntegralSearch) -> Result:
@@ -96,7 +96,7 @@ def integrals(found: IntegralSearch) -> Result:
     }
 
 
-@summary(
+@analysis(
     "find-density", "preserve.densities:find_densities", eps=None, symbolic=None, max_degree=None, seconds=30, seed=0
 )
 def density(found: DensitySearch) -> Result:
@@ -112,7 +112,7 @@ def density(found: DensitySearch) -> Result:
     }
 
 
-@summary(
+@analysis(
     "find-poisson",
     "preserve.poisson.poisson_tensors:find_poisson",
     renamed=POISSON,
@@ -137,7 +137,7 @@ def poisson(found: PoissonSearch) -> Result:
     }
 
 
-@summary("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", seconds=30)
+@analysis("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", seconds=30)
 def symmetry(found: Symmetries) -> Result:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
     return {
@@ -153,7 +153,7 @@ def symmetry(found: Symmetries) -> Result:
     }
 
 
-@summary(
+@analysis(
     "find-commuting",
     "symmetry.commuting:commuting_systems",
     of="system",
@@ -178,8 +178,8 @@ def commuting(found: CommutingSystems) -> Result:
     }
 
 
-@summary("analyze", "analysis:analyze", eps=None, symbolic=None, seconds=None, seed=0)
-def analysis(found: Analysis) -> Result:
+@analysis("analyze", "analysis:analyze", eps=None, symbolic=None, seconds=None, seed=0)
+def all_analyses(found: Analysis) -> Result:
     """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.system_normal_form import SystemNormalForm
 

@@ -8,7 +8,7 @@ The names of the parameters are names of `options.VOCABULARY`; a default makes a
 it is there, is the system. A result is plain data; "verdict" in it becomes the verdict of the record. What a function
 of the laboratory finds, with these options and these defaults, is a task that only says what is kept of it:
 
-    @summary("find-density", "preserve.densities:find_densities", eps=None, seconds=30, seed=0)
+    @analysis("find-density", "preserve.densities:find_densities", eps=None, seconds=30, seed=0)
     def density(found: DensitySearch) -> Result:
         '''The densities phi for which the measure dx/phi is invariant.'''
 
@@ -83,34 +83,38 @@ def fields(found: Any, *names: str) -> Result:
 _KINDS: dict[str, TaskKind] = {}
 
 
-def task(name: str, needs: str = SYSTEM, *, reports: bool = False) -> Callable[[Function], Function]:
+def task(
+    name: str, needs: str = SYSTEM, *, options: Mapping[str, Any] | None = None, reports: bool = False
+) -> Callable[[Function], Function]:
     """Register a function as a kind of task. Raises TypeError for a parameter that is no known option.
 
+    `options` with their defaults stand for the signature of a function that takes any: its system, and these by name.
     One that `reports` returns what it found beside the result: it is kept as "report" where that option asks for it.
     """
 
     def register(function: Function) -> Function:
-        parameters = dict(inspect.signature(function).parameters)
-        takes_system = parameters.pop("system", None) is not None
-        unknown = [key for key in parameters if key not in VOCABULARY]
+        names, defaults, takes_system = list(options or ()), dict(options or {}), True
+        if options is None:
+            parameters = dict(inspect.signature(function).parameters)
+            takes_system = parameters.pop("system", None) is not None
+            names = list(parameters)
+            defaults = {key: one.default for key, one in parameters.items() if one.default is not one.empty}
+        unknown = [key for key in names if key not in VOCABULARY]
         if unknown:
             raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
         if name in _KINDS and _KINDS[name].function.__code__ != function.__code__:  # equal: imported a second time
             raise TypeError(f"there are two tasks of the name {name}")
-        summary = (inspect.getdoc(function) or "").partition("\n")[0]
-        defaults = {
-            key: parameter.default for key, parameter in parameters.items() if parameter.default is not parameter.empty
-        }
-        options = {key: VOCABULARY[key] for key in parameters}
         if reports:
-            options[REPORT], defaults[REPORT] = VOCABULARY[REPORT], False
-        _KINDS[name] = TaskKind(name, summary, function, options, defaults, needs if takes_system else None, reports)
+            names, defaults[REPORT] = [*names, REPORT], False
+        known = {key: VOCABULARY[key] for key in names}
+        summary = (inspect.getdoc(function) or "").partition("\n")[0]
+        _KINDS[name] = TaskKind(name, summary, function, known, defaults, needs if takes_system else None, reports)
         return function
 
     return register
 
 
-def summary(
+def analysis(
     name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENTS, **defaults: Any
 ) -> Callable[[Summary], Summary]:
     """Register what a function of the laboratory ("module:name", loaded when it is called) finds, as a kind of task.
@@ -127,12 +131,8 @@ def summary(
             found = getattr(import_module(f"kahanmaps.laboratory.{module}"), attribute)(asked, **given)
             return summarize(found), found
 
-        parameters = [inspect.Parameter("system", inspect.Parameter.POSITIONAL_ONLY)]
-        for key, default in defaults.items():
-            parameters.append(inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default))
-        perform.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         perform.__doc__, perform.__module__ = summarize.__doc__, summarize.__module__
-        task(name, reports=True)(perform)
+        task(name, options=defaults, reports=True)(perform)
         return summarize
 
     return register

@@ -26,7 +26,7 @@ shape.py.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,8 +39,6 @@ MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000
 EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
 _LARGEST_TOLD = 3
-_VALUE = {"type": ["string", "integer", "number", "boolean"]}
-_VALUES = {"anyOf": [_VALUE, {"type": "array", "items": _VALUE, "minItems": 1}]}
 
 
 class SpecError(SystemFileError):
@@ -95,35 +93,21 @@ def parse_spec(
     kahanmaps.experiments.spec.SpecError: spec: 1 mistake
       experiments.a.task: there is no task 'orbot', expected one of ...; did you mean orbit?
     """
-    return _read(SpecDocument(_TOML.document(text, where), folder or Path(), skip_bad), where, max_tasks)
-
-
-def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:
+    document = SpecDocument(_TOML.document(text, where), folder or Path(), skip_bad)
     experiments = []
-    tables = document.sound("experiments") or {}
-    for name, table in tables.items():
+    for name, table in (document.sound("experiments") or {}).items():
         if not re.fullmatch(EXPERIMENT_NAME, name):
             expected = "expected a name of at most 80 letters, digits and the characters _ . + -"
             document.mistake(f"experiments.{name}", expected)
-        if isinstance(table, dict):
-            experiment = ExperimentReader(document, name).read()
-            if experiment is not None:
-                experiments.append(experiment)
+        if isinstance(table, dict) and (experiment := ExperimentReader(document, name).read()) is not None:
+            experiments.append(experiment)
     spec = Spec(document.sound("name") or "", tuple(experiments), document.documents)
     if spec.size > max_tasks:
-        document.mistake(
-            "experiments",
-            f"found {spec.size:,} tasks, expected at most {max_tasks:,} (--max-tasks allows more): "
-            + _largest(experiments),
-        )
+        largest = sorted(experiments, key=lambda experiment: -experiment.size)
+        told = ", ".join(f"{experiment.name} has {experiment.product}" for experiment in largest[:_LARGEST_TOLD])
+        more = f" and {len(largest) - _LARGEST_TOLD} more" if len(largest) > _LARGEST_TOLD else ""
+        sentence = f"found {spec.size:,} tasks, expected at most {max_tasks:,} (--max-tasks allows more): {told}{more}"
+        document.mistake("experiments", sentence)
     if document.mistakes:
         raise SpecError(where, document.mistakes)
     return spec
-
-
-def _largest(experiments: Sequence[Experiment]) -> str:
-    """What the largest experiments have, and how many more there are."""
-    by_size = sorted(experiments, key=lambda experiment: -experiment.size)
-    told = [f"{experiment.name} has {experiment.product}" for experiment in by_size[:_LARGEST_TOLD]]
-    more = len(experiments) - len(told)
-    return ", ".join(told) + (f" and {more} more" if more else "")

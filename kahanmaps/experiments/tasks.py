@@ -15,13 +15,12 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Report, Verdict
-from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.checks.table import CHECKS, Check
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, Whole, fields, task
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, SYSTEM, Result, Whole, fields, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.heights import height_growth
@@ -36,44 +35,24 @@ _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
 
 
-@task("check-commute", needs=MEMBER_OR_OTHER, reports=True)
-def commute(
-    system: SystemFile,
-    other: SystemFile | None = None,
-    eps: Any = None,
-    eps2: Any = None,
-    start: Any = None,
-    steps: int = 10,
-    seed: int = 0,
-    error_bits: int = DEFAULT_ERROR_BITS,
-    max_digits: int | None = None,
-) -> Whole:
-    """Do two Kahan maps commute, or all rational associated maps of a member of the family?"""
-    settings = _settings(eps, start, steps, seed, error_bits, max_digits)
-    return _of_report(check_commute(system, other, settings, eps2))
+_CHECKED = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
-def _of_one_system(check: Check) -> None:
-    """The task of a check that asks something of one system, with the usual settings."""
+def _checked(check: Check) -> None:
+    """The task of a check, with the usual settings; of one system, or of a pair at two time steps."""
 
-    def perform(
-        system: SystemFile,
-        eps: Any = None,
-        start: Any = None,
-        steps: int = 10,
-        seed: int = 0,
-        error_bits: int = DEFAULT_ERROR_BITS,
-        max_digits: int | None = None,
-    ) -> Whole:
-        return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)))
+    def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> Whole:
+        is_asked = options["start"] is not None or options["steps"] != Settings.steps
+        settings = Settings(**options, orbit_is_asked=is_asked)
+        return _of_report(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question
-    task(check.command, reports=True)(perform)
+    options = {"other": None, "eps": None, "eps2": None, **_CHECKED} if check.is_of_pair else _CHECKED
+    task(check.command, needs=MEMBER_OR_OTHER if check.is_of_pair else SYSTEM, options=options, reports=True)(perform)
 
 
 for _check in CHECKS.values():
-    if not _check.is_of_pair:
-        _of_one_system(_check)
+    _checked(_check)
 
 
 @task("verify", needs=MEMBER, reports=True)
@@ -256,18 +235,6 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     """A start for the system: one of the seed alone could lie on a curve on which the system is made to be special."""
     return next(random_starts(system.dim, seed_for(seed, system.map.subject)))
-
-
-def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_digits: int | None) -> Settings:
-    return Settings(
-        eps=eps,
-        start=start,
-        steps=steps,
-        seed=seed,
-        error_bits=error_bits,
-        max_digits=max_digits,
-        orbit_is_asked=start is not None or steps != Settings.steps,
-    )
 
 
 def _of_report(report: Report) -> Whole:
