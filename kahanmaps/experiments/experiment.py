@@ -60,10 +60,12 @@ class Experiment:
         """
         axes: dict[str, Any] = {}
         for name, values in self.grid.axes.items():
-            axes[name] = list(values) if not isinstance(values, Values) else []
-            for piece in values.pieces if isinstance(values, Values) else ():
+            if not isinstance(values, Values):
+                axes[name] = list(values)
+                continue
+            read, axes[name] = values.option.read, []
+            for piece in values.pieces:
                 if isinstance(piece, RationalRange):  # as its ends, not spelt out
-                    read = values.option.read
                     axes[name].append({"from": read(piece[0]), "to": read(piece[-1]), "count": len(piece)})
                 else:
                     axes[name].append(list(piece))

@@ -26,9 +26,13 @@ _SHOWN = 3  # tasks of each experiment in a dry run
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
-    missing = _missing(db, spec, options)
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
+    missing = None
+    if os.path.exists(db):  # it is asked, and not changed
+        with lib.Store.open(db, readonly=True) as store:
+            done = {row.task.key for row in store.rows() if row.record is not None}
+        missing = len({task.key for experiment in chosen for task in experiment.tasks()} - done)
     if options["as_json"]:
         data = [
             {
@@ -76,22 +80,31 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
     limits = {"max_tasks": options["max_tasks"] or lib.MAX_TASKS, "skip_bad": options["skip_bad"]}
     spec = None if path is None else lib.read_spec(path, **limits)
+    experiments = () if spec is None else spec.experiments
     if spec is not None:
-        require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
+        require_experiments(options["only"], [experiment.name for experiment in experiments])
     with lib.Store.open(db, create=spec is not None) as store:
         planned = {} if spec is None else lib.plan(spec, store)
-        names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
+        names = list(options["only"]) or ([e.name for e in experiments] if spec is not None else None)
         which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
-        todo = store.count_pending(**which, retry_failed=options["retry_failed"])
-        if not options["quiet"]:
-            for experiment in spec.experiments if spec is not None else ():
-                if experiment.skipped:
-                    say(f"{experiment.name}: {counted(len(experiment.skipped), 'system')} skipped (see batch status)")
-            _tell_plan(planned, todo, db)
+        progress = BatchProgress(store.count_pending(**which, retry_failed=options["retry_failed"]), options["quiet"])
+        for experiment in experiments:
+            if experiment.skipped:
+                progress.say(
+                    f"{experiment.name}: {counted(len(experiment.skipped), 'system')} skipped (see batch status)"
+                )
+        for name, plan in planned.items():
+            if not plan.is_resumed:
+                words = [_tasks(plan.total)]
+                words += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
+                words += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
+                progress.say(f"{name}: {', '.join(words)}")
+        todo = f"{_tasks(progress.todo)} to do, results go to {db}"
+        progress.say(todo if progress.todo else f"nothing to do: every task has a result in {db}")
         was_interrupted = False
-        with BatchProgress(todo, options["quiet"]) as progress:
-            if todo:
-                jobs = store.pending(**which, retry_failed=options["retry_failed"])
+        if progress.todo:
+            jobs = store.pending(**which, retry_failed=options["retry_failed"])
+            with progress:
                 was_interrupted = _do(jobs, store, progress, options)
         missing = store.count_pending(**which)
         data = status_data(store, names or ())
@@ -102,8 +115,35 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         print_json({**data, **more, "interrupted": interrupted, "seconds": round(progress.seconds, 3)})
     elif not options["as_jsonl"]:
         print_status(data)
-    if not options["quiet"]:
-        _tell_end(path, db, progress, missing, failed, interrupted, options)
+    if progress.done:
+        progress.say(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
+    if progress.lost:
+        progress.say(
+            f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "
+            f"{lib.TRIES} times ({progress.why_lost})"
+        )
+    words = [
+        "kahanmaps",
+        "batch",
+        "run",
+        *([f"./{path}" if path.startswith("-") else path] if path else []),
+        "--db",
+        db,
+    ]
+    for name in options["only"]:
+        words += ["-e", name]
+    for name in ("scheduler", "worker_python"):
+        if options[name] is not None:
+            words += [f"--{name.replace('_', '-')}", options[name]]
+    if options["shard"]:
+        words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
+    again = as_typed(words)
+    if missing:
+        how = "interrupted: " if interrupted else ""
+        progress.say(f"{how}{_tasks(missing)} without a result yet; to continue: {again}")
+    if failed:
+        why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
+        progress.say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
     if interrupted:
         return 130
     return 3 if failed or missing else 0
@@ -111,7 +151,10 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
 
 def _do(jobs: Iterator[lib.Job], store: lib.Store, progress: BatchProgress, options: Mapping[str, Any]) -> bool:
     """Do the jobs, each record stored before the next job is handed out; whether somebody interrupted."""
-    with closing(_executor(store, progress, options)) as executor:
+    number = options["jobs"] or lib.processors()
+    cluster = (options["scheduler"], options["worker_python"])
+    executor = lib.executor_for(store.document, number, *cluster, options["group_seconds"], progress.say)
+    with closing(executor):
         batch, is_told = lib.Batch(jobs, executor), False
         with interruptible(batch.interrupt):
             for records in batch:
@@ -126,72 +169,6 @@ def _do(jobs: Iterator[lib.Job], store: lib.Store, progress: BatchProgress, opti
                     for record in records:
                         click.echo(json.dumps({"record": "result", **record.to_json()}))
     return batch.was_interrupted
-
-
-def _executor(store: lib.Store, progress: BatchProgress, options: Mapping[str, Any]) -> lib.Executor:
-    return lib.executor_for(
-        store.document,
-        options["jobs"] or lib.processors(),
-        options["scheduler"],
-        options["worker_python"],
-        options["group_seconds"],
-        progress.say,
-    )
-
-
-def _tell_plan(planned: Mapping[str, lib.Planned], todo: int, db: str) -> None:
-    for name, found in planned.items():
-        if found.is_resumed:
-            continue
-        words = [_tasks(found.total), f"{found.new_tasks} of them new" if found.new_tasks < found.total else ""]
-        words.append(f"{found.dropped} of the earlier plan are not in it" if found.dropped else "")
-        say(f"{name}: {', '.join(filter(None, words))}")
-    say(f"{_tasks(todo)} to do, results go to {db}" if todo else f"nothing to do: every task has a result in {db}")
-
-
-def _tell_end(
-    path: str | None,
-    db: str,
-    progress: BatchProgress,
-    missing: int,
-    failed: int,
-    interrupted: bool,
-    options: Mapping[str, Any],
-) -> None:
-    if progress.done:
-        say(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
-    words = ["kahanmaps", "batch", "run", "--db", db]
-    if path:
-        words.insert(3, f"./{path}" if path.startswith("-") else path)
-    for name in options["only"]:
-        words += ["-e", name]
-    for name in ("scheduler", "worker_python"):
-        if options[name] is not None:
-            words += [f"--{name.replace('_', '-')}", options[name]]
-    if options["shard"]:
-        words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
-    again = as_typed(words)
-    why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
-    if progress.lost:
-        say(
-            f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "
-            f"{lib.TRIES} times ({progress.why_lost})"
-        )
-    if missing:
-        say(f"{'interrupted: ' if interrupted else ''}{_tasks(missing)} without a result yet; to continue: {again}")
-    if failed:
-        say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
-
-
-def _missing(db: str, spec: lib.Spec, options: Mapping[str, Any]) -> int | None:
-    """How many tasks have no result, if there is a database to ask; it is not changed."""
-    if not os.path.exists(db):
-        return None
-    with lib.Store.open(db, readonly=True) as store:
-        done = {row.task.key for row in store.rows() if row.record is not None}
-    names = options["only"] or [experiment.name for experiment in spec.experiments]
-    keys = {task.key for experiment in spec.experiments if experiment.name in names for task in experiment.tasks()}
-    return len(keys - done)
 
 
 def _tasks(number: int) -> str:
