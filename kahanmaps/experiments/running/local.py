@@ -92,7 +92,8 @@ class LocalWorkers:
         self._documents = documents
         self._group_seconds = group_seconds
         self._tries = tries
-        self._starts = 0
+        self._starts = 0  # of workers, one after the other, that were killed before they were ready
+        self._workers: list[_Worker] = []
         self._idle: list[_Worker] = []
         self._running: dict[Future[str], tuple[_Worker, _Attempt]] = {}
         self._ending: list[Thread] = []
@@ -128,7 +129,7 @@ class LocalWorkers:
 
     def close(self) -> None:
         """Kill every worker at once."""
-        for worker in [*self._idle, *(worker for worker, _ in self._running.values())]:
+        for worker in list(self._workers):
             self._end(worker)
         self._idle.clear()
         self._running.clear()
@@ -138,7 +139,11 @@ class LocalWorkers:
     def _begin(self, attempt: _Attempt) -> None:
         # What is tried again gets a fresh worker: one that has done nothing yet.
         is_retry = attempt.tries > 0 or attempt.had_fault
-        worker = self._idle.pop() if self._idle and not is_retry else _Worker()
+        if is_retry or not self._idle:
+            worker = _Worker()
+            self._workers.append(worker)  # before it is started: a second Ctrl-C may come now
+        else:
+            worker = self._idle.pop()
         attempt.begun = time.monotonic()
         try:
             future = worker.ask(attempt)
@@ -178,12 +183,13 @@ class LocalWorkers:
         # Pebble takes a worker that ended with status 0, or before it took the task, for a broken pool.
         status = error.exitcode if isinstance(error, ProcessExpired) else worker.exitcode
         found["stderr"] = printed = worker.printed()
+        is_ready = worker.is_ready
         self._end(worker)
         if isinstance(error, TimeoutError):
             message = f"not done within {attempt.job.limits.time:g} seconds"
             return _record_of({**found, "outcome": Outcome.TIMEOUT, "message": message})
         ended = f"the child {ending(status)}"
-        if not worker.is_ready:
+        if not is_ready:
             self._starts += 1
             if is_from_outside(status) and self._starts < MAX_STARTS:
                 return None
@@ -206,6 +212,7 @@ class LocalWorkers:
 
     def _end(self, worker: _Worker) -> None:
         """Kill a worker. Its pool takes some tenths of a second to notice, which nobody waits for here."""
+        self._workers.remove(worker)
         worker.kill()
         self._ending = [thread for thread in self._ending if thread.is_alive()]
         self._ending.append(Thread(target=worker.end, daemon=True))
@@ -271,7 +278,8 @@ class _Worker:
     def end(self) -> None:
         """Kill it, and leave no zombie, no thread and no open file."""
         self.kill()
-        self.pool.join()
+        with suppress(Exception):  # whatever pebble finds to say of a worker that is dead
+            self.pool.join()
         with suppress(FileNotFoundError):
             os.unlink(self._stderr.name)
         self._stderr.close()
