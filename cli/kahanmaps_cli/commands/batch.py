@@ -45,7 +45,7 @@ def _database(required: bool = True) -> Callable[[F], F]:
 
 @click.group("batch", cls=SuggestingGroup)
 def command() -> None:
-    """Thousands of experiments from one file: planned, run in child processes, stored, resumed.
+    """Thousands of experiments from one file: planned, run in worker processes, stored, resumed.
 
     \b
       kahanmaps batch run study.toml -j 2       # results go to study.db
@@ -67,7 +67,7 @@ def command() -> None:
     "--jobs",
     type=click.IntRange(1, 1024),
     metavar="N",
-    help="Child processes at a time (default: the processors).",
+    help="Worker processes at a time (default: the processors).",
 )
 @_ONLY
 @click.option("--shard", type=Shard(), metavar="I/N", help="Only the I-th of N parts: for job arrays.")
@@ -93,7 +93,7 @@ def command() -> None:
     metavar="T",
     default=5.0,
     show_default=True,
-    help="Short tasks share a child, or a command on the cluster, for so long.",
+    help="Short tasks share a worker process, or a command on the cluster, for so long.",
 )
 @click.option("--jsonl", "as_jsonl", is_flag=True, help="Every record on standard output, as it comes in.")
 @output_options
