@@ -46,6 +46,7 @@ START_UP = 60.0  # seconds a group may take beyond the limits of its jobs, on a 
 START_UP_OF_A_JOB = 5.0  # and for each job in it
 LARGEST_GROUP = 200  # jobs
 UNFIT_AFTER = 3  # groups that ended by themselves without a record, when there has never been one
+FETCH = 30.0  # seconds to fetch the output of a group that has ended
 LOOK_EVERY = 2.0  # seconds between two looks at who the workers are
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
 
@@ -210,20 +211,24 @@ class ClusterWorkers(Executor):
 
     def _taken(self, future: Any) -> list[Record]:
         """The records that a group has printed; jobs without one are put up for another try, alone, or lost."""
-        left = {job.task.key: job for job in self._groups.pop(future)}
+        left = {job.task.key: job for job in self._groups[future]}
         is_alone = len(left) == 1
         output: Any
         try:
-            output = future.result()
+            output = future.result(timeout=FETCH)
             message = f"the worker's command {ending(output.returncode)}"
             message += " and no record" if output.returncode == 0 else ""
             is_unfit = output.returncode >= 0
+        except TimeoutError:  # the worker has died with the output, and the scheduler has the command run again
+            self._results.add(future)
+            return []
         except subprocess.TimeoutExpired as error:
             output, is_unfit = error, False
             message = f"the worker's command did not end within {error.timeout:g} s"
         except Exception as error:
             output, is_unfit = None, "KilledWorker" not in type(error).__name__
             message = f"the worker could not run its command: {told(error)}"
+        del self._groups[future]
         with suppress(Exception):
             future.release()
         records: list[Record] = []
