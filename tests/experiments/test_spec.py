@@ -138,55 +138,38 @@ def test_a_second_system_is_a_recipe_like_the_first(folder):
 # Keys
 
 
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + 'options = {eps = "2/20"}'),
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {time_step = 2e-1}"),
-        (LORENZ + "axes = {eps = 1000.5}", LORENZ + "axes = {eps = 1_000.5}"),
-        (LORENZ + "axes = {eps = 1, steps = 5}", LORENZ + 'axes = {steps = "5.0", eps = "1"}'),
-        (LORENZ + "axes = {eps = 1}", LORENZ + 'axes = {eps = 1, steps = 100, arithmetic = "exact", seed = 0}'),
-        (
-            LORENZ + "axes = {eps = 1}",
-            LORENZ + 'axes = {eps = 1, parameters = {s = 10, b = "16/6"}}\nlimits = {time = 5, memory = 1000}',
-        ),
-        (LORENZ + 'axes = {eps = 1, start = "1/2, -1/3, 0"}', LORENZ + 'axes = {eps = 1, start = "0.5,-2/6,0"}'),
-
-        (LORENZ + "axes = {eps = 1, max_digits = 9}", LORENZ + "axes = {eps = 1}\nlimits = {digits = 9}"),
-        (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, draw = "eigenvalues", size = 2}'),
-
-        (
-            FAMILY + 'axes = {eps = 1, m = 2, draw = "generic"}',
-            FAMILY + 'axes = {eps = 1, m = 2, draw = "generic", size = 1}',
-        ),
-        (FAMILY + 'axes = {eps = 1, chi = "t^2-2"}', FAMILY + 'axes = {eps = 1, chi = "2*t^2 - 4", size = 1}'),
-
-        ('[experiments.b]\ntask = "orbit"\nsystem = ["lorenz"]\naxes = {eps = 1}', LORENZ + "axes = {eps = 1}"),
-    ],
-)  # fmt: skip
-def test_the_same_question_has_the_same_key(one, other):
-    assert task_of(one).key == task_of(other).key
+SAME_KEYS = [
+    (LORENZ + "axes = {eps = 0.1}", LORENZ + 'options = {eps = "2/20"}'),
+    (LORENZ + "axes = {eps = 1000.5}", LORENZ + "axes = {eps = 1_000.5}"),
+    (LORENZ + "axes = {eps = 1}", LORENZ + 'axes = {eps = 1, steps = 100, arithmetic = "exact", seed = 0}'),
+    (LORENZ + "axes = {eps = 1}", LORENZ + 'axes = {eps = 1, parameters = {s = 10, b = "16/6"}}\nlimits = {time = 5}'),
+    (LORENZ + 'axes = {eps = 1, start = "1/2, -1/3, 0"}', LORENZ + 'axes = {eps = 1, start = "0.5,-2/6,0"}'),
+    (LORENZ + "axes = {eps = 1, max_digits = 9}", LORENZ + "axes = {eps = 1}\nlimits = {digits = 9}"),
+    (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, draw = "eigenvalues", size = 2}'),
+    (FAMILY + 'axes = {eps = 1, chi = "t^2-2"}', FAMILY + 'axes = {eps = 1, chi = "2*t^2 - 4", size = 1}'),
+    ('[experiments.b]\ntask = "orbit"\nsystem = ["lorenz"]\naxes = {eps = 1}', LORENZ + "axes = {eps = 1}"),
+]
+OTHER_KEYS = [
+    (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {time_step = 0.1}"),
+    (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1}\nlimits = {digits = 9}"),
+    (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1, parameters = {s = 11}}"),
+    (LORENZ + "axes = {eps = 1}", LORENZ.replace("orbit", "heights") + "axes = {eps = 1}"),
+    (LORENZ + 'axes = {eps = 1, start = "1,2,3"}', LORENZ + 'axes = {eps = 1, start = "1,3,2"}'),
+    (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, draw = "generic"}'),
+    (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, signs = "1,-1"}'),
+    (FAMILY + 'axes = {eps = 1, eigenvalues = "1,2"}', FAMILY + 'axes = {eps = 1, eigenvalues = "2,1"}'),
+    (
+        COMMUTE + 'system = "lorenz"\naxes = {other = "euler_top"}',
+        COMMUTE + 'system = "euler_top"\naxes = {other = "lorenz"}',
+    ),
+]
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        (LORENZ + "axes = {eps = 0.1}", LORENZ + "axes = {time_step = 0.1}"),
-        (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1}\nlimits = {digits = 9}"),
-        (LORENZ + "axes = {eps = 1}", LORENZ + "axes = {eps = 1, parameters = {s = 11}}"),
-        (LORENZ + "axes = {eps = 1}", LORENZ.replace("orbit", "heights") + "axes = {eps = 1}"),
-        (LORENZ + 'axes = {eps = 1, start = "1,2,3"}', LORENZ + 'axes = {eps = 1, start = "1,3,2"}'),
-        (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, draw = "generic"}'),
-        (FAMILY + "axes = {eps = 1, m = 2}", FAMILY + 'axes = {eps = 1, m = 2, signs = "1,-1"}'),
-        (FAMILY + 'axes = {eps = 1, eigenvalues = "1,2"}', FAMILY + 'axes = {eps = 1, eigenvalues = "2,1"}'),
-        (
-            COMMUTE + 'system = "lorenz"\naxes = {other = "euler_top"}',
-            COMMUTE + 'system = "euler_top"\naxes = {other = "lorenz"}',
-        ),
-    ],
+    ("one", "other", "is_same"), [(*pair, True) for pair in SAME_KEYS] + [(*pair, False) for pair in OTHER_KEYS]
 )
-def test_different_questions_have_different_keys(one, other):
-    assert task_of(one).key != task_of(other).key
+def test_the_same_question_has_the_same_key_and_another_one_another_key(one, other, is_same):
+    assert (task_of(one).key == task_of(other).key) is is_same
 
 
 @settings(max_examples=20)
@@ -258,25 +241,17 @@ def test_a_range_and_the_list_of_its_values_are_two_definitions_of_the_same_task
 
 
 @pytest.mark.parametrize(
-    ("time", "seconds"),
+    ("name", "written", "limit"),
     [
-        ("1.5", 1.5), ('"90s"', 90.0), ('"1.5 min"', 90.0), ('"2 h"', 7200.0), ('"1 d"', 86400.0), ('"none"', None),
-        ("1e3", 1000.0), ("0.001", 0.001), ('" 5 "', 5.0),
+        ("time", "1.5", 1.5), ("time", '"90s"', 90.0), ("time", '"1.5 min"', 90.0), ("time", '"2 h"', 7200.0),
+        ("time", '"1 d"', 86400.0), ("time", "1e3", 1000.0), ("time", '" 5 "', 5.0), ("time", '"none"', None),
+        ("memory", "1000", 1000), ("memory", '"500 MB"', 500_000_000), ("memory", '"4.35 GB"', 4_350_000_000),
+        ("memory", '"2GiB"', 2**31), ("memory", '"1 KiB"', 1024), ("memory", '"1 TB"', 10**12),
+        ("memory", "2_000_000", 2_000_000), ("memory", '"none"', None),
     ],
 )  # fmt: skip
-def test_a_limit_of_time_is_in_seconds_unless_it_says_otherwise(time, seconds):
-    assert only(LORENZ + f"axes = {{eps = 1}}\nlimits = {{time = {time}}}").limits.time == seconds
-
-
-@pytest.mark.parametrize(
-    ("memory", "size"),
-    [
-        ("1000", 1000), ('"500 MB"', 500_000_000), ('"1.1 GB"', 1_100_000_000), ('"2GiB"', 2**31), ('"1 KiB"', 1024),
-        ('"4.35 GB"', 4_350_000_000), ('"1 kB"', 1000), ('"none"', None), ("2_000_000", 2_000_000), ('"1 TB"', 10**12),
-    ],
-)  # fmt: skip
-def test_a_limit_of_memory_is_in_bytes_unless_it_says_otherwise(memory, size):
-    assert only(LORENZ + f"axes = {{eps = 1}}\nlimits = {{memory = {memory}}}").limits.memory == size
+def test_a_limit_is_in_seconds_or_bytes_unless_it_says_otherwise(name, written, limit):
+    assert getattr(only(LORENZ + f"axes = {{eps = 1}}\nlimits = {{{name} = {written}}}").limits, name) == limit
 
 
 def test_there_are_limits_where_nothing_is_said():
