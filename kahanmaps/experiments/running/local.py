@@ -22,11 +22,14 @@ from concurrent.futures import wait as wait_for
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from fcntl import F_SETFL, fcntl
 from functools import cache
 from importlib.metadata import version
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from signal import SIGKILL, Signals
-from tempfile import NamedTemporaryFile
+from stat import S_IRUSR, S_IWUSR
+from tempfile import TemporaryFile
 from threading import Lock, Thread
 from types import ModuleType
 from typing import Any
@@ -232,14 +235,17 @@ class _Worker:
         self.seconds = 0.0
         self.is_fresh = True  # it has done nothing yet
         self._documents: set[str] = set()
-        self._stderr = NamedTemporaryFile(delete=False)  # noqa: SIM115 (closed by `end`)
+        with TemporaryFile() as file:
+            # What it prints. A connection, since that is how multiprocessing hands over a file without a name.
+            self._output = Connection(os.dup(file.fileno()))
+        fcntl(self._output.fileno(), F_SETFL, os.O_APPEND)
         self._context = _Context()
-        begin = (os.getpid(), self._stderr.name)
+        begin = (os.getpid(), self._output)
         self.pool: Any = ProcessPool(1, initializer=_begin, initargs=begin, context=self._context)
 
     def ask(self, attempt: _Attempt) -> Future[str]:
         """The answer to a task."""
-        self._stderr.truncate(0)
+        os.ftruncate(self._output.fileno(), 0)
         new = {key: text for key, text in attempt.documents.items() if key not in self._documents}
         self._documents.update(new)
         job = attempt.job
@@ -260,12 +266,12 @@ class _Worker:
     @property
     def is_ready(self) -> bool:
         """Whether it has begun to wait for tasks."""
-        return not os.path.exists(self._stderr.name)
+        return not os.fstat(self._output.fileno()).st_mode & S_IWUSR
 
     def printed(self) -> str:
         """The end of what it printed since its task began."""
-        begin = max(0, os.fstat(self._stderr.fileno()).st_size - TAIL)
-        return os.pread(self._stderr.fileno(), TAIL, begin).decode("utf-8", "replace").strip()
+        begin = max(0, os.fstat(self._output.fileno()).st_size - TAIL)
+        return os.pread(self._output.fileno(), TAIL, begin).decode("utf-8", "replace").strip()
 
     def kill(self) -> None:
         """End it with all that its tasks have started."""
@@ -280,9 +286,7 @@ class _Worker:
         self.kill()
         with suppress(Exception):  # whatever pebble finds to say of a worker that is dead
             self.pool.join()
-        with suppress(FileNotFoundError):
-            os.unlink(self._stderr.name)
-        self._stderr.close()
+        self._output.close()
 
 
 class _Context(SpawnContext):
@@ -379,20 +383,19 @@ class _Here:
 _here = _Here()
 
 
-def _begin(parent: int, stderr: str) -> None:
+def _begin(parent: int, output: Connection) -> None:
     """Prepare the worker: pebble calls this once, before the first task."""
     end_with_parent(parent)
     os.setpgid(0, 0)  # what tasks start ends with the group; and Ctrl-C in a terminal reaches the parent alone
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler would wait for the end of a call of FLINT
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # which pebble ignores
     # The answers have their own pipe: whatever tasks print goes to the file, and what they read is empty.
-    output, nothing = os.open(stderr, os.O_WRONLY | os.O_APPEND), os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.dup2(output, 1)
-    os.dup2(output, 2)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(output.fileno(), 1)
+    os.dup2(output.fileno(), 2)
     task_kinds()  # importing them is no part of any task
     _here.pid, _here.idle = os.getpid(), _address_space()
-    os.unlink(stderr)  # this tells the parent that the worker is ready
+    os.fchmod(output.fileno(), S_IRUSR)  # this tells the parent that the worker is ready
 
 
 def _answer(text: str, memory: int | None, documents: dict[str, str]) -> str:
