@@ -46,7 +46,6 @@ from kahanmaps.version import __version__
 # has no result, and the next run tries it as often again.
 TRIES = 5
 GROUP_SECONDS = 5.0  # of work for one worker: starting it costs about a fifth of a second
-MAX_STARTS = 20  # workers killed one after the other before they are ready: then there is no use in more
 TAIL = 2000  # characters that are kept of a message, a traceback, or what a worker printed
 
 # Words with which Python, FLINT, GMP and OpenBLAS end where there is no memory.
@@ -95,7 +94,6 @@ class LocalWorkers:
         self._documents = documents
         self._group_seconds = group_seconds
         self._tries = tries
-        self._starts = 0  # of workers, one after the other, that were killed before they were ready
         self._workers: list[_Worker] = []
         self._idle: list[_Worker] = []
         self._running: dict[Future[str], tuple[_Worker, _Attempt]] = {}
@@ -170,7 +168,6 @@ class LocalWorkers:
             except (ValueError, RecursionError) as wrong:  # an integer of more digits than are read here
                 found |= {"outcome": Outcome.FAILED, "message": f"the result cannot be kept: {wrong}"}
             worker.seconds += found["seconds"]
-            self._starts = 0
             # A traceback: nobody expected this, so it may be the fault of what was done before.
             is_doubtful = found["outcome"] == Outcome.FAILED and "stderr" in found
             is_exhausted = found["outcome"] == Outcome.OUT_OF_MEMORY  # what is left of the memory nobody knows
@@ -192,13 +189,9 @@ class LocalWorkers:
             message = f"not done within {attempt.job.limits.time:g} seconds"
             return _record_of({**found, "outcome": Outcome.TIMEOUT, "message": message})
         ended = f"the child {ending(status)}"
-        if not is_ready:
-            self._starts += 1
-            if is_from_outside(status) and self._starts < MAX_STARTS:
-                return None
+        if not is_ready and not is_from_outside(status):
             told = printed or "it says nothing"
             raise WorkersError(f"a worker process cannot start (it {ending(status)}): {told}")
-        self._starts = 0
         if is_from_outside(status):
             attempt.tries += 1
             if attempt.tries < self._tries:
