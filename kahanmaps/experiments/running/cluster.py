@@ -101,6 +101,7 @@ class ClusterWorkers(Executor):
         self._unfit_groups = 0
         self._client = connect(address, connect_seconds)
         self._results = import_module("distributed").as_completed(loop=self._client.loop)
+        self._lost: str | None = None  # why the scheduler is lost
         self._threads, self._looked, self._is_told = 0, -LOOK_EVERY, False
         self._look()
 
@@ -142,14 +143,14 @@ class ClusterWorkers(Executor):
                 time.sleep(0.01)
             futures = self._results.next_batch(block=False) if is_ready else []
             self._look()
+            records = [record for future in futures if self._is_connected for record in self._taken(future)]
+            if records or (self._is_connected and time.monotonic() >= deadline):
+                return records
             if not self._is_connected:
                 raise ClusterLost(
-                    f"the scheduler at {self.address} is lost (the connection was closed): what was recorded is safe; "
-                    "run the same command again once the scheduler is back"
+                    f"the scheduler at {self.address} is lost ({self._lost or 'the connection was closed'}): what was "
+                    "recorded is safe; run the same command again once the scheduler is back"
                 )
-            records = [record for future in futures for record in self._taken(future)]
-            if records or time.monotonic() >= deadline:
-                return records
 
     def close(self) -> None:
         """End at once, whether or not the scheduler is still there; it and its workers stay. May be called twice.
@@ -170,7 +171,7 @@ class ClusterWorkers(Executor):
 
     @property
     def _is_connected(self) -> bool:
-        return bool(self._client.status == "running")
+        return self._lost is None and self._client.status == "running"
 
     def _look(self) -> None:
         """Count the workers' threads now and then, and say once when there are none."""
@@ -196,18 +197,22 @@ class ClusterWorkers(Executor):
         # The limits of a task are kept by the command: this is for a command that hangs.
         timeout = None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
         # distributed warns of arguments beyond 10 MB: a single document may be as large.
-        with suppress(Exception), warnings.catch_warnings(action="ignore"):
-            future = self._client.submit(
-                subprocess.run,
-                self._command,
-                input=json.dumps(group).encode(),
-                capture_output=True,
-                timeout=timeout,
-                pure=False,
-                key=f"kahanmaps-{uuid.uuid4().hex}",
-            )
-            self._groups[future] = jobs
-            self._results.add(future)
+        with warnings.catch_warnings(action="ignore"):
+            try:
+                future = self._client.submit(
+                    subprocess.run,
+                    self._command,
+                    input=json.dumps(group).encode(),
+                    capture_output=True,
+                    timeout=timeout,
+                    pure=False,
+                    key=f"kahanmaps-{uuid.uuid4().hex}",
+                )
+            except Exception as error:  # the client has closed itself after losing the scheduler
+                self._lost = self._lost or told(error)
+                return
+        self._groups[future] = jobs
+        self._results.add(future)
 
     def _taken(self, future: Any) -> list[Record]:
         """The records that a group has printed; jobs without one are put up for another try, alone, or lost."""
@@ -226,6 +231,9 @@ class ClusterWorkers(Executor):
             output, is_unfit = error, False
             message = f"the worker's command did not end within {error.timeout:g} s"
         except Exception as error:
+            if future.status != "error":  # no error of the command's, but of the way to it
+                self._lost = self._lost or told(error)
+                return []
             output, is_unfit = None, "KilledWorker" not in type(error).__name__
             message = f"the worker could not run its command: {told(error)}"
         del self._groups[future]
