@@ -152,14 +152,6 @@ def test_the_theorem_leaves_out_factors_without_variables_and_wants_numbers_in_f
     assert module._theorem(Laboratory(file, ())) is None
 
 
-def test_a_density_without_a_closed_form_is_told():
-    laboratory = SimpleNamespace(formulas=lambda *_: SimpleNamespace(bases=None, reason="too long"))
-    assert module._formulas(laboratory, None, 3, 0.0) == (
-        [],
-        "there is a density of degree 3 modulo primes, but no closed form: too long",
-    )
-
-
 def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.densities._MAX_DEGREE", 3)
     top = System("x' = y*z; y' = -3*x*z; z' = 2*x*y")
@@ -174,30 +166,6 @@ def test_random_systems_have_none(dim, seed):
     found = find_densities(random_system(dim, seed), max_degree=5)
     assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
     assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
-
-
-def with_densities_from(degree, monkeypatch):
-    """The degrees that are tried, where the space of each from this one on is not empty."""
-    tried = []
-
-    def space(map_, degree_, model=None):
-        tried.append(degree_)
-        return SimpleNamespace(basis=[1] * (degree_ >= degree))
-
-    monkeypatch.setattr(module, "_space", space)
-    return tried
-
-
-def test_degrees_are_leapt_over_only_where_there_is_nothing(monkeypatch):
-    tried, told = with_densities_from(5, monkeypatch), []
-    found = list(module._spaces(None, [0, 1, 2, 4, 7, 9], inf, told.append))
-    assert [(degree, bool(space.basis)) for degree, space in found] == [
-        *((0, False), (1, False), (2, False), (4, False)),
-        *((5, True), (6, True), (7, True), (8, True), (9, True)),
-    ]
-    assert tried == [0, 1, 2, 4, 7, 5, 6, 9, 8]
-    assert told == [f"densities of degree {degree}" for degree in tried]
-    assert list(module._spaces(None, [0, 1], 0, told.append)) == []  # the time is over
 
 
 def test_where_points_give_out_the_last_degree_that_was_tried_is_said(monkeypatch):

@@ -152,7 +152,12 @@ def closed_forms(
     that of a polynomial in the symbols included. With a `root` the only symbol stands for it.
     """
     supports = [space.support for space in model]
-    places = [_places(space) for space in model]
+    # Echelon forms end in a 1 at the largest monomial; the places of other entries than this and zeros are unknown.
+    pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
+    places = [
+        [(i, k) for i, vector in enumerate(space.basis) for k, c in enumerate(vector) if c and k != ends[i]]
+        for space, ends in zip(model, pivots, strict=True)
+    ]
 
     def box(prime: int, values: tuple[int, ...]) -> tuple[int, ...] | None:
         try:
@@ -176,48 +181,24 @@ def closed_forms(
         if answer.functions is None:
             return ClosedForms(None, answer.reason)
         functions += answer.functions
-    context = ring((*variables, *symbols, "eps"))
-    bases = []
-    for space, cells in zip(model, places, strict=True):
-        coefficients = {cell: functions.pop(0) for cell in cells}
-        basis = [_polynomial(space, i, coefficients, context, len(variables)) for i in range(len(space.basis))]
-        if root is not None:
-            basis = [primitive_over(root, P, len(variables)) for P in basis]
-        bases.append([_weighted(P, len(variables)) for P in basis] if eps_enters == "by weight" else basis)
+    context, n = ring((*variables, *symbols, "eps")), len(variables)
+    gens, bases = context.gens()[n:], []
+    for space, ends, cells in zip(model, pivots, places, strict=True):
+        coefficients, monomials = {cell: functions.pop(0) for cell in cells}, exponents_up_to(space.dim, space.degree)
+        basis = []
+        for row, pivot in enumerate(ends):
+            mine = {k: function for (i, k), function in coefficients.items() if i == row}
+            numerators, denominator = over_one_denominator(list(mine.values()), context, gens)
+            P = context.constant(0)
+            for k, factor in (*zip(mine, numerators, strict=True), (pivot, denominator)):
+                P = P + factor * context.from_dict({(*monomials[k], *([0] * len(gens))): 1})
+            P = primitive_part(P)[1]
+            if root is not None:
+                P = primitive_over(root, P, n)
+            if eps_enters == "by weight":  # P(eps x), divided by a power of eps
+                degrees = {monomial: sum(map(int, monomial[:n])) for monomial in P.monoms()}
+                least = min(degrees.values())
+                P = context.from_dict({(*m[:-1], degrees[m] - least): c for m, c in P.terms()})
+            basis.append(P)
+        bases.append(basis)
     return ClosedForms(bases)
-
-
-def _places(space: DarbouxSpace) -> list[tuple[int, int]]:
-    """Where the basis has entries other than the zeros and ones of the echelon form."""
-    pivots = [_leading(vector) for vector in space.basis]
-    return [
-        (i, k) for i, vector in enumerate(space.basis) for k, entry in enumerate(vector) if entry and k != pivots[i]
-    ]
-
-
-def _weighted(polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
-    """P(eps x), divided by a power of eps."""
-    least = min(sum(int(e) for e in monomial[:n]) for monomial in polynomial.monoms())
-    weighted: fmpq_mpoly = polynomial.context().from_dict(
-        {(*m[:-1], sum(int(e) for e in m[:n]) - least): coefficient for m, coefficient in polynomial.terms()}
-    )
-    return weighted
-
-
-def _leading(vector: list[int]) -> int:
-    return max(k for k, entry in enumerate(vector) if entry)
-
-
-def _polynomial(
-    space: DarbouxSpace, row: int, coefficients: dict[tuple[int, int], RationalFunction], context: Any, n: int
-) -> fmpq_mpoly:
-    """One polynomial of the basis, cleared of denominators and primitive."""
-    monomials = exponents_up_to(space.dim, space.degree)
-    mine = {k: function for (i, k), function in coefficients.items() if i == row}
-    pivot = _leading(space.basis[row])
-    gens = context.gens()[n:]
-    above, below = over_one_denominator(list(mine.values()), context, gens)
-    total = context.constant(0)
-    for k, factor in (*zip(mine, above, strict=True), (pivot, below)):
-        total = total + factor * context.from_dict({(*monomials[k], *([0] * len(gens))): 1})
-    return primitive_part(total)[1]

@@ -8,7 +8,7 @@ are found by their exponents (products.py). Source: celledoni-2019.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import comb, prod
@@ -39,13 +39,12 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
+from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period, require_time
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
-_CLOSES_WITHIN = 64  # points of an orbit
 _ONCE = CofactorProduct((1,), 1)
 
 
@@ -197,7 +196,7 @@ def find_densities(
     laboratory, deadline = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True), time.monotonic() + seconds
     if laboratory.defect:
         return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
-    period = None if flow else _period(laboratory)
+    period = None if flow else closing_period(laboratory.maps)
     product = turning = None
     theorem, dim, cut = _theorem(laboratory), laboratory.map.dim, ""
     if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
@@ -206,8 +205,13 @@ def find_densities(
         progress("densities that are products")
         product, turning = _products(laboratory, max_degree)
         densities, tried, cut = _search(laboratory, product, max_degree, deadline, progress)
-        if densities and all(one.verdict is not Verdict.PROVED for one in densities):
-            densities = [*_product_of_variables(laboratory, max_degree), *densities]
+        none_proved = densities and all(one.verdict is not Verdict.PROVED for one in densities)
+        if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
+            # x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree.
+            x = ring(laboratory.map.names).gens()
+            phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
+            proof = product_density_invariant(laboratory.system, phi)
+            densities = densities if proof is None else [FoundDensity(phi, Verdict.PROVED, proof), *densities]
     found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
     if found.is_open and time.monotonic() < deadline:
         if integrals is None:
@@ -244,16 +248,33 @@ def _search(
     """Densities, the largest degree that was tried, and what ended it; the product where none is simpler."""
     dim = laboratory.map.dim
     top = max_degree if max_degree is not None else _MAX_DEGREE
-    top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
-    # With a product in hand only lower degrees are worth a part of the time, and the others of its own degree.
-    until = deadline if product is None else time.monotonic() + (deadline - time.monotonic()) / 3
-    top = top if product is None else min(top, product.degree(dim))
-    leaps = _leaps(dim, top) if product is None else [*_leaps(dim, top - 1), top]
+    top, until = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0), deadline
+    if product is not None:
+        # Only lower degrees are worth a part of the time then, and the others of its own degree.
+        until, top = time.monotonic() + (deadline - time.monotonic()) / 3, min(top, product.degree(dim))
     tried = -1
     try:
-        for degree, first in _spaces(laboratory.maps[0], leaps, until, progress):
-            if first.basis and len(first.basis) == len(_space(laboratory.maps[1], degree, first).basis):
-                found, reason = _formulas(laboratory, first, degree, deadline)
+        for degree in range(top + 1):
+            if time.monotonic() > until:
+                break
+            progress(f"densities of degree {degree}")
+            model = _space(laboratory.maps[0], degree)
+            if model.basis and len(model.basis) == len(_space(laboratory.maps[1], degree, model).basis):
+                found, reason = list[FoundDensity](), ""
+
+                def spaces_on(
+                    map_: ModularMap, degree: int = degree, model: DarbouxSpace = model
+                ) -> list[DarbouxSpace]:
+                    return [_space(map_, degree, model)]
+
+                forms = laboratory.formulas([model], spaces_on, deadline)
+                if forms.bases is None:
+                    reason = f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
+                for P in [] if forms.bases is None else forms.bases[0]:
+                    phi = RationalFunction(P, P.context().constant(1))
+                    verdict, evidence = _judged(laboratory, phi)
+                    found += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
+                    reason = f"a density of degree {degree} that was found modulo primes did not pass as an identity"
                 if found or product is None:
                     return found, degree, reason
             tried = degree
@@ -262,51 +283,6 @@ def _search(
     if product is not None:
         return [product], product.degree(dim), ""
     return [], tried, "" if tried == top else f"the time was over at degree {tried + 1}"
-
-
-def _leaps(dim: int, top: int) -> list[int]:
-    """Degrees up to `top`: up to each there are at most half as many monomials as up to the one listed after it, if so.
-
-    >>> _leaps(3, 12), _leaps(6, 5), _leaps(1, 7)
-    ([0, 1, 2, 4, 6, 9, 12], [0, 1, 2, 3, 4, 5], [0, 1, 3, 7])
-    """
-    if top < 0:
-        return []
-    below = (d for d in range(top - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + top, top))
-    return [*_leaps(dim, next(below, top - 1)), top]
-
-
-def _spaces(
-    map_: ModularMap, leaps: Sequence[int], until: float, progress: Callable[[str], None]
-) -> Iterator[tuple[int, DarbouxSpace]]:
-    """The spaces of the degrees in `leaps` and, before one that is not empty, those of the degrees it leapt over.
-
-    Where the space of a leap is empty, so are those of lower degrees. It ends when the time is over.
-    """
-    below = -1
-    for leap in leaps:
-        if time.monotonic() > until:
-            return
-        progress(f"densities of degree {leap}")
-        whole = _space(map_, leap)
-        for degree in range(below + 1, leap) if whole.basis else ():
-            if time.monotonic() > until:
-                return
-            progress(f"densities of degree {degree}")
-            yield degree, _space(map_, degree)
-        yield leap, whole
-        below = leap
-
-
-def _product_of_variables(laboratory: Laboratory, max_degree: int | None) -> list[FoundDensity]:
-    """x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree: proved ones come first."""
-    system = laboratory.system
-    if system is None or laboratory.flow or (max_degree is not None and system.dim > max_degree):
-        return []
-    x = ring(laboratory.map.names).gens()
-    phi = RationalFunction(prod(x[: system.dim], start=x[0] ** 0), x[0] ** 0)
-    proof = product_density_invariant(system, phi)
-    return [] if proof is None else [FoundDensity(phi, Verdict.PROVED, proof)]
 
 
 def _products(
@@ -318,8 +294,7 @@ def _products(
         found = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), parts)).density
     except NoPoint:
         return None, None
-    phi = None if found is None else found.function
-    if found is None or phi is None:
+    if found is None or (phi := found.function) is None:
         return None, None
     verdict, evidence = _judged(laboratory, phi, found.constant)
     one = FoundDensity(phi, verdict, evidence, found.text)
@@ -361,32 +336,7 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Verdict.PROVED, evidence)
 
 
-def _period(laboratory: Laboratory) -> int | None:
-    """The number of points of orbits that close soon, on all maps; None where they do not."""
-    try:
-        periods = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in laboratory.maps}
-    except NoPoint:
-        return None
-    period = periods.pop()
-    return None if periods or period == _CLOSES_WITHIN else period
-
-
 def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
     """The P of degree at most `degree` with P(x~) = det dPhi P(x), and with the monomials of the model."""
     sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, *([] if model is None else [model])))
     return cofactor_space(sample, _ONCE, degree, model)
-
-
-def _formulas(
-    laboratory: Laboratory, model: DarbouxSpace, degree: int, deadline: float
-) -> tuple[list[FoundDensity], str]:
-    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree, model)], deadline)
-    if forms.bases is None:
-        return [], f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
-    found = []
-    for P in forms.bases[0]:
-        phi = RationalFunction(P, P.context().constant(1))
-        verdict, evidence = _judged(laboratory, phi)
-        if verdict.holds:
-            found.append(FoundDensity(phi, verdict, evidence))
-    return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

@@ -67,28 +67,10 @@ def verdict_on(
     'proved'
     """
     map_ = as_map(given)
-    identity = _identity(map_, function, eps, is_density, factor)
-    return judged(identity, seed, expands=expands and map_.dim <= MAX_DIMENSION)
-
-
-def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verdict, Evidence]:
-    """The verdict on an identity, by random points and, if `expands`, by expansion."""
-    decision = decide(identity, seed)
-    found = settle(identity, decision, seed, _BUDGET) if expands else decision
-    return found.verdict, found.evidence
-
-
-def _identity(
-    map_: BirationalMap,
-    function: RationalFunction,
-    eps: fmpq | None,
-    is_density: bool,
-    factor: RationalFunction | None,
-) -> Identity:
-    """P(x~) Q(x) = P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
     n, root = map_.dim, map_.root
 
     def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
+        """P(x~) Q(x) and P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
         point, symbols = place[:n], place[n:]
         over = map_.at(step, field, symbols)
         image = over.step(point)
@@ -116,4 +98,14 @@ def _identity(
     told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
     scope = f"for {values}{told}" if values else told.removeprefix(", ").strip()
     subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
-    return Identity(n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject)
+    identity = Identity(
+        n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject
+    )
+    return judged(identity, seed, expands=expands and n <= MAX_DIMENSION)
+
+
+def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verdict, Evidence]:
+    """The verdict on an identity, by random points and, if `expands`, by expansion."""
+    decision = decide(identity, seed)
+    found = settle(identity, decision, seed, _BUDGET) if expands else decision
+    return found.verdict, found.evidence

@@ -12,10 +12,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz
+from flint import fmpq, fmpz
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
@@ -42,7 +41,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, require_time
+from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period, require_time
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
     Found,
@@ -54,11 +53,9 @@ from kahanmaps.laboratory.preserve.search import (
 )
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
-_CLOSING_POINTS = 64  # of an orbit at the values of the file: as many as relations of some degree take
 Formula = tuple[RationalFunction, str, str]  # where it comes from; in factors, where it is known so
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 
@@ -282,22 +279,42 @@ def find_integrals(
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
     deadline = time.monotonic() + seconds
-    known = _Known(laboratory, seed) if laboratory.system is not None and not flow and laboratory.root is None else None
     collected = _Collected(laboratory, deadline, progress)
+    # What theorems say of the integrals of a Kahan map, on each of the maps: without symbols these have one system.
+    inherited = list[InheritedIntegrals]()
+    if laboratory.system is not None and not flow and laboratory.root is None:
+        systems = {
+            values: inherited_integrals(laboratory.system.at(values), seed=seed)
+            for values in {map_.values for map_ in laboratory.maps}
+        }
+        inherited = [systems[map_.values] for map_ in laboratory.maps]
+    theorems, by_theorems = "", 0
+    if inherited:
+        at = ", ".join(laboratory.free_symbols)
+        theorems = inherited[0].text + (f", at random values of {at}" if at else "")
+        if not laboratory.defect:
+            by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
+    # The map modulo the first prime with the values that the file gives to the symbols, if it gives any.
+    at_values, values = None, [laboratory.file.parameters.get(name) for name in laboratory.symbols]
+    if values and None not in values:
+        prime = laboratory.maps[0].prime
+        residues = [int(GF(prime).convert(value)) for value in values]
+        at_values = laboratory.map_at(prime, residues, laboratory.maps[0].eps)
+    period_at_values = None if at_values is None or laboratory.defect else closing_period([at_values])
 
     def result(profile: Profile, reason: str) -> IntegralSearch:
-        theorems = known.text if known is not None else ""
-        by_theorems = known.count if known is not None and not laboratory.defect else 0
-        found = tuple(collected.integrals), profile, reason, by_theorems, theorems
+        integrals = tuple(collected.integrals), profile, reason, by_theorems, theorems
         more = tuple(collected.in_time), tuple(collected.in_iterates)
-        return IntegralSearch(*laboratory.asked, *found, *more, _period_at_the_values(laboratory), flow=flow)
+        return IntegralSearch(*laboratory.asked, *integrals, *more, period_at_values, flow=flow)
+
+    def known(map_: ModularMap, x: Point) -> list[list[int]]:
+        return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
 
     empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
         return result(empty, laboratory.defect)
-    gradients = {} if known is None else {"known": known.gradients}
     try:
-        profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds, progress=progress, **gradients)
+        profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds, known=known, progress=progress)
         cofactors = laboratory.cofactors()
         # Of a system these would be too many, and few integrals of its map have other denominators than those.
         factors = [one.polynomial for one in cofactors if one.polynomial is not None]
@@ -312,8 +329,8 @@ def find_integrals(
     except NoPoint as error:
         return result(empty, str(error))
     collected.offer(formulas)
-    if known is not None and not laboratory.symbols:
-        collected.add_by_theorems(known.inherited[0])
+    if inherited and not laboratory.symbols:
+        collected.add_by_theorems(inherited[0])
     if len(collected.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
         collected.add_products(cofactors)
@@ -344,81 +361,23 @@ def find_integrals(
         if time.monotonic() > deadline:
             reason += f", and then the {seconds:g} seconds were over"
         reason += ": coefficients of Hirota-Kimura bases are such integrals"
-    reasons = (reason, _at_the_values(laboratory, done), _unfinished(profile, max_degree, deadline))
-    return replace(done, reason="; ".join(filter(None, reasons)))
-
-
-class _Known:
-    """What theorems say of the integrals of a Kahan map, on each of the maps modulo primes."""
-
-    def __init__(self, laboratory: Laboratory, seed: int) -> None:
-        assert laboratory.system is not None
-        self._laboratory = laboratory
-        # Without symbols the maps have the same values, none, and one system.
-        systems = {
-            values: inherited_integrals(laboratory.system.at(values), seed=seed)
-            for values in {map_.values for map_ in laboratory.maps}
-        }
-        self.inherited = [systems[map_.values] for map_ in laboratory.maps]
-
-    def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
-        """Those of the integrals at a point."""
-        return self.inherited[self._laboratory.maps.index(map_)].gradients(map_, x)
-
-    @cached_property
-    def count(self) -> int:
-        """How many are independent."""
-        return min(one.count(map_) for one, map_ in zip(self.inherited, self._laboratory.maps, strict=True))
-
-    @property
-    def text(self) -> str:
-        """Which there are."""
-        symbols = ", ".join(self._laboratory.free_symbols)
-        return self.inherited[0].text + (f", at random values of {symbols}" if symbols else "")
-
-
-def _at_the_values(laboratory: Laboratory, search: IntegralSearch) -> str:
-    """That formulas with symbols depend on each other, or vanish, where these have the values that the file gives."""
-    values = [laboratory.file.parameters.get(name) for name in laboratory.symbols]
-    map_ = _map_at_the_values(laboratory)
-    if map_ is None:
-        return ""
-    there = Independent(map_)
-    rows = [there.gradient(one.function) for one in search.integrals]
-    rows += [gradient_of(one.ratio, laboratory.map, map_, there.point) for one in search.in_iterates]
-    left = sum(map(there.add, rows))
-    if left == len(rows):
-        return ""
-    told = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
-    how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
-    return f"at {told} {how_many}: without --symbolic others may be found"
-
-
-def _period_at_the_values(laboratory: Laboratory) -> int | None:
-    """How many points orbits have that close where the symbols have the values of the file; None where they do not."""
-    map_ = None if laboratory.defect else _map_at_the_values(laboratory)
-    try:
-        points = [] if map_ is None else map_.orbit(_CLOSING_POINTS)
-    except NoPoint:
-        return None
-    return len(points) if 0 < len(points) < _CLOSING_POINTS else None
-
-
-def _map_at_the_values(laboratory: Laboratory) -> ModularMap | None:
-    """The map modulo the first prime with the values that the file gives to the symbols; None without such values."""
-    values = [laboratory.file.parameters.get(name) for name in laboratory.symbols]
-    if not values or None in values:
-        return None
-    prime = laboratory.maps[0].prime
-    return laboratory.map_at(prime, [int(GF(prime).convert(value)) for value in values], laboratory.maps[0].eps)
-
-
-def _unfinished(profile: Profile, max_degree: int | None, deadline: float) -> str:
-    """What the profile leaves open; empty where it left nothing that was asked for or is likely to show more."""
+    reasons = [reason]
+    if at_values is not None:
+        # Formulas with symbols may depend on each other, or vanish, at the values of the file.
+        there = Independent(at_values)
+        rows = [there.gradient(one.function) for one in done.integrals]
+        rows += [gradient_of(one.ratio, laboratory.map, at_values, there.point) for one in done.in_iterates]
+        left = sum(map(there.add, rows))
+        if left < len(rows):
+            at = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
+            how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
+            reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
     if not profile.complete and (max_degree is not None or not profile.is_settled):
         why = "too many unknowns" if time.monotonic() < deadline else "the time was over"
-        return f"relations of degree {profile.degree + 1} and more were not tried: {why}"
-    return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
+        reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {why}")
+    elif not profile.agree:
+        reasons.append("the orbits that were compared do not agree: try another --seed")
+    return replace(done, reason="; ".join(filter(None, reasons)))
 
 
 def _formulas(
@@ -443,22 +402,13 @@ def _formulas(
     progress("interpolating closed forms")
     bases, reason = bases_of(laboratory, base.prime, found, deadline)
     origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
-    pairs = zip(bases, origins, strict=False)
-    return base, found, [(_ratio(P, Q), origin, "") for (Q, *more), origin in pairs for P in more], reason
-
-
-def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
-    """P/Q, or Q/P where P is the one that becomes a number for eps = 0."""
-    origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
-    if P.subs(origin).is_constant() and not Q.subs(origin).is_constant():
-        return RationalFunction(Q, P)
-    return RationalFunction(P, Q)
-
-
-def _size(formula: Formula) -> tuple[int, int, list[list[int]]]:
-    """By size, then by monomials: the order must not depend on the primes."""
-    P = formula[0].numerator
-    return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
+    at_zero: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
+    formulas = list[Formula]()
+    for (Q, *more), origin in zip(bases, origins, strict=False):
+        for P in more:  # of P/Q and Q/P the one whose denominator becomes a number for eps = 0, if only one does
+            is_inverse = P.subs(at_zero).is_constant() and not Q.subs(at_zero).is_constant()
+            formulas.append((RationalFunction(Q, P) if is_inverse else RationalFunction(P, Q), origin, ""))
+    return base, found, formulas, reason
 
 
 class _Collected:
@@ -473,12 +423,25 @@ class _Collected:
 
     def offer(self, formulas: Sequence[Formula]) -> None:
         """Take those that do not depend on others and pass as identities, short ones first."""
-        for function, origin, product in sorted(map(self._normalized, formulas), key=_size):
+
+        def size(formula: Formula) -> tuple[int, int, list[list[int]]]:
+            """By size, then by monomials: the order must not depend on the primes."""
+            P = formula[0].numerator
+            return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
+
+        for function, origin, product in sorted(map(self._normalized, formulas), key=size):
             row = self._gradients.gradient(function)
             if not self._gradients.adds(row):
                 continue
             self._progress("verifying an integral")
-            verdict, evidence = self._judged(function)
+            laboratory, evidence = self._laboratory, _AFFINE_EVIDENCE
+            n, monomials = laboratory.map.dim, function.numerator.monoms()
+            is_affine = function.is_polynomial and all(sum(map(int, m[:n])) <= 1 and not m[-1] for m in monomials)
+            system = None if laboratory.flow else laboratory.system
+            if is_affine and system is not None and is_kept_by_flow(system, function):
+                verdict = Verdict.PROVED  # v.x with v.f = 0; v may contain the symbols
+            else:
+                verdict, evidence = laboratory.verdict_on(function)
             if verdict.holds:
                 self._add(row, function, origin, verdict, evidence, product)
 
@@ -502,21 +465,17 @@ class _Collected:
         name = f"{'F' if self._laboratory.flow else 'I'}{len(self.integrals) + 1}"
         self.integrals.append(FoundIntegral(name, *known))
 
-    def _judged(self, function: RationalFunction) -> tuple[Verdict, Evidence]:
-        laboratory = self._laboratory
-        if not laboratory.flow and laboratory.system is not None and _is_affine_integral(laboratory.system, function):
-            return Verdict.PROVED, _AFFINE_EVIDENCE
-        return laboratory.verdict_on(function)
-
     def add_by_theorems(self, inherited: InheritedIntegrals) -> None:
         """Those of the theorems, as far as they can be written out."""
         laboratory = self._laboratory
-        affine = len(inherited.quotient.integrals)
+        affine, context = len(inherited.quotient.integrals), ring((*laboratory.map.variables, "eps"))
         for k, row in enumerate(inherited.gradients(laboratory.maps[0], self._gradients.point)):
             if not self._gradients.adds(row):
                 continue
             if k < affine:
-                self._add(row, *_affine(laboratory, inherited.quotient.integrals[k]))
+                terms = zip(context.gens(), inherited.quotient.integrals[k], strict=False)
+                form = RationalFunction(sum((x * v for x, v in terms), context.constant(0)), context.constant(1))
+                self._add(row, form, AFFINE, Verdict.PROVED, _AFFINE_EVIDENCE)
             elif time.monotonic() <= self._deadline and (written := _modified(laboratory, inherited, k - affine)):
                 function, origin, *known = written
                 self._add(row, *self._normalized((function, origin, ""))[:2], *known)
@@ -560,21 +519,6 @@ class _Collected:
             if verdict.holds:
                 name = f"I{len(self.integrals) + len(self.in_iterates) + 1}"
                 self.in_iterates.append(IntegralInIterates(name, ratio, origin, verdict, evidence))
-
-
-def _is_affine_integral(system: QuadraticSystem, function: RationalFunction) -> bool:
-    """Whether the function is v.x with v.f = 0; v may contain the symbols."""
-    if not function.is_polynomial:
-        return False
-    is_affine = all(sum(map(int, m[: system.dim])) <= 1 and not m[-1] for m in function.numerator.monoms())
-    return is_affine and is_kept_by_flow(system, function)
-
-
-def _affine(laboratory: Laboratory, vector: Sequence[fmpz]) -> tuple[RationalFunction, str, Verdict, Evidence]:
-    """v.x as a function of the variables and eps."""
-    context = ring((*laboratory.map.variables, "eps"))
-    total = sum((gen * v for gen, v in zip(context.gens(), vector, strict=False)), context.constant(0))
-    return RationalFunction(total, context.constant(1)), AFFINE, Verdict.PROVED, _AFFINE_EVIDENCE
 
 
 def _modified(

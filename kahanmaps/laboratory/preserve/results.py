@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,8 +11,11 @@ from flint import fmpq
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.implicit import BirationalMap
+
+_CLOSES_WITHIN = 64  # points of an orbit: as many as relations of some degree take
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,15 @@ def require_time(seconds: float) -> None:
     """Raise InputError for less than no time."""
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a time above 0")
+
+
+def closing_period(maps: Sequence[ModularMap]) -> int | None:
+    """The number of points of orbits that close soon, on all maps; None where they do not."""
+    try:
+        [*others, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
+    except NoPoint:
+        return None
+    return None if others or period == _CLOSES_WITHIN else period
 
 
 def closing_note(period: int | None, eps: fmpq | None, map_: BirationalMap) -> str:

@@ -161,32 +161,38 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
     if along.degree() < 0:
         return only_factors("the extactic determinant vanishes identically, there may be infinitely many")
     complete = True
-    candidates = []
+    candidates = list[list[fmpq]]()
     for t in _rational_roots(along):
-        normals, all_of_them = _normals(local, [a + t * d for a, d in zip(start, direction, strict=True)], quotient)
-        complete = complete and all_of_them
-        candidates += normals
+        x = [a + t * d for a, d in zip(start, direction, strict=True)]
+        normals = nullspace(QQ, _taylor_rows(local, x, quotient.free))
+        if len(normals) > 1:
+            # The flow on the hyperplane is degenerate itself. The normal is one of these that is a left eigenvector of
+            # f'(x), since v f'(x) = L(x) v on l = 0.
+            basis = fmpq_mat([list(v) for v in normals])
+            action = quotient.rows(local.jacobian(x)) * quotient.section
+            normals = []
+            for eigenvalue in _rational_roots(fmpq_poly(action.charpoly().coeffs())):
+                combinations = nullspace(QQ, (basis * action - basis * eigenvalue).transpose())
+                complete = complete and len(combinations) <= 1
+                normals += [tuple((fmpq_mat([list(c)]) * basis).entries()) for c in combinations]
+        for v in normals:
+            entries = dict(zip(quotient.free, v, strict=True))
+            candidates.append([entries.get(i, fmpq(0)) for i in range(n)])
     reason = "" if complete else "the flow degenerates on an invariant hyperplane: others may hide behind it"
     return AffineDarbouxList(_factors_that_are(system, candidates), complete, reason)
 
 
-def _taylor(local: SystemOver, x: Sequence[fmpq], order: int) -> list[fmpq_mat]:
-    """The Taylor coefficients x_1, ..., x_order of the solution through x, as columns."""
+def _taylor_rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
+    """The coordinates `free` of as many Taylor coefficients of the solution through x, one coefficient a row."""
     series = [fmpq_mat(local.dim, 1, list(x))]
     forms: list[fmpq_mat] = []
-    for k in range(order):
+    for k in range(len(free)):
         forms.append(local.hessian_times(series[k].entries()))
         total = local.B * series[k] + (local.c if k == 0 else local.c * 0)
         for a in range(k + 1):
             total = total + forms[a] * series[k - a] * fmpq(1, 2)
         series.append(total * fmpq(1, k + 1))
-    return series[1:]
-
-
-def _rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
-    """The coordinates `free` of the Taylor coefficients, one coefficient a row."""
-    series = _taylor(local, x, len(free))
-    return fmpq_mat([[column[i, 0] for i in free] for column in series])
+    return fmpq_mat([[column[i, 0] for i in free] for column in series[1:]])
 
 
 def _determinant_along(
@@ -195,7 +201,9 @@ def _determinant_along(
     """The extactic determinant at start + t direction, by interpolation in t."""
     m = len(free)
     nodes = range(m * (m + 3) // 2 + 1)
-    values = [_rows(local, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes]
+    values = [
+        _taylor_rows(local, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes
+    ]
     # Divided differences at 0, 1, 2, ...
     for k in range(1, len(values)):
         differences = [(after - before) / k for before, after in pairwise(values[k - 1 :])]
@@ -208,30 +216,6 @@ def _determinant_along(
 
 def _rational_roots(polynomial: fmpq_poly) -> list[fmpq]:
     return [-factor[0] / factor[1] for factor, _ in polynomial.factor()[1] if factor.degree() == 1]
-
-
-def _normals(local: SystemOver, x: Sequence[fmpq], quotient: QuotientForms) -> tuple[list[tuple[fmpq, ...]], bool]:
-    """The vectors that may be normal to an invariant hyperplane through x, modulo the affine integrals, and whether
-    they are all.
-
-    Where more than one is orthogonal to all Taylor coefficients (the flow on the hyperplane is degenerate itself), the
-    normal is one of them that is a left eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
-    """
-    orthogonal = nullspace(QQ, _rows(local, x, quotient.free))
-    all_of_them = True
-    if len(orthogonal) > 1:
-        basis = fmpq_mat([list(v) for v in orthogonal])
-        action = quotient.rows(local.jacobian(x)) * quotient.section
-        orthogonal = []
-        for eigenvalue in _rational_roots(fmpq_poly(action.charpoly().coeffs())):
-            combinations = nullspace(QQ, (basis * action - basis * eigenvalue).transpose())
-            all_of_them = all_of_them and len(combinations) <= 1
-            orthogonal += [tuple((fmpq_mat([list(c)]) * basis).entries()) for c in combinations]
-    normals = []
-    for v in orthogonal:
-        entries = dict(zip(quotient.free, v, strict=True))
-        normals.append(tuple(entries.get(i, fmpq(0)) for i in range(local.dim)))
-    return normals, all_of_them
 
 
 def _factors_that_are(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]) -> tuple[AffineDarboux, ...]:
@@ -280,35 +264,29 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     >>> [under_map(system, l, fmpq(eps)) for eps in (1, -1, 2) for l in (x, y)]
     ['contracted', 'undefined', 'undefined', 'contracted', 'invariant', 'invariant']
     """
-    for outcome, step in (("undefined", eps), ("contracted", -eps)):
-        vanishes = _determinant_vanishes_on(system, function, step)
-        if vanishes is not False:
-            return outcome if vanishes else "undecided"
-    return "invariant"
-
-
-def _determinant_vanishes_on(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> bool | None:
-    """Whether det(I - eps f'(x)) is identically 0 on the zero set of an affine function; None where it is too long."""
     n, context = system.dim, function.context()
     *slopes, _ = _coefficients(function)
     k = next(i for i, slope in enumerate(slopes) if slope != 0)
-    place = list(context.gens())
+    place = list(context.gens())  # of a point of the hyperplane
     place[k] = place[k] - function / slopes[k]
     rng = random.Random("a point of the hyperplane")
     free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
     point = [evaluate(x, QQ, free) for x in place]
-    if Kahan(system).at(eps).determinant(point) != 0:  # at most points: then nothing is expanded
-        return False
-    field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
-    entries = [
-        Function(field, int(i == j) - f.derivative(j).compose(*place, ctx=context) * eps, one)
-        for i, f in enumerate(system.rhs)
-        for j in range(n)
-    ]
-    try:
-        return bool(FunctionMatrix(field, n, n, entries).det().above.is_zero())
-    except BudgetExceeded:
-        return None
+    for outcome, step in (("undefined", eps), ("contracted", -eps)):
+        if Kahan(system).at(step).determinant(point) != 0:  # at most points: then nothing is expanded
+            continue
+        field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
+        entries = [
+            Function(field, int(i == j) - f.derivative(j).compose(*place, ctx=context) * step, one)
+            for i, f in enumerate(system.rhs)
+            for j in range(n)
+        ]
+        try:
+            if FunctionMatrix(field, n, n, entries).det().above.is_zero():
+                return outcome
+        except BudgetExceeded:
+            return "undecided"
+    return "invariant"
 
 
 def _coefficients(function: fmpq_mpoly) -> list[fmpq]:

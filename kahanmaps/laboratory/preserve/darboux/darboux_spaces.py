@@ -105,7 +105,10 @@ def darboux_spaces(
     if len(span) > 2 * LARGEST_SPAN:
         return None
     explained = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
-    fresh = _complement(explained, span, prime)
+    # Vectors of the span that together with those explained are a basis of the sum.
+    stacked = [*explained, *span]
+    independent = pivots(echelon(list(zip(*stacked, strict=True)), prime)) if stacked else []
+    fresh = [stacked[k] for k in independent if k >= len(explained)]
     if not fresh:
         return []
     if not explained and _is_darboux(map_, fresh, degree):
@@ -117,14 +120,6 @@ def darboux_spaces(
     if not bases and not explained:
         bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
-
-
-def _complement(inner: Vectors, outer: Vectors, prime: int) -> Vectors:
-    """Vectors of `outer` that together with `inner` are a basis of the sum."""
-    if not outer:
-        return []
-    stacked = [*inner, *outer]
-    return [stacked[k] for k in pivots(echelon(list(zip(*stacked, strict=True)), prime)) if k >= len(inner)]
 
 
 def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
@@ -165,42 +160,21 @@ def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_m
 
 
 def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, prime: int) -> list[Vectors]:
-    """The spaces with a common cofactor from the matrices A on fresh + explained."""
-    k, size = len(fresh), len(fresh) + len(explained)
-    # Columns of the fresh-fresh parts span the fresh parts of the spaces, in coordinates.
-    columns = [[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)]
-    coordinates = echelon(columns, prime)
-    found = []
-    for block in _blocks(solutions, coordinates, prime):
-        lifted = _lift(solutions, block, k, size, prime)
-        if lifted is None:
-            continue
-        found.append(echelon(combine(lifted, [*fresh, *explained], prime), prime))
-    return found
+    """The spaces with a common cofactor from the matrices A on fresh + explained.
 
-
-def _restricted(solutions: list[nmod_mat], basis: Vectors, prime: int) -> list[nmod_mat]:
-    """The fresh-fresh parts A = sum A'_ij b_i b_j^T as matrices A' in terms of a basis in echelon form."""
-    places = pivots(basis)
-    return [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
-
-
-def _some_combinations(forms: list[nmod_mat], prime: int) -> list[nmod_mat]:
-    """The matrices, or random combinations of them where there are many: what all satisfy can be read off a few."""
-    if len(forms) <= _ENOUGH:
-        return forms
-    rng = random.Random(prime)
-    return [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
-
-
-def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list[Vectors]:
-    """The spaces, in coordinates of the fresh part: eigenspaces of a random E with E A = A E^T for all A."""
-    n = len(coordinates)
+    Their fresh parts are eigenspaces of a random E with E A = A E^T for all fresh-fresh parts of the A.
+    """
+    k, size, rng = len(fresh), len(fresh) + len(explained), random.Random(prime)
+    # Columns of the fresh-fresh parts span the fresh parts of the spaces, in coordinates: a basis in echelon form, in
+    # terms of which sum A'_ij b_i b_j^T has the entries at the pivots.
+    coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
+    n, places = len(coordinates), pivots(coordinates)
     if n < 2:
         return []
-    forms = _some_combinations(_restricted(solutions, coordinates, prime), prime)
+    forms = [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
+    if len(forms) > _ENOUGH:  # what all satisfy can be read off a few random combinations
+        forms = [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
     algebra = _intertwining(forms, n, prime)
-    rng = random.Random(prime)
     E = combination_of([rng.randrange(prime) for _ in algebra], algebra)
     found = []
     for factor, _ in E.charpoly().factor()[1]:
@@ -210,7 +184,9 @@ def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list
         shifted = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
         eigen = null_space(shifted, n, prime)
         if len(eigen) > 1:
-            found.append(echelon(combine(eigen, coordinates, prime), prime))
+            lifted = _lift(solutions, echelon(combine(eigen, coordinates, prime), prime), k, size, prime)
+            if lifted is not None:
+                found.append(echelon(combine(lifted, [*fresh, *explained], prime), prime))
     return found
 
 
