@@ -62,7 +62,6 @@ def test_cofactors_alone_give_the_three_integrals_of_lyness_of_order_five():
 
 # Recurrences with Laurent polynomials for integrals: x_{n+N} = 3/(x_{n+1} ... x_{n+N-1}) - x_n - ... - x_{n+N-1}.
 FOURTH_ORDER = ("a b c d", ["b", "c", "d", "3/(b*c*d) - a - b - c - d"])
-FIFTH_ORDER = ("a b c d e", ["b", "c", "d", "e", "3/(b*c*d*e) - a - b - c - d - e"])
 
 
 def recurrence(names, image):
@@ -73,7 +72,6 @@ def recurrence(names, image):
     ("map_", "origins"),
     [
         (FOURTH_ORDER, ["denominator b*c", "common cofactor 1"]),
-        (FIFTH_ORDER, ["denominator b*d", "denominator b*c*d", "common cofactor 1"]),
     ],
 )
 def test_laurent_polynomials_are_found_without_the_span_of_the_relations(map_, origins, monkeypatch):

@@ -19,7 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
+from itertools import accumulate, repeat
 from math import prod
+from operator import mul
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz, fmpz_mat, nmod_poly
@@ -145,7 +147,7 @@ def _jacobians(map_: BirationalMap, eps: fmpq | None, both: bool) -> dict[str, f
 class _Line:
     """A random line modulo the prime of a map, and its image (X : Z) without common factor, polynomials in t.
 
-    det dPhi is `above` / (Z^n `below`) on it. Raises NoPoint.
+    det dPhi is `numerator` / (Z^n `denominator`) on it. Raises NoPoint.
     """
 
     def __init__(self, map_: ModularMap) -> None:
@@ -153,7 +155,7 @@ class _Line:
         self.prime, self.map = p, map_
         start, slope = map_.random_point(), map_.random_point()
         self.here = [*(nmod_poly([c, d], p) for c, d in zip(start, slope, strict=True)), nmod_poly([1], p)]
-        self.there, self.above, self.below = self.here, nmod_poly([1], p), nmod_poly([1], p)
+        self.there, self.numerator, self.denominator = self.here, nmod_poly([1], p), nmod_poly([1], p)
         for one in map_.map.factors:
             self._step(one)
 
@@ -172,13 +174,13 @@ class _Line:
 
         def homogeneous(t: int) -> list[int]:
             x, image, Z = step(t)
-            below = int(one.determinant(x)) * pow(Z, n * top, p)
-            return [*(int(c) * below % p for c in image), below % p]
+            denominator = int(one.determinant(x)) * pow(Z, n * top, p)
+            return [*(int(c) * denominator % p for c in image), denominator % p]
 
         raw = _interpolated(homogeneous, n * top * size, p)
         common = reduce(nmod_poly.gcd, raw)
         self.there = [entry // common for entry in raw]
-        self.below = self.below * raw[-1]
+        self.denominator = self.denominator * raw[-1]
         after = self.there[-1]
 
         def numerator(t: int) -> list[int]:
@@ -186,8 +188,7 @@ class _Line:
             return [int(det(one.numerator_matrix(x, image))) * pow(Z, n * (top - 1), p) * pow(int(after(t)), n, p) % p]
 
         reach = max(int(entry.degree()) for entry in self.there)
-        [above] = _interpolated(numerator, n * ((top - 1) * size + reach), p)
-        self.above = self.above * above
+        self.numerator = self.numerator * _interpolated(numerator, n * ((top - 1) * size + reach), p)[0]
 
     def along(self, g: fmpq_mpoly, place: Sequence[nmod_poly]) -> nmod_poly:
         """g on the line, or the numerator Z^deg g(X/Z) of g on its image."""
@@ -196,12 +197,8 @@ class _Line:
         rest = [field.convert(c) for c in (*self.map.values, self.map.eps)]
         top = degree_in(g, n)
         powers = [[nmod_poly([1], p)] for _ in place]
-
-        def power(k: int, e: int) -> nmod_poly:
-            while len(powers[k]) <= e:
-                powers[k].append(powers[k][-1] * place[k])
-            return powers[k][e]
-
+        for row, c in zip(powers, place, strict=True):
+            row += accumulate(repeat(c, top), mul)
         total = nmod_poly([0], p)
         for monomial, coefficient in g.terms():
             value = field.convert(coefficient)
@@ -209,9 +206,8 @@ class _Line:
                 value = value * c ** int(e)
             exponents = [int(e) for e in monomial[:n]]
             term = nmod_poly([int(value)], p)
-            for k, e in enumerate([*exponents, top - sum(exponents)]):
-                if e:
-                    term = term * power(k, e)
+            for row, e in zip(powers, [*exponents, top - sum(exponents)], strict=True):
+                term = term * row[e] if e else term
             total = total + term
         return total
 
@@ -302,7 +298,15 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     weights = [_FIRST, *map(len, polynomials)]  # short formulas before long ones
     if laboratory.field is not None and laboratory.flow:
         return _products_of_flow(laboratory.field, laboratory.map.names, polynomials, weights)
-    rows = _exponents_on_line(laboratory.maps[0], polynomials)
+    line, n = _Line(laboratory.maps[0]), laboratory.map.dim
+    here, there = ([line.along(g, place) for g in polynomials] for place in (line.here, line.there))
+    # det dPhi and the C_i on a random line, as vectors over a coprime base.
+    base = coprime_base([*here, *there, line.there[-1], line.numerator, line.denominator])
+    Z, N, M = (_exponents(P, base) for P in (line.there[-1], line.numerator, line.denominator))
+    rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]
+    for g, P, Q in zip(polynomials, here, there, strict=True):
+        d = degree_in(g, n)
+        rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
     return _sorted_by_constant(laboratory, polynomials, _reduced(relations(rows), weights), weights)
 
 
@@ -328,20 +332,6 @@ def _products_of_flow(
     return _assembled(polynomials, n, exact, [(one, exact)], in_time)
 
 
-def _exponents_on_line(map_: ModularMap, polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
-    """det dPhi and the C_i on a random line, as vectors over a coprime basis. Raises NoPoint."""
-    line, n = _Line(map_), map_.dim
-    here = [line.along(g, line.here) for g in polynomials]
-    there = [line.along(g, line.there) for g in polynomials]
-    base = coprime_base([*here, *there, line.there[-1], line.above, line.below])
-    Z, N, M = (_exponents(P, base) for P in (line.there[-1], line.above, line.below))
-    rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]  # of det dPhi
-    for g, P, Q in zip(polynomials, here, there, strict=True):
-        d = degree_in(g, n)
-        rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
-    return rows
-
-
 def _sorted_by_constant(
     laboratory: Laboratory,
     polynomials: Sequence[fmpq_mpoly],
@@ -351,7 +341,23 @@ def _sorted_by_constant(
     """Which products of the vectors have the constant 1; the exponent of det dPhi comes first in them."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
-    values = constants_of(laboratory, lambda map_: [_constant(map_, polynomials, vector) for vector in vectors])
+
+    def constants(map_: ModularMap) -> list[int]:
+        """prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
+        p, field, found = map_.prime, GF(map_.prime), list[int]()
+        at = [field.convert(c) for c in (*map_.values, map_.eps)]
+        for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
+            total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
+            for g, k in zip(polynomials, vector[1:], strict=True):
+                if k:
+                    before, after = (int(evaluate(g, field, [*map(field.convert, place), *at])) for place in (x, image))
+                    if not before or not after:
+                        raise NoPoint("a polynomial vanishes at a random point modulo a prime")
+                    total = total * pow(after, k, p) * pow(before, -k, p) % p
+            found.append(total)
+        return found
+
+    values = constants_of(laboratory, constants)
     known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
     minus = RationalFunction(context.constant(-1), context.constant(1))
 
@@ -377,16 +383,31 @@ def _assembled(
 ) -> Products:
     """The products: integrals and a density by their vectors, for each constant of one; what depends on time."""
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
-    integrals = [_upright(v, degrees) for v in exact if v[0] == 0]
+    integrals = []
+    for v in (v for v in exact if v[0] == 0):
+        # Of I and 1/I the one of positive degree or, where that is 0, whose first exponent is positive.
+        total = sum(k * d for k, d in zip(v, degrees, strict=True))
+        integrals.append(v if (total, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
 
     def product(vector: Sequence[int], constant: RationalFunction) -> Product:
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
+    def cost(vector: Sequence[int]) -> tuple[int, int, int]:
+        """Few negative exponents are best, then a low degree."""
+        denominator, numerator = (
+            sum(sign * k * d for k, d in zip(vector, degrees, strict=True) if sign * k > 0) for sign in (-1, 1)
+        )
+        return denominator, numerator, sum(map(abs, vector))
+
     density = None
     for constant, choice in of_densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
-        if vector is not None and density is None:
-            density = product(_most_polynomial(vector, integrals, degrees), constant)
+        while vector is not None and density is None:  # times integrals, as long as single ones help
+            others = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
+            best = min(others, key=cost, default=vector)
+            if cost(best) >= cost(vector):
+                density = product(vector, constant)
+            vector = best
     one = of_densities[0][0]
     return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in in_time))
 
@@ -414,45 +435,8 @@ def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[
     return [RationalFunction(above, below) for [above], below in moved]
 
 
-def _upright(vector: list[int], degrees: Sequence[int]) -> list[int]:
-    """Of I and 1/I the one of positive degree or, where that is 0, whose first exponent is positive."""
-    total = sum(k * d for k, d in zip(vector, degrees, strict=True))
-    return vector if (total, next((k for k in vector if k), 0)) > (0, 0) else [-k for k in vector]
-
-
-def _most_polynomial(density: list[int], integrals: Sequence[Sequence[int]], degrees: Sequence[int]) -> list[int]:
-    """The density times integrals, as long as single ones help: few negative exponents, then a low degree."""
-
-    def cost(vector: Sequence[int]) -> tuple[int, int, int]:
-        below = sum(-k * d for k, d in zip(vector, degrees, strict=True) if k < 0)
-        above = sum(k * d for k, d in zip(vector, degrees, strict=True) if k > 0)
-        return below, above, sum(map(abs, vector))
-
-    while True:
-        others = [_combined((1, sign), (density, v)) for v in integrals for sign in (1, -1)]
-        best = min(others, key=cost, default=density)
-        if cost(best) >= cost(density):
-            return density
-        density = best
-
-
 def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:
     return [sum(w * e for w, e in zip(weights, column, strict=True)) for column in zip(*vectors, strict=True)]
-
-
-def _constant(map_: ModularMap, polynomials: Sequence[fmpq_mpoly], vector: Sequence[int]) -> int:
-    """prod C_i^k_i det dPhi^k_0 at a random point. Raises NoPoint."""
-    p, field = map_.prime, GF(map_.prime)
-    rest = [field.convert(c) for c in (*map_.values, map_.eps)]
-    [(x, image)] = map_.pairs(1)
-    total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
-    for g, k in zip(polynomials, vector[1:], strict=True):
-        if k:
-            before, after = (int(evaluate(g, field, [*map(field.convert, place), *rest])) for place in (x, image))
-            if not before or not after:
-                raise NoPoint("a polynomial vanishes at a random point modulo a prime")
-            total = total * pow(after, k, p) * pow(before, -k, p) % p
-    return total
 
 
 def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list[int]]:

@@ -258,24 +258,21 @@ def _in_order(
 def _most_alike(
     alike: list[DarbouxSpace], wanted: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
-    """Those spaces that share most numbers with the wanted ones: conjugate ones, which are too many, share none."""
+    """Those spaces that share most numbers with the wanted ones: conjugate ones, which are too many, share none.
+
+    Two coefficients seem to be the same rational number if one simple fraction has them modulo both primes.
+    """
     waiting = list(alike)
     found = []
-    for space in wanted:
-        found.append(max(waiting, key=lambda one: _equal_entries(one, space, prime, reference)))
-        waiting.remove(found[-1])
+    for model in wanted:
+        counts = []
+        for space in waiting:
+            rows = zip(space.basis, model.basis, strict=True)
+            pairs = [(a, b) for row in rows for a, b in zip(*row, strict=True) if b and b != 1]
+            residues = chinese([a for a, _ in pairs], prime, [b for _, b in pairs], reference)
+            counts.append(sum(simple_fraction(c, prime * reference, _CHANCE) is not None for c in residues))
+        found.append(waiting.pop(counts.index(max(counts))))
     return found
-
-
-def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference: int) -> int:
-    """How many coefficients seem to be the same rational number: modulo both primes one simple fraction has them."""
-    count = 0
-    for mine, its in zip(one.basis, model.basis, strict=True):
-        for a, b in zip(mine, its, strict=True):
-            if b and b != 1:
-                [residue] = chinese([a], prime, [b], reference)
-                count += simple_fraction(residue, prime * reference, _CHANCE) is not None
-    return count
 
 
 def bases_of(

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-from flint import fmpq
+from operator import ge
 
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import ring
@@ -77,15 +76,20 @@ def sparse_relations(
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    lower = _implied(maps[0], degree, support)
-    found = []
-    integral, function = (_letter(choice, variables) for choice in (("c", "k", "C", "K"), ("e", "s", "E", "S")))
+    leads = []  # of the relations of lower degree, whose multiples they imply
+    if degree > 1:
+        lower = _falling(maps[0].dim, degree - 1)
+        leads = [lower[next(k for k, c in enumerate(row) if c)] for row in _relations(maps[0], degree - 1)]
+    found, context = [], ring(variables)
+    # The first letters that names like c1, c2, ... and e1, e2, ... may begin with, none of them being a variable.
+    taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
+    integral, function = (next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES"))
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
     for one, again, other in zip(*tables, strict=True):
         used = [k for k, entry in enumerate(one) if entry]
-        lead = used[0]
-        if support[lead] in lower or len(used) > most_terms:
+        is_implied = any(all(map(ge, support[used[0]], lead)) for lead in leads)
+        if is_implied or len(used) > most_terms:
             continue
         terms = []
         for k in used:
@@ -94,7 +98,7 @@ def sparse_relations(
             else:
                 number = _number_text(one[k], other[k], maps[0], maps[1])
                 text = number or functions.setdefault((one[k], other[k]), f"{function}{first + len(functions)}")
-            terms.append((_monomial(support[k], variables), text))
+            terms.append((format_polynomial(context.from_dict({support[k]: 1})), text))
         found.append(
             SparseRelation(
                 tuple(terms),
@@ -117,25 +121,6 @@ def _relations(map_: ModularMap, degree: int) -> list[list[int]]:
     return echelon([[v[k] for k in order] for v in relations_on_orbit(map_, degree).vectors], map_.prime)
 
 
-def _letter(choice: Sequence[str], variables: Sequence[str]) -> str:
-    """The first letter that names like c1, c2, ... may begin with, none of them being a variable."""
-    taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
-    return next((letter for letter in choice if letter not in taken), f"{choice[0]}_")
-
-
-def _implied(map_: ModularMap, degree: int, support: Sequence[tuple[int, ...]]) -> set[tuple[int, ...]]:
-    """The leading monomials of the multiples of all relations of lower degree."""
-    if degree == 1:
-        return set()
-    below = _falling(map_.dim, degree - 1)
-    leads = [below[next(k for k, entry in enumerate(row) if entry)] for row in _relations(map_, degree - 1)]
-    return {
-        exponent
-        for exponent in support
-        if any(all(a >= b for a, b in zip(exponent, lead, strict=True)) for lead in leads)
-    }
-
-
 def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) -> str | None:
     """The coefficient as a number times a power of eps, modulo both primes simpler than by chance; None otherwise."""
     for power in _POWERS:
@@ -145,20 +130,11 @@ def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) 
         [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
         value = simple_fraction(residue, map_.prime * other_map.prime, _SPARE_BITS)
         if value is not None:
-            return _times_power(value, power)
+            number, q = format_number(value), "" if value.q == 1 else f"{value.q}*"
+            if power == 0:
+                return number
+            eps = "eps" if abs(power) == 1 else f"eps^{abs(power)}"
+            if power < 0:
+                return f"{value.p}/({q}{eps})" if q else f"{value.p}/{eps}"
+            return f"{number}*{eps}".replace("1*", "", 1) if abs(value) == 1 else f"{number}*{eps}"
     return None
-
-
-def _times_power(value: fmpq, power: int) -> str:
-    """E.g. -1/6*eps^2, or 3/eps."""
-    number = format_number(value)
-    if power == 0:
-        return number
-    eps = "eps" if abs(power) == 1 else f"eps^{abs(power)}"
-    if power > 0:
-        return f"{number}*{eps}".replace("1*", "", 1) if abs(value) == 1 else f"{number}*{eps}"
-    return f"{value.p}/{eps}" if value.q == 1 else f"{value.p}/({value.q}*{eps})"
-
-
-def _monomial(exponent: tuple[int, ...], variables: Sequence[str]) -> str:
-    return format_polynomial(ring(variables).from_dict({exponent: 1}))

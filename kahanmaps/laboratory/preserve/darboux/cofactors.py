@@ -19,10 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product as cartesian
 from math import inf, prod
-from operator import add, sub
+from operator import sub
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz, nmod
+from flint import fmpq, fmpq_mpoly, fmpz, nmod, nmod_mpoly, nmod_mpoly_ctx
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
@@ -33,6 +33,7 @@ from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
+from kahanmaps.laboratory.singular.jets import modulo
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
@@ -363,7 +364,11 @@ def search_cofactors(
     found = CofactorSearch(every, [], 0)
     spaces = list(known)
     independent = gradient_rank(map_, spaces)
-    polynomials = [_residues(map_, one.polynomial) for one in denominators if one.polynomial is not None]
+    context, field = nmod_mpoly_ctx.get([f"x{k}" for k in range(dim)], modulus=prime), GF(prime)
+    at = [*context.gens(), *(context.constant(c) for c in (*map_.values, map_.eps))]
+    polynomials = [
+        modulo(one.polynomial, field).compose(*at, ctx=context) for one in denominators if one.polynomial is not None
+    ]
     for degree in range(1, max_degree + 1):
         if independent >= wanted:
             break
@@ -379,7 +384,7 @@ def search_cofactors(
             tried += [
                 replace(one, powers=(*[0] * len(cofactors), *one.powers))
                 for one in products(denominators, degree)[1:]
-                if _is_spanned(_product(polynomials, one.powers, prime), places, rows, prime)
+                if _is_spanned(prod(map(pow, polynomials, one.powers), start=context.constant(1)), places, rows, prime)
             ]
             count = len(relations) + _SPARE
             sample = Sample.of(map_, every, points_needed(dim, degree))
@@ -431,36 +436,9 @@ def search_cofactors(
     return found
 
 
-def _residues(map_: ModularMap, polynomial: fmpq_mpoly) -> dict[Exponent, int]:
-    """The coefficients of a polynomial in (variables, symbols, eps) on a map modulo a prime."""
-    field, n = GF(map_.prime), map_.dim
-    values = [field.convert(c) for c in (*map_.values, map_.eps)]
-    found: dict[Exponent, int] = {}
-    for monomial, coefficient in polynomial.terms():
-        term = prod((c ** int(e) for c, e in zip(values, monomial[n:], strict=True)), start=field.convert(coefficient))
-        exponents = tuple(map(int, monomial[:n]))
-        found[exponents] = (found.get(exponents, 0) + int(term)) % map_.prime
-    return found
-
-
-def _product(polynomials: Sequence[dict[Exponent, int]], powers: Sequence[int], prime: int) -> dict[Exponent, int]:
-    """The coefficients of a product of powers."""
-    total = {(0,) * len(next(iter(polynomials[0]))): 1} if polynomials else {}
-    for polynomial, power in zip(polynomials, powers, strict=True):
-        for _ in range(power):
-            terms: dict[Exponent, int] = {}
-            for (a, c), (b, d) in cartesian(total.items(), polynomial.items()):
-                exponents = tuple(map(add, a, b))
-                terms[exponents] = (terms.get(exponents, 0) + c * d) % prime
-            total = terms
-    return total
-
-
-def _is_spanned(
-    polynomial: dict[Exponent, int], places: dict[Exponent, int], rows: dict[int, list[int]], prime: int
-) -> bool:
+def _is_spanned(polynomial: nmod_mpoly, places: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
     """Whether a polynomial is in the span of rows of an echelon form, each under the place of its first entry."""
-    left = {places[exponents]: c for exponents, c in polynomial.items() if c}
+    left = {places[exponents]: int(c) for exponents, c in polynomial.terms()}
     while left:
         first = min(left)
         if first not in rows:
