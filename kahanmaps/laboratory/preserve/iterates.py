@@ -13,7 +13,7 @@ their place in what it finds. Source: petrera-suris-2018.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from itertools import count
@@ -214,13 +214,22 @@ def integrals_in_iterates(
             bases, _ = bases_of(inside, base.prime, found, deadline)
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]
-                for ratio in _ratios(one, functions if back is None else [back(F, one.shift) for F in functions]):
+                functions = functions if back is None else [back(F, one.shift) for F in functions]
+                # The ratios that generate all others.
+                candidates = [RatioOfIterates(one, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
+                if one.rank == 2:
+                    pairs = [(first, k) for k in range(2, len(functions)) for first in (0, 1)]
+                    candidates = [RatioOfIterates(one, tuple(functions), pair, (0, 1)) for pair in pairs]
+                for ratio in candidates:
                     if not known.add(gradient_of(ratio, laboratory.map, laboratory.maps[0], known.point)):
                         continue
                     if lift.shift:
                         ratios.append((ratio, one.text))
-                    else:
-                        plain.append((_in_x(ratio, laboratory.map), one.text, ""))
+                    else:  # no iterate is in it: a function of (variables, symbols, eps)
+                        context = ring(laboratory.map.names)
+                        gens, n = context.gens(), laboratory.map.dim
+                        P, Q = (F.compose(*gens[:n], *gens, ctx=context) for F in ratio.functions)
+                        plain.append((RationalFunction(P, Q), one.text, ""))
     return plain, ratios
 
 
@@ -283,26 +292,6 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
         return F.compose(*kept[0], *kept[1], *rest, *sums, eps, ctx=whole)
 
     return inside, back
-
-
-def _in_x(ratio: RatioOfIterates, map_: BirationalMap) -> RationalFunction:
-    """A ratio that contains no iterate as a function of (variables, symbols, eps)."""
-    context = ring(map_.names)
-    *gens, eps = context.gens()
-    n = map_.dim
-    P, Q = (F.compose(*gens[:n], *gens[:n], *gens[n:], eps, ctx=context) for F in ratio.functions)
-    return RationalFunction(P, Q)
-
-
-def _ratios(lift: Lift, functions: Sequence[fmpq_mpoly]) -> Iterator[RatioOfIterates]:
-    """The ratios that generate all others."""
-    if lift.rank == 1:
-        for F in functions[1:]:
-            yield RatioOfIterates(lift, (F, functions[0]), (0,), (1,))
-        return
-    for k in range(2, len(functions)):
-        for first in (0, 1):
-            yield RatioOfIterates(lift, tuple(functions), (first, k), (0, 1))
 
 
 def gradient_of(ratio: RatioOfIterates, exact: BirationalMap, map_: ModularMap, point: Point) -> list[int]:

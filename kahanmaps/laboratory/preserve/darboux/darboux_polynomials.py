@@ -137,7 +137,14 @@ def darboux_polynomials(
     deadline, cofactors, spaces = time.monotonic() + seconds, laboratory.cofactors(), list[DarbouxPolynomials]()
     reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0
     if flow:
-        reason = _of_flow(laboratory, degree, seconds, spaces)
+        assert laboratory.field is not None
+        known = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
+        for P in known.functions:
+            K = darboux_cofactor(laboratory.field, P)
+            assert K is not None  # or it would not have been listed
+            spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
+        if known.degree < degree:
+            reason = f"degrees above {known.degree} are not settled: {known.reason}"
     elif not reason:
         try:
             reason = _of_map(laboratory, degree, cofactors, deadline, progress, spaces)
@@ -174,7 +181,11 @@ def _of_map(
             break
         progress(f"cofactor {product.text(cofactors)}")
         spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
-    known = {law: space for law, one in spaces.items() if (space := _without_constants(one)).basis}
+    known = dict[Law, DarbouxSpace]()
+    for law, space in spaces.items():
+        basis = [vector for vector in space.basis if any(vector[1:])]  # the constants have C = 1, and are left out
+        if basis:
+            known[law] = DarbouxSpace(space.dim, space.degree, basis)
     # Different products of cofactors may be the same function, and one of them may show that products span the space.
     listed = [space for law, space in known.items() if _is_spanned_by_products(known, law, map_.prime)]
     for law, space in known.items():
@@ -187,22 +198,6 @@ def _of_map(
             else:
                 found.append(written)
     return reason
-
-
-def _of_flow(laboratory: Laboratory, degree: int, seconds: float, found: list[DarbouxPolynomials]) -> str:
-    """The same with the Darboux polynomials of the flow, each with its own cofactor."""
-    assert laboratory.field is not None
-    known = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
-    for P in known.functions:
-        K = darboux_cofactor(laboratory.field, P)
-        assert K is not None  # or it would not have been listed
-        found.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
-    return "" if known.degree >= degree else f"degrees above {known.degree} are not settled: {known.reason}"
-
-
-def _without_constants(space: DarbouxSpace) -> DarbouxSpace:
-    """For C = 1 the constants solve the equation: they are left out."""
-    return DarbouxSpace(space.dim, space.degree, [vector for vector in space.basis if any(vector[1:])])
 
 
 def _is_spanned_by_products(known: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:

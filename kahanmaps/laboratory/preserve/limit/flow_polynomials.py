@@ -189,9 +189,13 @@ class _Search:
             except BadPrime:
                 continue
             vectors, are_all = self._modulo(flow, deadline)
-            missing = [
-                vector for vector in vectors if not self._lifts(vector, prime) and not self._is_known(vector, flow)
-            ]
+            missing = list[list[int]]()
+            for vector in vectors:
+                if not self._lifts(vector, prime):  # a higher power shows it, or that it has conjugate ones
+                    residues, modulus = self._newton(vector, prime), prime**_PRECISION
+                    is_known = residues and self._lifts(residues, modulus)
+                    if not is_known and not any(_is_irrational(c, modulus) for c in residues):
+                        missing.append(vector)
             if not are_all:
                 continue
             pairs = [(chinese(old, m, new, prime), m * prime, new) for old, m in joined for new in missing]
@@ -239,12 +243,6 @@ class _Search:
                 return False
             self.found[str(P)] = P
         return True
-
-    def _is_known(self, vector: Sequence[int], flow: ModularFlow) -> bool:
-        """Whether a higher power of the prime shows the polynomial: it is added, or has conjugate ones."""
-        residues = self._newton(vector, flow.prime)
-        modulus = flow.prime**_PRECISION
-        return bool(residues) and (self._lifts(residues, modulus) or any(_is_irrational(c, modulus) for c in residues))
 
     def _newton(self, vector: Sequence[int], p: int) -> list[int]:
         """The coefficients modulo a power of p, of a P known modulo p; empty where that is no simple solution."""
@@ -372,18 +370,23 @@ class _Line:
 
     def spaces(self) -> list[Vectors] | None:
         """What vanishes along the solutions from as many zeros as the degree is, for each choice; None if too many."""
-        p, points = self.flow.prime, self.special(self._left())
+        p, left = self.flow.prime, self._extactic()
+        for P in self.known:
+            factor = self.restricted(P)
+            while (common := left.gcd(factor)).degree() > 0:
+                left = left // common
+        points = self.special(left)
         found: list[Vectors] = []
         waiting: list[tuple[int, int, Vectors]] = [(0, 0, [])]
         tried = 0
         while waiting:
-            start, size, common = waiting.pop()
+            start, size, shared = waiting.pop()
             for k in range(start, len(points)):
                 degree, space = points[k]
                 if size + degree > self.degree:
                     continue
                 tried += 1
-                both = _intersection(common, space, p) if size else space
+                both = _intersection(shared, space, p) if size else space
                 if size and len(both) <= self._usual(size + degree):
                     continue
                 if size + degree == self.degree:
@@ -440,15 +443,6 @@ class _Line:
             values.append(tuple(int(minor.det()) for minor in minors))
         first, second = (interpolated(range(top + 1), column, p) for column in zip(*values, strict=True))
         return first.gcd(second)
-
-    def _left(self) -> nmod_poly:
-        """The extactic determinant without the factors of known polynomials."""
-        left = self._extactic()
-        for P in self.known:
-            factor = self.restricted(P)
-            while (common := left.gcd(factor)).degree() > 0:
-                left = left // common
-        return left
 
     def restricted(self, P: fmpq_mpoly) -> nmod_poly:
         """A polynomial on the line, in t."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 import random
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import comb
 from typing import Any
@@ -167,7 +167,16 @@ class _Reduced:
 
     def pencil(self, name: str, integral: RationalFunction, eps: int) -> Pencil:
         """The pencil of the components. Raises BadPrime, _Unclear."""
-        P, Q = self._in_random_coordinates([integral.numerator, integral.denominator], eps)
+        # Homogeneous, both of the same degree, and affine forms put for x, y and z.
+        x, y = self.ring.gens()
+        forms = (modulo(f, self.field) for f in (integral.numerator, integral.denominator))
+        flat = [f.compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
+        top, zero = int(max(f.total_degree() for f in flat)), self.ring.constant(0)
+        X, Y, Z = (
+            [line**k for k in range(top + 1)]
+            for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
+        )
+        P, Q = (sum((X[i] * Y[j] * Z[top - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in flat)
         curves = [self._component(P, Q) for _ in range(3)]
         d = int(curves[0].total_degree())
         coefficients = [[int(C[i, j]) for i in range(d + 1) for j in range(d + 1 - i)] for C in curves]
@@ -185,18 +194,6 @@ class _Reduced:
 
     def _random(self) -> int:
         return self._rng.randrange(1, self.prime)
-
-    def _in_random_coordinates(self, forms: Sequence[Any], eps: int) -> list[nmod_mpoly]:
-        """Polynomials in (x, y, eps) made homogeneous, all of the same degree, and affine forms put for x, y and z."""
-        x, y = self.ring.gens()
-        flat = [modulo(f, self.field).compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
-        d = int(max(f.total_degree() for f in flat))
-        X, Y, Z = (
-            [line**k for k in range(d + 1)]
-            for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
-        )
-        zero = self.ring.constant(0)
-        return [sum((X[i] * Y[j] * Z[d - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in flat]
 
     def _component(self, P: nmod_mpoly, Q: nmod_mpoly) -> nmod_mpoly:
         """That of the member through a random point on which the point is: irreducible over the closure of GF(p)."""
@@ -220,7 +217,12 @@ class _Reduced:
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
             a = _root(K, [K(int(c)) for c in factor.coeffs()])
-            on_line = [_on_line(K, F, a) for F in (C, D)]
+            on_line = list[Any]()  # F(a, y) as polynomials over K
+            for F in (C, D):
+                coefficients = [K(0)] * (int(F.total_degree()) + 1)
+                for (i, j), c in F.terms():
+                    coefficients[j] += a**i * K(int(c))
+                on_line.append(_polynomial(K, coefficients))
             common = on_line[0].gcd(on_line[1])
             k = int(common.degree())
             _require(k > 0)
@@ -281,38 +283,33 @@ def _embedding(K: Any, L: Any) -> Any:
     return lambda c: sum((power * L(int(part)) for part, power in zip(c.to_list(), powers, strict=False)), L(0))
 
 
-def _on_line(K: Any, F: nmod_mpoly, a: Any) -> Any:
-    """F(a, y) as a polynomial over K."""
-    coefficients = [K(0)] * (int(F.total_degree()) + 1)
-    for (i, j), c in F.terms():
-        coefficients[j] += a**i * K(int(c))
-    return _polynomial(K, coefficients)
+def _nonzero(terms: Iterable[tuple[tuple[int, int], Any]]) -> _Local:
+    """The sum of terms, without those that are 0."""
+    found: _Local = {}
+    for exponents, c in terms:
+        found[exponents] = found.get(exponents, 0) + c
+    return {exponents: c for exponents, c in found.items() if not c.is_zero()}
 
 
 def _moved(F: _Local, a: Any, b: Any, most: int) -> _Local:
     """F(x + a, y + b), as all that follows without what is 0 and what is of a degree above `most`."""
-    found: _Local = {}
-    for (i, j), c in F.items():
-        for k in range(min(i, most) + 1):
-            left = c * comb(i, k) * a ** (i - k)
-            for l in range(min(j, most - k) + 1):
-                found[k, l] = found.get((k, l), 0) + left * comb(j, l) * b ** (j - l)
-    return {e: c for e, c in found.items() if not c.is_zero()}
+    return _nonzero(
+        ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
+        for (i, j), c in F.items()
+        for k in range(min(i, most) + 1)
+        for l in range(min(j, most - k) + 1)
+    )
 
 
 def _sheared(F: _Local, s: Any) -> _Local:
     """F(x + s y, y)."""
-    found: _Local = {}
-    for (i, j), c in F.items():
-        for k in range(i + 1):
-            found[i - k, j + k] = found.get((i - k, j + k), 0) + c * comb(i, k) * s**k
-    return {e: c for e, c in found.items() if not c.is_zero()}
+    return _nonzero(((i - k, j + k), c * comb(i, k) * s**k) for (i, j), c in F.items() for k in range(i + 1))
 
 
 def _blown_up(F: _Local, m: int, slope: Any, most: int) -> _Local:
     """F(x, x (y + slope))/x^m, where m is the multiplicity."""
-    found: _Local = {}
-    for (i, j), c in F.items():
-        for k in range(min(j, most - (i + j - m)) + 1):
-            found[i + j - m, k] = found.get((i + j - m, k), 0) + c * comb(j, k) * slope ** (j - k)
-    return {e: c for e, c in found.items() if not c.is_zero()}
+    return _nonzero(
+        ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
+        for (i, j), c in F.items()
+        for k in range(min(j, most - (i + j - m)) + 1)
+    )

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, reduce
+from functools import reduce
 from itertools import combinations
 from math import comb
 from typing import Any
@@ -41,6 +42,7 @@ from kahanmaps.laboratory.modular_points import (
     Independent,
     ModularMap,
     NoPoint,
+    Point,
     exponents_up_to,
     product_of,
     slopes,
@@ -236,7 +238,10 @@ def find_poisson(
     dim, asked = file.dim, degree
     pairs = dim * (dim - 1) // 2
     if denominator is not None:
-        denominator = _in_names_of(laboratory, denominator)
+        context = ring(laboratory.map.names)  # with the symbols
+        gens = (*context.gens()[:dim], context.gens()[-1])
+        parts = (denominator.numerator, denominator.denominator)
+        denominator = RationalFunction(*(part.compose(*gens, ctx=context) for part in parts))
         if any(part.is_zero() for part in at_eps(denominator, laboratory.eps)):
             at = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
             raise InputError(
@@ -271,11 +276,16 @@ def find_poisson(
     if cut:
         cut = f"{cut}: such tensors have too many coefficients"
         reason = f"{reason}; {cut}" if reason and not found else cut
-    pencil = _verdict_on_pencil(laboratory, found, deadline)
+    pencil = None
+    if 1 < len(found) <= _LARGEST_PENCIL and all(one.jacobi.holds for one in found):
+        identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
+        pencil, _ = _verdict(laboratory, identity, deadline)
     search = PoissonSearch(*laboratory.asked, tuple(found), (), degree, denominator, pencil, reason)
     if found and integrals is None:
         progress("integrals, for their brackets")
-        integrals = _integrals(laboratory, symbols, deadline, seed)
+        left = max(1.0, (deadline - time.monotonic()) / 2)
+        with suppress(KahanmapsError):  # of maps without a search
+            integrals = find_integrals(file, symbols=symbols, eps=laboratory.eps, seconds=left, seed=seed).integrals
     return with_brackets(search, integrals or (), max(0.0, deadline - time.monotonic()))
 
 
@@ -286,30 +296,6 @@ def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], seco
         laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed)
         tensors = tuple(_with_brackets(laboratory, one, integrals, deadline) for one in tensors)
     return replace(found, tensors=tensors, integrals=tuple(integrals))
-
-
-def _in_names_of(laboratory: Laboratory, function: RationalFunction) -> RationalFunction:
-    """A function of the variables and eps as one of the symbols too."""
-    context = ring(laboratory.map.names)
-    gens = (*context.gens()[: laboratory.map.dim], context.gens()[-1])
-    return RationalFunction(*(part.compose(*gens, ctx=context) for part in (function.numerator, function.denominator)))
-
-
-def _verdict_on_pencil(laboratory: Laboratory, found: Sequence[FoundTensor], deadline: float) -> Verdict | None:
-    """Whether all combinations are Poisson tensors; None where these are too many, or not all of them are."""
-    if not 1 < len(found) <= _LARGEST_PENCIL or not all(one.jacobi.holds for one in found):
-        return None
-    identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
-    return _verdict(laboratory, identity, deadline)[0]
-
-
-def _integrals(laboratory: Laboratory, symbols: Sequence[str], deadline: float, seed: int) -> tuple[FoundIntegral, ...]:
-    """The integrals in closed form that are found in half of the time that is left; none for maps without a search."""
-    left = max(1.0, (deadline - time.monotonic()) / 2)
-    try:
-        return find_integrals(laboratory.file, symbols=symbols, eps=laboratory.eps, seconds=left, seed=seed).integrals
-    except KahanmapsError:
-        return ()
 
 
 def _tensors(
@@ -330,11 +316,12 @@ def _tensors(
         return [], "what was found at one eps was not found at another"
     support = frozenset(model.support)
     variables = laboratory.map.variables
+    prefix = "d_"
+    while any(name.startswith(prefix) for name in variables):
+        prefix += "_"
+    names = (*variables, *(prefix + name for name in variables))  # the latter for the directions
     forms = laboratory.formulas(
-        [model],
-        lambda map_: [tensor_space(map_, degree, denominator, support)],
-        deadline,
-        (*variables, *_directions(variables)),
+        [model], lambda map_: [tensor_space(map_, degree, denominator, support)], deadline, names
     )
     if forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
@@ -393,14 +380,6 @@ def _not_multiples(map_: ModularMap, space: DarbouxSpace, degree: int) -> list[i
     return found
 
 
-def _directions(variables: Sequence[str]) -> list[str]:
-    """Names d_i for the directions, none of them that of a variable."""
-    prefix = "d_"
-    while any(name.startswith(prefix) for name in variables):
-        prefix += "_"
-    return [prefix + name for name in variables]
-
-
 def _tensor_of(bivector: fmpq_mpoly, n: int, names: Sequence[str], denominator: RationalFunction | None) -> GivenTensor:
     """The matrix of sum P_ij d_i d_j, divided by the denominator."""
     context = ring(names)
@@ -408,33 +387,20 @@ def _tensor_of(bivector: fmpq_mpoly, n: int, names: Sequence[str], denominator: 
     for monomial, coefficient in bivector.terms():
         pair = tuple(k for k in range(n) if monomial[n + k])
         entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
-    above, below = context.constant(1), context.constant(1)
+    over, times = context.constant(1), context.constant(1)
     if denominator is not None:
-        below, above = denominator.numerator, denominator.denominator
+        over, times = denominator.numerator, denominator.denominator
 
     def entry(i: int, j: int) -> RationalFunction:
-        P = context.from_dict(entries.get((min(i, j), max(i, j)), {})) * above
-        return _reduced(P if i < j else -P, below)
+        P = context.from_dict(entries.get((min(i, j), max(i, j)), {})) * times
+        return _reduced(P if i < j else -P, over)
 
     return GivenTensor([[entry(i, j) for j in range(n)] for i in range(n)])
 
 
-def _reduced(above: fmpq_mpoly, below: fmpq_mpoly) -> RationalFunction:
-    common = above.gcd(below)
-    return RationalFunction(above / common, below / common)
-
-
-@cache
-def _unknowns(n: int, degree: int) -> tuple[list[tuple[int, int, int]], list[tuple[int, int]]]:
-    """For each monomial x^a d_i d_j its number among all monomials, that of d_i d_j and of x^a; and the pairs i < j."""
-    pairs = list(combinations(range(n), 2))
-    number = {exponent: k for k, exponent in enumerate(exponents_up_to(2 * n, degree + 2))}
-    found = []
-    for p, (i, j) in enumerate(pairs):
-        directions = tuple(int(k in (i, j)) for k in range(n))
-        for m, exponent in enumerate(exponents_up_to(n, degree)):
-            found.append((number[(*exponent, *directions)], p, m))
-    return found, pairs
+def _reduced(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
+    common = P.gcd(Q)
+    return RationalFunction(P / common, Q / common)
 
 
 def tensor_space(
@@ -449,38 +415,39 @@ def tensor_space(
     Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
-    unknowns, pairs = _unknowns(n, degree)
-    length = len(exponents_up_to(2 * n, degree + 2))
-    if support is not None:
-        every = exponents_up_to(2 * n, degree + 2)
-        unknowns = [one for one in unknowns if every[one[0]] in support]
+    every, pairs = exponents_up_to(2 * n, degree + 2), list(combinations(range(n), 2))
+    number = {exponent: k for k, exponent in enumerate(every)}
+    unknowns = []  # for each monomial x^a d_i d_j its number among all monomials, that of d_i d_j and of x^a
+    for p, pair in enumerate(pairs):
+        directions = tuple(int(k in pair) for k in range(n))
+        for m, exponent in enumerate(exponents_up_to(n, degree)):
+            if support is None or (*exponent, *directions) in support:
+                unknowns.append((number[(*exponent, *directions)], p, m))
+
+    def factor(x: Point) -> int:
+        """The value of the denominator at a point, 1 without one. Raises NoPoint at its poles, which are everywhere."""
+        if denominator is None:
+            return 1
+        field = GF(prime)
+        value = denominator.value(field, [field.convert(c) for c in (*x, *map_.values, map_.eps)])
+        if value is None:
+            raise NoPoint("the denominator has no value at a random point modulo a prime")
+        return int(value)
+
     by_pair = [sum(p == q for _, q, _ in unknowns) for p in range(len(pairs))]
     rows = []
     for x, image in map_.pairs(max(by_pair, default=0) + _SPARE):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
-        before, after = (_factor(map_, denominator, point) for point in (x, image))
-        here, there = map_.moved(x, image, degree, (after, before))
+        here, there = map_.moved(x, image, degree, (factor(image), factor(x)))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
             rows.append([minors[p] * here[m] - there[m] if p == row else minors[p] * here[m] for _, p, m in unknowns])
     vectors = []
     for solution in null_space(rows, len(unknowns), prime):
-        vector = [0] * length
+        vectors.append([0] * len(every))
         for (place, _, _), value in zip(unknowns, solution, strict=True):
-            vector[place] = value
-        vectors.append(vector)
+            vectors[-1][place] = value
     return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime)
-
-
-def _factor(map_: ModularMap, denominator: RationalFunction | None, x: Sequence[int]) -> int:
-    """The value of the denominator at a point, 1 without one. Raises NoPoint at its poles, which are everywhere."""
-    if denominator is None:
-        return 1
-    field = GF(map_.prime)
-    value = denominator.value(field, [field.convert(c) for c in (*x, *map_.values, map_.eps)])
-    if value is None:
-        raise NoPoint("the denominator has no value at a random point modulo a prime")
-    return int(value)
 
 
 def _judged(laboratory: Laboratory, tensor: GivenTensor, deadline: float) -> FoundTensor | None:
@@ -527,25 +494,19 @@ def _with_brackets(
             row = there.gradient(function)
             if len(there.rows) < most and there.adds(row):
                 add_casimir(name, function, row)
-    chosen = [integrals[k] for k in _in_involution(field, P, rows)]
+    # The most of the gradients whose brackets with each other are 0 at the point, the first such choice.
+    moved = [(P * field.column(row)).entries() for row in rows]
+    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in moved] for row in rows]
+    some = range(min(len(rows), _MOST_INTEGRALS))
+    choices = (choice for size in range(len(some), 0, -1) for choice in combinations(some, size))
+    best = next((choice for choice in choices if all(vanish[i][j] for i, j in combinations(choice, 2))), ())
+    chosen = [integrals[k] for k in best]
     involution = None
     if chosen:
         functions = [one.function for one in chosen]
         involution, _ = _verdict(laboratory, _brackets(laboratory, tensor, functions, False), deadline)
     names = tuple(one.name for one in chosen)
     return replace(found, casimirs=tuple(casimirs), in_involution=names, involution=involution)
-
-
-def _in_involution(field: Field, P: Any, rows: Sequence[Sequence[Any]]) -> tuple[int, ...]:
-    """The most of the gradients `rows` whose brackets with each other are 0 at the point, the first such choice."""
-    moved = [(P * field.column(row)).entries() for row in rows]
-    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in moved] for row in rows]
-    most = range(min(len(rows), _MOST_INTEGRALS))
-    for size in range(len(most), 0, -1):
-        for choice in combinations(most, size):
-            if all(vanish[i][j] for i, j in combinations(choice, 2)):
-                return choice
-    return ()
 
 
 def _verdict(laboratory: Laboratory, identity: Identity, deadline: float) -> tuple[Verdict, Evidence]:
