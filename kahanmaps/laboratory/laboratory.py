@@ -30,10 +30,9 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_factors,
     jacobian_factors,
 )
-from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.identities import Separated, separated, verdict_on
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
-from kahanmaps.laboratory.preserve.separated import Separated, separated
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan

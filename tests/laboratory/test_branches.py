@@ -10,9 +10,9 @@ from search_helpers import system, values_on_orbits
 
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.branches import tell_apart
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.search import tell_apart
 
 # f = grad H x grad K with quadratic H(x, y) and K(y, z). By exchanging H and K each of the two pencils becomes the
 # other: (K + const)/(1 - eps^2 (a (dK/dz)^2 ...)) has its zeros where the other one has them.

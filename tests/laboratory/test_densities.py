@@ -139,19 +139,6 @@ def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypa
     assert module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2))) is None
 
 
-def test_the_theorem_leaves_out_factors_without_variables_and_wants_numbers_in_few_dimensions(monkeypatch):
-    file = system("x y z w", "x", "-y", "w", "z^2")  # det(I - eps f') = (1 - eps^2) (1 - 2 eps^2 z)
-    found = module._theorem(Laboratory(file, ()))
-    assert found.function == parse_rational_function("2*eps^2*z - 1", ["x", "y", "z", "w", "eps"])
-    with_symbol = system("x y", "a*x", "-a*y + x^2", a="2")
-    assert module._theorem(Laboratory(with_symbol, ())) is not None
-    assert module._theorem(Laboratory(with_symbol, ("a",))) is None
-    monkeypatch.setattr(module, "MAX_DIMENSION", 4)
-    assert module._theorem(Laboratory(file, ())) is not None
-    monkeypatch.setattr(module, "MAX_DIMENSION", 3)
-    assert module._theorem(Laboratory(file, ())) is None
-
-
 def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.densities._MAX_DEGREE", 3)
     top = System("x' = y*z; y' = -3*x*z; z' = 2*x*y")
@@ -161,9 +148,8 @@ def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched(mo
     assert find_densities(top, integrals=()).densities == ()
 
 
-@pytest.mark.parametrize(("dim", "seed"), [(2, 0), (3, 1)])
-def test_random_systems_have_none(dim, seed):
-    found = find_densities(random_system(dim, seed), max_degree=5)
+def test_random_systems_have_none():
+    found = find_densities(random_system(3, 1), max_degree=5)
     assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
     assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
 

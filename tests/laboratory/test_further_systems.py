@@ -127,12 +127,6 @@ def slow_unless(names, fast):
 # The answers themselves
 
 
-def test_every_system_has_an_answer_and_the_other_way_round():
-    for folder, answers in ((FOLDER, FURTHER), (FOLDER / "degenerate", DEGENERATE)):
-        assert {path.stem for path in folder.glob("*.toml")} == set(answers)
-    assert all(file_of(name).system.dim == known["dim"] for name, known in KNOWN.items())
-
-
 @pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 2]))
 def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
     file, known = file_of(name), KNOWN[name]

@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import Decision
@@ -13,9 +13,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import identities
-from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -93,21 +91,7 @@ def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_boun
     assert integral_verdict(system, wrong, None)[0] is Verdict.REFUTED
 
 
-def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
-    formulas = Laboratory.formulas
-
-    def wrong(self, model, spaces_on, deadline):
-        found = formulas(self, model, spaces_on, deadline)
-        one = parse_polynomial("x + y", found.bases[0][0].context().names())
-        found.bases[0][0] = found.bases[0][0] + one
-        return found
-
-    monkeypatch.setattr(Laboratory, "formulas", wrong)
-    found = darboux_polynomials(load("lotka_volterra"), 1)
-    assert found.spaces == ()
-    assert found.reason == "no closed form for the number in front of the cofactor C[y]"
-
-
+@pytest.mark.slow
 def test_what_check_integrals_proves_is_proved_where_it_is_found():
     """Of the repaired icosahedral map, whose denominator has degree 6 and eps^18: some 93 million products of terms."""
     file = load("repaired_icosahedral")

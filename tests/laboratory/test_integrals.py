@@ -4,7 +4,7 @@ import random
 
 import pytest
 from flint import fmpq
-from helpers import DIMENSION
+from helpers import DIMENSION, quick
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from search_helpers import integrals_of, random_system, ranks, system, values_on_orbits
@@ -29,7 +29,7 @@ def independent(functions, file, others=(), symbols=()):
     return ranks(list(functions), list(others), Laboratory(file, symbols).maps[0])
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in PLANE_AND_SPACE])
+@pytest.mark.parametrize("name", quick(PLANE_AND_SPACE, [n for n in PLANE_AND_SPACE if n not in LONG][::2]))
 def test_the_integrals_of_the_literature_are_found(name):
     file = load(name)
     found = integrals_of(name)
@@ -78,8 +78,7 @@ def test_a_number_for_eps():
     assert found.toml_section().startswith("# for eps = 1/3 only (time step 2 eps = 2/3): check with --eps 1/3\n[integ")
 
 
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(("dim", "seed"), [(2, 0), (3, 1)])
 def test_random_systems_have_none(dim, seed):
     found = find_integrals(random_system(dim, seed), max_degree=4)
     assert (found.integrals, found.codimension, found.reason, found.toml_section()) == ((), 0, "", "")
@@ -117,17 +116,6 @@ def test_maps_that_are_periodic_at_an_eps(file, eps, period):
         assert {len(each) for each in values_on_orbits(file, one.text, [eps])} == {1}
     others = [len(each) for one in found.integrals for each in values_on_orbits(file, one.text, ["1/7"])]
     assert max(others) > 1
-
-
-@pytest.mark.parametrize(
-    ("rhs", "eps", "words"),
-    [(["x", "3*y"], "1/3", "no value anywhere"), (["-x", "x*y + y^2"], 1, "not invertible")],
-)
-def test_maps_that_are_none_are_told(rhs, eps, words):
-    found = find_integrals(system("x y", *rhs), eps=eps)
-    assert (found.integrals, found.profile.nullities, found.profile.complete) == ((), (), False)
-    assert words in found.reason
-    assert f"eps = {eps}" in found.reason
 
 
 def test_too_little_time_is_told():
@@ -198,19 +186,15 @@ def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
 UP_TO_2 = "relations of degree up to 2 along orbits"
 COUNTS = [  # dimension, codimensions by degree, period, with the known ones, by theorems, formulas; what is concluded
     (3, (0, 2), None, 0, 0, 0, (2, True, False), f"in all 2 independent (measured: {UP_TO_2} show 2)"),
-    (
-        3, (0, 1), None, 0, 1, 1, (1, False, True),
-        f"in all at least 1 independent (1 by theorems: T; measured: {UP_TO_2} show no more)",
-    ),
+    (3, (0, 1), None, 0, 1, 1, (1, False, True),
+     f"in all at least 1 independent (1 by theorems: T; measured: {UP_TO_2} show no more)"),
     (3, (0, 1), None, 0, 0, 2, (2, True, True), f"in all 2 independent (measured: {UP_TO_2} show 1; 2 have formulas)"),
     (4, (0, 1), None, 2, 0, 1, (2, False, False), f"in all at least 2 independent (measured: {UP_TO_2} show 2)"),
     (3, (0, 0), None, 0, 0, 0, (0, False, True), f"none shows in {UP_TO_2} (measured)"),
     (1, (0, 0), None, 0, 0, 0, (0, True, True), f"there is no integral (measured, {UP_TO_2})"),
     (3, (), None, 0, 0, 0, (0, False, True), "orbits were not measured"),
-    (3, (), None, 0, 2, 0, (2, False, False), "in all at least 2 independent (2 by theorems: T)"),
     (3, (), None, 0, 3, 3, (3, True, True), "in all 3 independent (3 by theorems: T)"),
     (2, (1, 1), 4, 0, 0, 0, (1, False, False), f"in all at least 1 independent (measured: {UP_TO_2} show 1)"),
-    (2, (1, 2), 4, 0, 0, 0, (2, True, False), f"in all 2 independent (measured: {UP_TO_2} show 2)"),
 ]  # fmt: skip
 
 

@@ -202,9 +202,7 @@ def test_a_pencil_is_one_of_at_least_two_tensors_and_of_not_too_many(monkeypatch
     assert find_poisson(load("weierstrass"), integrals=()).pencil is None
 
 
-@pytest.mark.parametrize(
-    ("denominator", "eps"), [("0", None), ("x - x", "1/10"), ("(10*eps - 1)*x", "1/10"), ("x/(10*eps - 1)", "1/10")]
-)
+@pytest.mark.parametrize(("denominator", "eps"), [("0", None), ("(10*eps - 1)*x", "1/10"), ("x/(10*eps - 1)", "1/10")])
 def test_a_denominator_that_is_0_at_the_eps_in_force_is_wrong_use(denominator, eps):
     file = load("lotka_volterra")
     function = parse_rational_function(denominator, (*file.variables, "eps"))

@@ -1,9 +1,4 @@
-"""Integrals of recurrences that are published as integrable, and of their images under scalings and permutations.
-
-The known integrals are checked here along exact orbits first, with Python's fractions.
-"""
-
-from fractions import Fraction
+"""Integrals of recurrences that are published as integrable, and of their images under scalings and permutations."""
 
 import pytest
 from search_helpers import ranks
@@ -44,27 +39,14 @@ def image_of(names, last, scales, order):
     return parse_system(f"variables = {variables}\n[map]\nimage = {image}")
 
 
-@pytest.mark.parametrize("case", [of_sums(4), of_sums(5), lyness(3), lyness(4)])
-def test_the_known_integrals_are_constant_along_exact_orbits(case):
-    names, last, known = case
-    point = [Fraction(2), Fraction(3, 2), Fraction(-5, 3), Fraction(7), Fraction(1, 4)][: len(names)]
-    values = set()
-    for _ in range(4):
-        values.add(tuple(eval(text, {}, dict(zip(names, point, strict=True))) for text in known))
-        point = [*point[1:], eval(last, {}, dict(zip(names, point, strict=True)))]
-    assert len(values) == 1
-
-
 @pytest.mark.parametrize(
     ("case", "count", "scales", "order"),
     [
         (of_sums(4), 2, [1, 1, 1, 1], [0, 1, 2, 3]),
         (of_sums(4), 2, [10**6, "1/3", 7, "2/999983"], [2, 0, 3, 1]),
         (of_sums(5), 3, [1, 1, 1, 1, 1], [0, 1, 2, 3, 4]),
-        pytest.param(of_sums(5), 3, [3, 10**6, "1/7", 1, 2], [4, 2, 0, 1, 3], marks=pytest.mark.slow),
         (lyness(3), 2, [2, "1/5", 10**5], [1, 2, 0]),
         (lyness(4), 2, [1, 1, 1, 1], [0, 1, 2, 3]),
-        pytest.param(lyness(4), 2, [5, 1, "1/1000", 3], [3, 2, 1, 0], marks=pytest.mark.slow),
         (("abcd", "(1 + a + b + c + d)/a", []), 0, [1, 1, 1, 1], [0, 1, 2, 3]),
     ],
 )

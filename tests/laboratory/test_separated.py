@@ -17,8 +17,8 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import laboratory
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import identities
+from kahanmaps.laboratory.preserve.identities import separated
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.separated import separated
 
 PAPER = load("paper_m3").system
 THERE = separated(PAPER)

@@ -1,24 +1,29 @@
 """Formulas that were found are put to the proof: as identities in x, eps and the symbols.
 
-They are stated without quotients, for I = P/Q that P(x~) Q(x) = P(x) Q(x~): that is the smaller form to expand.
+They are stated without quotients, for I = P/Q that P(x~) Q(x) = P(x) Q(x~): that is the smaller form to expand. In
+coordinates in which the planes of a normal form separate, identities that are too long to expand are short.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.functions import DEFAULT_BUDGET
-from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import MAX_DIMENSION, settle
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.invariants.integrals import integral_condition
 from kahanmaps.invariants.measures import density_condition, jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _BUDGET = DEFAULT_BUDGET  # as `check-integrals` has it: what is proved there is proved here
@@ -109,3 +114,39 @@ def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verd
     decision = decide(identity, seed)
     found = settle(identity, decision, seed, _BUDGET) if expands else decision
     return found.verdict, found.evidence
+
+
+@dataclass(frozen=True)
+class Separated:
+    """The `system` that another one is in z, where x = T z. A Kahan map is the same in all linear coordinates."""
+
+    system: QuadraticSystem
+    T: fmpq_mat
+
+    def function(self, given: RationalFunction) -> RationalFunction:
+        """A function of (x, ...) as one of (z, ...)."""
+
+        def there(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+            context, n = polynomial.context(), self.system.dim
+            x = linear_combinations(self.T, context.gens()[:n])
+            return polynomial.compose(*x, *context.gens()[n:], ctx=context)
+
+        return RationalFunction(there(given.numerator), there(given.denominator))
+
+
+def separated(system: QuadraticSystem) -> Separated | None:
+    """The system where its planes over Q separate; None for one without such planes, and where it is not shorter.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> system = load("paper_m2").system
+    >>> [len(f) for f in system.rhs], [len(f) for f in separated(system).system.rhs]
+    ([8, 8, 9, 9], [2, 3, 3, 2])
+    """
+    known = system_normal_form(system)
+    if not isinstance(known, SystemNormalForm):
+        return None
+    splitting = Splitting(known.form, QQ, 1, known.T)
+    matrices = [splitting.matrix(plane) for plane in range(len(splitting.planes))]
+    T = fmpq_mat([list(chain(*rows)) for rows in zip(*matrices, strict=True)])
+    there = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
+    return Separated(there, T) if sum(map(len, there.rhs)) < sum(map(len, system.rhs)) else None

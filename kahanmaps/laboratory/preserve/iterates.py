@@ -37,11 +37,10 @@ from kahanmaps.invariants.normalize import normalized
 from kahanmaps.invariants.phase_functions import orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
-from kahanmaps.laboratory.preserve.branches import pattern
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
-from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
+from kahanmaps.laboratory.preserve.search import Found, Step, bases_of, pattern
 from kahanmaps.maps.implicit import BirationalMap
 
 

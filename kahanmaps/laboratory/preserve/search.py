@@ -4,7 +4,13 @@ A search runs on one map: modulo a prime, at one eps, at one value of each symbo
 integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other primes, eps and
 values of the symbols gives the coefficients of the same polynomials there, from which closed forms are interpolated.
 
-What a search found modulo one prime as polynomials over Q: the search is repeated on other maps and interpolated.
+Spaces that look alike are told apart on every map, so that one rational function belongs to each of them. Two pencils
+may have zeros at the same places: then nothing on a single map, modulo one prime and at one value of the symbols, says
+which of them is which. Take a coefficient w in which they differ. Its values w_1, ..., w_k on the k spaces are the
+roots of chi(T) = (T - w_1) ... (T - w_k), whose coefficients do not depend on the order of the spaces: they can be
+interpolated. The factors of chi over Q are the spaces again: a linear one is the w_i of one space as a function of the
+symbols and eps, by whose value this space is known on any other map. A factor of higher degree belongs to spaces that
+are conjugate over an extension and have no formula over Q.
 """
 
 from __future__ import annotations
@@ -13,18 +19,22 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import product as cartesian
 from itertools import takewhile
 from math import comb, inf
 from types import MappingProxyType
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import null_space
+from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, ring, substitute
 from kahanmaps.algebra.residues import chinese, simple_fraction
+from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.preserve.branches import Branches, Pattern, pattern, tell_apart
+from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -48,10 +58,40 @@ from kahanmaps.maps.kahan import KahanMapOver
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MOST_TERMS = 1000
+Pattern = tuple[tuple[bool, ...], ...]
+Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
+
+_SAMPLES = (150, 600, 3000)  # a simple coefficient is looked for before many values are taken for one
+_COEFFICIENTS = 6
 NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
 AFFINE = "v.x with v.f(x) = 0"
 _CHANCE = 20  # bits by which a fraction is simpler than one of a random residue
+
+
+def pattern(space: DarbouxSpace) -> Pattern:
+    """Where the basis of a space has entries other than zero."""
+    return tuple(tuple(bool(entry) for entry in vector) for vector in space.basis)
+
+
+@dataclass(frozen=True)
+class Branches:
+    """Spaces of one pattern by the values of their coefficient at `place`: `roots` are its functions, one a space."""
+
+    place: tuple[int, int]
+    roots: tuple[RationalFunction, ...]
+
+    def in_order(self, alike: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
+        """The spaces on a map in the order of the roots; None where two agree there, or one is missing."""
+        field = GF(map_.prime)
+        at = [field.convert(value) for value in (*map_.values, map_.eps)]
+        row, column = self.place
+        by_value = {space.basis[row][column]: space for space in alike}
+        values = [root.value(field, at[: len(root.names)]) for root in self.roots]
+        if len(by_value) < len(alike) or None in values:
+            return None
+        found = [by_value.get(int(value)) for value in values]
+        return None if None in found else [space for space in found if space is not None]
 
 
 @dataclass(frozen=True)
@@ -328,3 +368,55 @@ def _branches(
                 return {}, f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
             branches.setdefault(number, {})[kind] = told
     return branches, ""
+
+
+def tell_apart(
+    model: Sequence[DarbouxSpace],
+    alike: Alike,
+    names: Sequence[str],
+    seed: int,
+    deadline: float,
+    root: Root | None = None,
+) -> Branches | None:
+    """What tells spaces of one pattern apart at every value of `names`; None where they are conjugate or time is over.
+
+    `model` are the spaces on one map, `alike(prime, values)` those on others, in any order; None at special values.
+    """
+    places = [
+        (i, k)
+        for i, vector in enumerate(model[0].basis)
+        for k in range(len(vector))
+        if len({space.basis[i][k] for space in model}) == len(model)
+    ]
+    count, context = len(model), ring((*names, "T"))
+    *gens, T = context.gens()
+    origin = {"T": fmpq(0)}
+    for samples, place in cartesian(_SAMPLES, places[:_COEFFICIENTS]):
+        if time.monotonic() > deadline:
+            return None
+
+        def symmetric_functions(
+            prime: int, values: tuple[int, ...], place: tuple[int, int] = place
+        ) -> list[int] | None:
+            spaces = alike(prime, values)
+            if spaces is None or len(spaces) != count:
+                return None
+            coefficients = [1]  # of prod (T - w), the highest first
+            for space in spaces:
+                w = space.basis[place[0]][place[1]]
+                shifted = zip([*coefficients, 0], [0, *coefficients], strict=True)
+                coefficients = [(here - w * before) % prime for here, before in shifted]
+            return coefficients[1:]
+
+        answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, deadline=deadline)
+        if answer.functions is None:
+            continue
+        numerators, denominator = over_one_denominator(answer.functions, context, gens)
+        chi = sum((P * T ** (count - k) for k, P in enumerate(numerators, 1)), denominator * T**count)
+        linear = [factor for factor, _ in chi.factor()[1] if factor.degrees()[-1] == 1]
+        roots = tuple(
+            RationalFunction(-substitute(factor, origin), substitute(factor.derivative(len(gens)), origin))
+            for factor in linear
+        )
+        return Branches(place, roots) if len(roots) == count else None
+    return None
