@@ -68,9 +68,10 @@ def test_the_reason_names_what_was_tried(monkeypatch):
     monkeypatch.setattr(integrals, "candidates", lambda *_: [])
     monkeypatch.setattr(integrals, "LARGEST_SPAN", 2)
     monkeypatch.setattr(search, "SMALL_SPAN", 2)
+    monkeypatch.setitem(search._COFACTOR_DEGREE, 4, 5)
     found = find_integrals(file)
     assert [one.text for one in found.integrals] == ["(a*b*c*d - 3)*(a + b + c + d)"]
     assert found.reason == (
-        "1 of the 2 independent integrals has no closed form P/Q among P and Q of degree up to 6 with known cofactors "
+        "1 of the 2 independent integrals has no closed form P/Q among P and Q of degree up to 5 with known cofactors "
         "or denominators: coefficients of Hirota-Kimura bases are such integrals"
     )

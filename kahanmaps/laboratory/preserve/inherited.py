@@ -60,7 +60,10 @@ class InheritedIntegrals:
             return rows
         here, there = ([field.convert(c) for c in point] for point in (x, image))
         S, local = field.convert_matrix(self.quotient.section), map_.map.local
-        A, A_there = (self._rows(field, local.jacobian(point) * S) for point in (here, there))
+        A, A_there = (
+            field.matrix(len(free), len(free), [slopes[i, j] for i in free for j in range(len(free))])
+            for slopes in (local.jacobian(point) * S for point in (here, there))
+        )
         one, eps = field.identity(len(free)), field.convert(map_.eps)
         f = local.value(here)
         f_y = field.column([f[i] for i in free])
@@ -75,10 +78,6 @@ class InheritedIntegrals:
                 row[i] = int(slope)
             rows.append(row)
         return rows
-
-    def _rows(self, field: Field, matrix: Any) -> Any:
-        m = len(self.quotient.free)
-        return field.matrix(m, m, [matrix[i, j] for i in self.quotient.free for j in range(m)])
 
     def count(self, map_: ModularMap) -> int:
         """How many of them are independent, at a random point: at least so many integrals the map has."""

@@ -476,9 +476,24 @@ class _Collected:
                 terms = zip(context.gens(), inherited.quotient.integrals[k], strict=False)
                 form = RationalFunction(sum((x * v for x, v in terms), context.constant(0)), context.constant(1))
                 self._add(row, form, AFFINE, Verdict.PROVED, _AFFINE_EVIDENCE)
-            elif time.monotonic() <= self._deadline and (written := _modified(laboratory, inherited, k - affine)):
-                function, origin, *known = written
-                self._add(row, *self._normalized((function, origin, ""))[:2], *known)
+                continue
+            field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
+            eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
+            try:
+                if time.monotonic() > self._deadline:
+                    continue
+                value = inherited.modified(k - affine, field, eps, field.variables[:-1])
+            except BudgetExceeded:
+                continue  # too long to be written out
+            common = value.above.gcd(value.below)
+            function = RationalFunction(value.above / common, value.below / common)
+            is_hamiltonian = inherited.forms[k - affine].rank() == len(inherited.quotient.free)
+            what = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
+            summary = f"{what} a constant skew matrix {'J' if is_hamiltonian else 'K'}"
+            summary = f"{summary}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
+            evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k - affine))})
+            formula = self._normalized((function, "modified Hamiltonian (cmoq-2013)", ""))
+            self._add(row, *formula[:2], Verdict.PROVED, evidence)
 
     def add_products(self, cofactors: Sequence[Cofactor]) -> None:
         """Products of powers of known polynomials, and such that depend on time."""
@@ -519,24 +534,3 @@ class _Collected:
             if verdict.holds:
                 name = f"I{len(self.integrals) + len(self.in_iterates) + 1}"
                 self.in_iterates.append(IntegralInIterates(name, ratio, origin, verdict, evidence))
-
-
-def _modified(
-    laboratory: Laboratory, inherited: InheritedIntegrals, k: int
-) -> tuple[RationalFunction, str, Verdict, Evidence] | None:
-    """The modified Hamiltonian that belongs to the k-th form; None where it is too long to be written out."""
-    field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
-    eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
-    try:
-        value = inherited.modified(k, field, eps, field.variables[:-1])
-    except BudgetExceeded:
-        return None
-    common = value.above.gcd(value.below)
-    function = RationalFunction(value.above / common, value.below / common)
-    is_hamiltonian = inherited.forms[k].rank() == len(inherited.quotient.free)
-    what = (
-        "f = J grad H with a constant skew matrix J" if is_hamiltonian else "K f = grad H with a constant skew matrix K"
-    )
-    summary = f"{what}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
-    evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k))})
-    return function, "modified Hamiltonian (cmoq-2013)", Verdict.PROVED, evidence

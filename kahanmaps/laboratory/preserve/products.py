@@ -46,7 +46,6 @@ from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.limit.flow import coefficient_rows
 from kahanmaps.maps.implicit import BirationalMap, StepOver
-from kahanmaps.systems.polynomial import PolynomialField
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
@@ -296,9 +295,25 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     x*y
     """
     weights = [_FIRST, *map(len, polynomials)]  # short formulas before long ones
-    if laboratory.field is not None and laboratory.flow:
-        return _products_of_flow(laboratory.field, laboratory.map.names, polynomials, weights)
-    line, n = _Line(laboratory.maps[0]), laboratory.map.dim
+    n, context, field = laboratory.map.dim, ring(laboratory.map.names), laboratory.field
+    one, minus = (RationalFunction(context.constant(c), context.constant(1)) for c in (1, -1))
+    if field is not None and laboratory.flow:
+        # sum k K is 0 for integrals, div f for densities, free of x for what depends on time.
+        gens = context.gens()
+        cofactors = [
+            field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
+            *(field.derivative(P) / P for P in polynomials),
+        ]
+        numbers = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
+        moving = [K - c for K, c in zip(cofactors, numbers, strict=True)]
+        in_time = []
+        for vector in _reduced(relations(coefficient_rows(moving)), weights):
+            total = sum((k * c for k, c in zip(vector, numbers, strict=True)), context.constant(0))
+            if vector[0] == 0 and not total.is_zero():
+                in_time.append((vector, RationalFunction(total, context.constant(1))))
+        exact = _reduced(relations(coefficient_rows(cofactors)), weights)
+        return _assembled(polynomials, n, exact, [(one, exact)], in_time)
+    line = _Line(laboratory.maps[0])
     here, there = ([line.along(g, place) for g in polynomials] for place in (line.here, line.there))
     # det dPhi and the C_i on a random line, as vectors over a coprime base.
     base = coprime_base([*here, *there, line.there[-1], line.numerator, line.denominator])
@@ -307,50 +322,19 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     for g, P, Q in zip(polynomials, here, there, strict=True):
         d = degree_in(g, n)
         rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
-    return _sorted_by_constant(laboratory, polynomials, _reduced(relations(rows), weights), weights)
-
-
-def _products_of_flow(
-    field: PolynomialField, names: Sequence[str], polynomials: Sequence[fmpq_mpoly], weights: Sequence[int]
-) -> Products:
-    """The same for a flow: sum k K is 0 for integrals, div f for densities, free of x for what depends on time."""
-    context = ring(names)
-    gens, n = context.gens(), field.dim
-    cofactors = [
-        field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
-        *(field.derivative(P) / P for P in polynomials),
-    ]
-    constants = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
-    moving = [K - c for K, c in zip(cofactors, constants, strict=True)]
-    in_time = []
-    for vector in _reduced(relations(coefficient_rows(moving)), weights):
-        total = sum((k * c for k, c in zip(vector, constants, strict=True)), context.constant(0))
-        if vector[0] == 0 and not total.is_zero():
-            in_time.append((vector, RationalFunction(total, context.constant(1))))
-    exact = _reduced(relations(coefficient_rows(cofactors)), weights)
-    one = RationalFunction(context.constant(1), context.constant(1))
-    return _assembled(polynomials, n, exact, [(one, exact)], in_time)
-
-
-def _sorted_by_constant(
-    laboratory: Laboratory,
-    polynomials: Sequence[fmpq_mpoly],
-    vectors: Sequence[list[int]],
-    weights: Sequence[int],
-) -> Products:
-    """Which products of the vectors have the constant 1; the exponent of det dPhi comes first in them."""
-    context = ring(laboratory.map.names)
-    one = RationalFunction(context.constant(1), context.constant(1))
+    vectors = _reduced(relations(rows), weights)  # the exponent of det dPhi first
 
     def constants(map_: ModularMap) -> list[int]:
         """prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
-        p, field, found = map_.prime, GF(map_.prime), list[int]()
-        at = [field.convert(c) for c in (*map_.values, map_.eps)]
+        p, residues, found = map_.prime, GF(map_.prime), list[int]()
+        at = [residues.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
             total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
             for g, k in zip(polynomials, vector[1:], strict=True):
                 if k:
-                    before, after = (int(evaluate(g, field, [*map(field.convert, place), *at])) for place in (x, image))
+                    before, after = (
+                        int(evaluate(g, residues, [*map(residues.convert, place), *at])) for place in (x, image)
+                    )
                     if not before or not after:
                         raise NoPoint("a polynomial vanishes at a random point modulo a prime")
                     total = total * pow(after, k, p) * pow(before, -k, p) % p
@@ -359,19 +343,16 @@ def _sorted_by_constant(
 
     values = constants_of(laboratory, constants)
     known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
-    minus = RationalFunction(context.constant(-1), context.constant(1))
 
     def with_constant_1(more: list[RationalFunction]) -> list[list[int]]:
         """The vectors whose constant is 1 or, up to such factors, one of those given: a basis."""
         combinations = multiplicative_relations([*(c for _, c in known), *more])
-        vectors = [_combined(a[: len(known)], [v for v, _ in known]) for a in combinations if any(a[: len(known)])]
-        return _reduced(vectors, weights)
+        chosen = [_combined(a[: len(known)], [v for v, _ in known]) for a in combinations if any(a[: len(known)])]
+        return _reduced(chosen, weights)
 
     exact = with_constant_1([])
     in_time = [(v, c) for v, c in known if v[0] == 0 and c != one]
-    return _assembled(
-        polynomials, laboratory.map.dim, exact, [(one, exact), (minus, with_constant_1([minus]))], in_time
-    )
+    return _assembled(polynomials, n, exact, [(one, exact), (minus, with_constant_1([minus]))], in_time)
 
 
 def _assembled(

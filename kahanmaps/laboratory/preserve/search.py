@@ -324,9 +324,32 @@ def bases_of(
     """
     if repeat(found, laboratory.maps[1], reference) is None:
         return [], "what was found at one eps was not found at another"
-    branches, reason = _branches(laboratory, found, reference, deadline)
-    if reason:
-        return [], f"integrals were found modulo primes, but no closed form: {reason}"
+    names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
+
+    @cache
+    def again_at(prime: int, values: tuple[int, ...]) -> Found | None:
+        try:
+            return repeat(found, laboratory.map_for(prime, values), reference)
+        except (NoPoint, BadPrime):
+            return None
+
+    branches: dict[int, dict[Pattern, Branches]] = {}  # what tells spaces apart that have zeros at the same places
+    for number, group in enumerate(found.spaces):
+        for kind, model in classes(group).items():
+            if len(model) == 1:
+                continue
+
+            def alike(
+                prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
+            ) -> list[DarbouxSpace] | None:
+                other = again_at(prime, values)
+                return None if other is None else classes(other.spaces[number])[kind]
+
+            known = tell_apart(model, alike, names, laboratory.seed, deadline, laboratory.root)
+            if known is None:
+                why = f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
+                return [], f"integrals were found modulo primes, but no closed form: {why}"
+            branches.setdefault(number, {})[kind] = known
 
     def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
         again = repeat(found, map_, reference, branches)
@@ -336,38 +359,6 @@ def bases_of(
     if forms.bases is None:
         return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
     return forms.bases, ""
-
-
-def _branches(
-    laboratory: Laboratory, found: Found, reference: int, deadline: float
-) -> tuple[dict[int, dict[Pattern, Branches]], str]:
-    """What tells the spaces of each step apart that have zeros at the same places, and a reason where nothing does."""
-    names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
-
-    @cache
-    def again(prime: int, values: tuple[int, ...]) -> Found | None:
-        try:
-            return repeat(found, laboratory.map_for(prime, values), reference)
-        except (NoPoint, BadPrime):
-            return None
-
-    branches: dict[int, dict[Pattern, Branches]] = {}
-    for number, group in enumerate(found.spaces):
-        for kind, model in classes(group).items():
-            if len(model) == 1:
-                continue
-
-            def alike(
-                prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
-            ) -> list[DarbouxSpace] | None:
-                other = again(prime, values)
-                return None if other is None else classes(other.spaces[number])[kind]
-
-            told = tell_apart(model, alike, names, laboratory.seed, deadline, laboratory.root)
-            if told is None:
-                return {}, f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
-            branches.setdefault(number, {})[kind] = told
-    return branches, ""
 
 
 def tell_apart(

@@ -138,66 +138,54 @@ def darboux_polynomials(
     reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0
     if flow:
         assert laboratory.field is not None
-        known = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
-        for P in known.functions:
+        settled = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
+        for P in settled.functions:
             K = darboux_cofactor(laboratory.field, P)
             assert K is not None  # or it would not have been listed
             spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
-        if known.degree < degree:
-            reason = f"degrees above {known.degree} are not settled: {known.reason}"
-    elif not reason:
-        try:
-            reason = _of_map(laboratory, degree, cofactors, deadline, progress, spaces)
-        except NoPoint as error:
-            reason = str(error)
-    names = () if laboratory.defect else tuple(one.name for one in cofactors)
-    return DarbouxSearch(*laboratory.asked, degree, names, tuple(spaces), reason, flow=flow)
-
-
-def _of_map(
-    laboratory: Laboratory,
-    degree: int,
-    cofactors: Sequence[Cofactor],
-    deadline: float,
-    progress: Callable[[str], None],
-    found: list[DarbouxPolynomials],
-) -> str:
-    """Adds the spaces of polynomials to those found; why the search ended early, empty where it did not."""
-    asked, dim, reason = degree, laboratory.map.dim, ""
-    while comb(dim + degree, dim) > _MOST_TERMS:
+        if settled.degree < degree:
+            reason = f"degrees above {settled.degree} are not settled: {settled.reason}"
+    if flow or laboratory.defect:
+        names = () if laboratory.defect else tuple(one.name for one in cofactors)
+        return DarbouxSearch(*laboratory.asked, degree, names, tuple(spaces), reason, flow=flow)
+    names, map_, asked = tuple(one.name for one in cofactors), laboratory.maps[0], degree
+    while comb(map_.dim + degree, degree) > _MOST_TERMS:
         degree -= 1
     if degree < asked:
-        reason = f"degrees above {degree} were not tried: polynomials in dimension {dim} have too many terms"
+        reason = f"degrees above {degree} were not tried: polynomials in dimension {map_.dim} have too many terms"
     candidates = products(cofactors, degree)
     if len(candidates) > _MOST_PRODUCTS:
         reason = f"{len(candidates)} products of cofactors, of which the first {_MOST_PRODUCTS} were tried"
         candidates = candidates[:_MOST_PRODUCTS]
-    map_ = laboratory.maps[0]
-    sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
-    spaces: dict[Law, DarbouxSpace] = {}
-    for product in candidates:
-        if time.monotonic() > deadline:
-            reason = "the time was over before all products of cofactors were tried"
-            break
-        progress(f"cofactor {product.text(cofactors)}")
-        spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
-    known = dict[Law, DarbouxSpace]()
-    for law, space in spaces.items():
-        basis = [vector for vector in space.basis if any(vector[1:])]  # the constants have C = 1, and are left out
-        if basis:
-            known[law] = DarbouxSpace(space.dim, space.degree, basis)
-    # Different products of cofactors may be the same function, and one of them may show that products span the space.
-    listed = [space for law, space in known.items() if _is_spanned_by_products(known, law, map_.prime)]
-    for law, space in known.items():
-        if space not in listed:
-            listed.append(space)
-            others = [one for other, one in spaces.items() if other[0] == law[0] and other != law]
-            written = _written(laboratory, cofactors, law[0], [spaces[law], *others], deadline)
-            if isinstance(written, str):
-                reason = written
-            else:
-                found.append(written)
-    return reason
+    found = dict[Law, DarbouxSpace]()
+    try:
+        sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
+        for product in candidates:
+            if time.monotonic() > deadline:
+                reason = "the time was over before all products of cofactors were tried"
+                break
+            progress(f"cofactor {product.text(cofactors)}")
+            found |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
+        known = dict[Law, DarbouxSpace]()
+        for law, space in found.items():
+            basis = [vector for vector in space.basis if any(vector[1:])]  # the constants have C = 1, and are left out
+            if basis:
+                known[law] = DarbouxSpace(space.dim, space.degree, basis)
+        # Different products of cofactors may be the same function, and one of them may show that products span the
+        # space.
+        listed = [space for law, space in known.items() if _is_spanned_by_products(known, law, map_.prime)]
+        for law, space in known.items():
+            if space not in listed:
+                listed.append(space)
+                others = [one for other, one in found.items() if other[0] == law[0] and other != law]
+                written = _written(laboratory, cofactors, law[0], [found[law], *others], deadline)
+                if isinstance(written, str):
+                    reason = written
+                else:
+                    spaces.append(written)
+    except NoPoint as error:
+        reason = str(error)
+    return DarbouxSearch(*laboratory.asked, asked, names, tuple(spaces), reason, flow=flow)
 
 
 def _is_spanned_by_products(known: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:

@@ -262,8 +262,19 @@ def find_poisson(
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             forms, _ = _tensors(laboratory, 2, None, deadline, log_canonical(dim))
         if not forms and denominator is None:
-            forms, denominator, more = _over_a_density(laboratory, degree, deadline)
-            reason = "" if forms else reason + more
+            # Over the factors of a known density, each once, with numerators as much higher in degree.
+            density = None
+            with suppress(NoPoint):
+                density = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+            factors = [g for g, _ in density.factors] if density is not None else []
+            higher = degree + sum(degree_in(g, dim) for g in factors)
+            if factors and pairs * comb(dim + higher, dim) <= _MAX_UNKNOWNS // 2:
+                psi = reduce(lambda a, b: a * b, factors)
+                over = RationalFunction(psi, psi.context().constant(1))
+                forms, _ = _tensors(laboratory, higher, over, deadline)
+                denominator = over if forms else None
+                more = f", and none of degree at most {higher} over {format_rational_function(over)}"
+                reason = "" if forms else reason + more
         for k, tensor in enumerate(forms, 1):
             progress(f"verifying tensor {k} of {len(forms)}")
             one = _judged(laboratory, tensor, deadline)
@@ -327,30 +338,6 @@ def _tensors(
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
     shown = [forms.bases[0][k] for k in _not_multiples(laboratory.maps[0], model, degree)]
     return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in shown], ""
-
-
-def _over_a_density(
-    laboratory: Laboratory, degree: int, deadline: float
-) -> tuple[list[GivenTensor], RationalFunction | None, str]:
-    """Tensors whose denominator has the factors of a known density, each once, numerators as much higher in degree.
-
-    With that denominator, and what to add to the reason where there are none.
-    """
-    dim = laboratory.map.dim
-    try:
-        density = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
-    except NoPoint:
-        return [], None, ""
-    factors = [g for g, _ in density.factors] if density is not None else []
-    higher = degree + sum(degree_in(g, dim) for g in factors)
-    if not factors or dim * (dim - 1) // 2 * comb(dim + higher, dim) > _MAX_UNKNOWNS // 2:
-        return [], None, ""
-    psi = reduce(lambda a, b: a * b, factors)
-    over = RationalFunction(psi, psi.context().constant(1))
-    forms, _ = _tensors(laboratory, higher, over, deadline)
-    if forms:
-        return forms, over, ""
-    return [], None, f", and none of degree at most {higher} over {format_rational_function(over)}"
 
 
 def log_canonical(dim: int) -> frozenset[Exponents]:
