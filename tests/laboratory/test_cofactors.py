@@ -1,7 +1,6 @@
 """Cofactors, their products, and the polynomials that have them."""
 
 import pytest
-from flint import nmod_mpoly_ctx
 from helpers import DIMENSION
 from search_helpers import system
 
@@ -80,15 +79,6 @@ def test_the_search_ends_when_enough_is_known():
     assert search_cofactors(map_, known, [], [space], 1, 3).spaces == []
     assert search_cofactors(map_, known, [], [], 1, 3, deadline=0.0).spaces == []
     assert search_cofactors(map_, known, [], [], 0, 3).spaces == []
-
-
-def test_products_that_are_spanned_by_rows():
-    # the rows of an echelon form on 1, x, y, x^2, x y, y^2
-    places = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (2, 0): 3, (1, 1): 4, (0, 2): 5}
-    rows = {1: [0, 1, 0, 0, 5, 0], 3: [0, 0, 0, 1, 0, 0]}
-    x, y = nmod_mpoly_ctx.get(["x", "y"], modulus=101).gens()
-    polynomials = (x, 3 * x + 15 * x * y, 7 * x**2, x**0)
-    assert [module._is_spanned(P, places, rows, 101) for P in polynomials] == [False, True, True, False]
 
 
 @pytest.mark.parametrize(("digits", "is_written"), [(800, True), (2400, False)])

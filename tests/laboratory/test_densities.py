@@ -3,8 +3,6 @@
 from fractions import Fraction
 from functools import cache, partial
 from itertools import islice
-from math import inf
-from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -19,7 +17,6 @@ from kahanmaps.documents.inline import System
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import NoPoint
 from kahanmaps.laboratory.preserve import densities as module
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
@@ -152,14 +149,3 @@ def test_random_systems_have_none():
     found = find_densities(random_system(3, 1), max_degree=5)
     assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
     assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
-
-
-def test_where_points_give_out_the_last_degree_that_was_tried_is_said(monkeypatch):
-    def space(map_, degree, model=None):
-        if degree > 3:
-            raise NoPoint("no points")
-        return SimpleNamespace(basis=[])
-
-    monkeypatch.setattr(module, "_space", space)
-    laboratory = Laboratory(load("lotka_volterra"))
-    assert module._search(laboratory, None, 9, inf, lambda _: None) == ([], 3, "no points")

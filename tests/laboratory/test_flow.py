@@ -1,51 +1,16 @@
 """Integrals of the differential equation, by the searches that find those of maps."""
 
-import random
-
 import pytest
-from flint import fmpq
 
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.lifted import Lift, Lifted
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 
 PRIME = 2**61 - 1
-
-
-def derivative(file, function, x):
-    """f . grad I at a point."""
-    f = file.system.over(QQ).value(x)
-    P, Q = function.numerator, function.denominator
-    at = (*x, fmpq(1))
-    values = [evaluate(one, QQ, at) for one in (P, Q)]
-    slopes = [[evaluate(one.derivative(k), QQ, at) for k in range(len(x))] for one in (P, Q)]
-    return sum((f[k] * (slopes[0][k] * values[1] - values[0] * slopes[1][k]) for k in range(len(x))), fmpq(0))
-
-
-@pytest.mark.parametrize(
-    ("name", "count"),
-    [
-        ("euler_top", 2),  # both energies, classical
-        ("zander_120", 1),
-        ("lotka_volterra", 0),  # its integral is no rational function
-    ],
-)
-def test_the_rational_integrals_of_a_flow_are_found(name, count):
-    file = load(name)
-    found = find_integrals(file, flow=True, max_degree=4)
-    assert len(found.integrals) == count == found.codimension
-    rng = random.Random(1)
-    for one in found.integrals:
-        assert str(one.verdict) == "proved"
-        x = tuple(fmpq(rng.randint(1, 9), rng.randint(1, 9)) for _ in range(file.dim))
-        assert derivative(file, one.function, x) == 0
 
 
 @pytest.mark.parametrize("kind", ["map", "flow", "lifted"])

@@ -69,14 +69,6 @@ def test_a_polynomial_that_does_not_divide_its_derivative_is_none(monkeypatch):
     assert found_in(field("x y", "x*y + x^2", "x*y + 1"), 2) == ["x"]
 
 
-def test_where_lines_leave_others_possible_the_degree_is_not_done(monkeypatch):
-    spaces = searched._Line.spaces
-    monkeypatch.setattr(searched._Line, "spaces", lambda line: spaces(line) if line.degree < 2 else None)
-    found = flow_polynomials(lorenz("10", "28", "20").system, 3, seed=6)
-    assert (found.functions, found.degree) == ((), 1)
-    assert found.reason == "lines modulo primes leave others possible"
-
-
 def test_where_solutions_are_algebraic_one_point_is_not_enough():
     """18 of 35 quartics vanish along the solution from a point of P = 0; K = -4/3."""
     found = flow_polynomials(lorenz("1/3", "2", "0").system, 4, seed=1)

@@ -1,10 +1,7 @@
 """Relations along orbits: the dimensions of the literature, none for systems without integrals, points where orbits
 close."""
 
-from types import SimpleNamespace
-
 import pytest
-from flint import nmod_mat
 from helpers import quick
 from search_helpers import system
 
@@ -13,7 +10,6 @@ from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import hirota_kimura as module
 from kahanmaps.laboratory.preserve.hirota_kimura import (
-    OrbitRelations,
     hirota_kimura_basis,
     orbit_profile,
     relations_on_orbit,
@@ -99,33 +95,3 @@ def test_there_are_not_too_many_unknowns(monkeypatch):
     assert (asked.nullities, asked.complete, asked.is_settled) == ((0, 0, 0), False, False)  # 35 of degree 4
     # nothing more was asked for than the dimension allows
     assert orbit_profile(maps(load("lorenz"))).complete
-
-
-@pytest.mark.parametrize(
-    ("degrees", "expected", "with_known"),
-    [  # for each degree and map: how many vectors, the codimension, the period
-        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, True), 2),
-        ([[(1, 1, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, False), 2),
-        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 0, None)]], ((0, 1), (0, 0), None, False), 1),
-        ([[(2, 2, None), (2, 2, None)], [(9, 2, None), (9, 2, None)]], ((2,), (2,), None, True), 2),  # orbits on curves
-        (
-            [[(2, 2, 6), (2, 2, 6)], [(9, 3, 6), (9, 3, 6)]],
-            ((2, 9), (2, 3), 6, True),
-            3,
-        ),  # orbits that close are points
-        ([[(1, 1, 5), (1, 1, 6)], [(4, 1, 6), (4, 1, 6)]], ((1, 4), (1, 1), 6, True), 2),
-    ],
-)
-def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, with_known, monkeypatch):
-    maps = [SimpleNamespace(dim=3, prime=101, step=lambda x: x, random_point=lambda: (1, 2, 3)) for _ in range(2)]
-
-    def along(map_, degree, leading):
-        count, codimension, period = degrees[degree - 1][next(k for k, one in enumerate(maps) if one is map_)]
-        return OrbitRelations(
-            nmod_mat(0, 0, 101), 0, count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ()
-        )
-
-    monkeypatch.setattr(module, "relations_on_orbit", along)
-    found = orbit_profile(maps, known=lambda map_, point: [[1, 1, 0]], max_degree=2)
-    assert (found.nullities, found.codimensions, found.period, found.agree) == expected
-    assert (found.complete, found.with_known) == (True, with_known)

@@ -110,7 +110,7 @@ def test_ratios_of_functions_of_rank_two_are_no_integrals_but_those_of_minors_ar
     laboratory, _, _, ratios = searched(load("clebsch_first_flow"))
     minors = ratios[-1]
     assert minors.lift.rank == 2
-    single = replace(minors, lift=minors.lift._replace(rank=1), above=(0,), below=(1,))
+    single = replace(minors, lift=minors.lift._replace(rank=1), numerator=(0,), denominator=(1,))
     assert verdict_on_ratio(laboratory, single)[0] is Verdict.REFUTED
 
 

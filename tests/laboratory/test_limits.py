@@ -97,15 +97,6 @@ def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
     assert ("undecided", "what the map makes of F1, F2: its integrals were not counted") in uncounted.lines()
 
 
-def test_integrals_of_the_flow_without_a_formula_are_counted():
-    search = integrals_of("zander_120")
-    flow = replace(find_integrals(load("zander_120"), flow=True), integrals=())
-    assert flow_and_map(search, None, flow).lines()[0] == (
-        "measured",
-        "solutions show 1 independent integral of the flow, 1 without a formula",
-    )
-
-
 def test_a_transcendental_integral_is_neither_seen_nor_lost():
     found = beside("lotka_volterra")
     assert (found.limits, found.others, found.lost) == ((), (), 0)

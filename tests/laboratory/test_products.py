@@ -12,13 +12,11 @@ from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import (
-    _interpolated,
     candidates,
     coprime_base,
     multiplicative_relations,
@@ -166,16 +164,3 @@ def test_a_coprime_base_makes_the_polynomials_again(seed):
                     break
                 one = quotient
         assert one.degree() == 0
-
-
-@pytest.mark.parametrize("missing", [{1, 2}, set(range(1, 24))])
-def test_polynomials_come_back_from_their_values_where_there_are_some(missing):
-    p = 101
-    wanted = [nmod_poly([5, 0, 7, 1], p), nmod_poly([3], p), nmod_poly([0, 0, 1], p)]
-
-    def values(t):
-        if t in missing:
-            raise SingularStep("nowhere")
-        return [int(P(t)) for P in wanted]
-
-    assert _interpolated(values, 3, p) == wanted

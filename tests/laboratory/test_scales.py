@@ -13,13 +13,11 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, primitive_part, ring
 from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-from kahanmaps.laboratory.singular.singularities import singularities
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
@@ -213,26 +211,3 @@ def test_commuting_fields(name, how):
         for g in moved.solutions
     }
     assert back == {str(g.system) for g in found.solutions}
-
-
-@pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "weighted", "lyness", "todd", "fibonacci"))
-def test_degrees_and_singularities(name, how):
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (degree_growth(one.file.map, max_terms=8).degrees for one in (same, image))
-    length = min(len(found), len(moved))
-    assert length >= 5
-    assert found[:length] == moved[:length]
-    eps = Fraction(2, 7)
-    runs = singularities(same.file.map, eps, steps=12), singularities(image.file.map, eps / image.speed, steps=12)
-    assert runs[0].shape == runs[1].shape
-    assert runs[0].verdict == runs[1].verdict
-
-
-def test_a_product_of_two_systems_has_the_polynomials_of_both():
-    """x + 2100000 y of one factor and those of a Riccati equation with rational fixed points at all scales."""
-    scaled = image_of("double", "scaled")
-    rhs = [*(str(f) for f in scaled.file.system.rhs), "10^6*z^2 - 3*z"]
-    product = parse_system(f"variables = ['x', 'y', 'z']\n[system]\nrhs = {rhs}")
-    found = darboux_polynomials(product, 2, flow=True)
-    assert found.reason == ""
-    assert {str(P) for space in found.spaces for P in space.polynomials} == {"x + 2100000*y", "y", "z", "1000000*z - 3"}

@@ -1,8 +1,5 @@
 """A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only."""
 
-from math import inf
-from types import SimpleNamespace
-
 import pytest
 from flint import nmod
 
@@ -18,7 +15,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among, 
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.products import candidates
-from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search, take_relations
+from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search
 
 
 def searched(file, eps=None):
@@ -84,34 +81,6 @@ def test_too_much_work_ends_the_search_with_the_degree_before(monkeypatch):
     assert (some.degree, some.spaces) == (3, [])
     late = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, deadline=0.0)
     assert (late.degree, late.spaces) == (2, [])  # no relation before degree 3, and nothing to try
-
-
-def degrees_whose_relations_are_taken(monkeypatch, nullities, largest, answers=(), wanted=1, by_relations=0):
-    """With stand-ins for the work; an answer is the number of spaces, None for too many dimensions."""
-    taken, independent, waiting = [], [0], list(answers)
-
-    def spaces(map_, degree, known, most):
-        assert most == largest
-        taken.append(degree)
-        independent[0] += by_relations
-        return waiting.pop(0) if waiting else []
-
-    monkeypatch.setattr(module, "darboux_spaces", spaces)
-    monkeypatch.setattr(module, "gradient_rank", lambda *_: independent[0])
-    profile, found = SimpleNamespace(nullities=nullities, codimension=wanted), module.Found()
-    take_relations(Laboratory(load("lorenz")).maps[0], profile, found, largest, inf, lambda _: None)
-    return taken, found.searched
-
-
-def test_degrees_with_few_relations_are_taken_until_enough_is_known(monkeypatch):
-    few = module.SMALL_SPAN
-    assert degrees_whose_relations_are_taken(monkeypatch, (0, 3, few - 1, few), few) == ([2, 3], [2, 3])
-    assert degrees_whose_relations_are_taken(monkeypatch, (1, few, 1), few) == ([1], [1])
-    assert degrees_whose_relations_are_taken(monkeypatch, (1, 1), few, by_relations=1) == ([1], [1])
-    assert degrees_whose_relations_are_taken(monkeypatch, (1, 1), few, wanted=0) == ([], [])
-    # A degree with too many dimensions waits for a larger limit.
-    assert degrees_whose_relations_are_taken(monkeypatch, (1, 2), few, [None]) == ([1, 2], [2])
-    assert degrees_whose_relations_are_taken(monkeypatch, (1, 2), 60) == ([1, 2], [1, 2])
 
 
 # The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.

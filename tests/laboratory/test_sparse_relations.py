@@ -13,7 +13,6 @@ from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, read_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve import sparse_relations as module
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -121,17 +120,6 @@ def test_what_lower_degrees_imply_is_left_out():
 def test_long_relations_are_left_out():
     assert relations("planar_cubic_hamiltonian", 3, most_terms=9) == ()
     assert len(relations("planar_cubic_hamiltonian", 3, most_terms=10)) == 1
-
-
-def test_orbits_that_disagree_give_nothing():
-    one, other = (Laboratory(load(name)).maps for name in ("euler_top", "volterra_periodic_3"))
-    assert sparse_relations([one[0], other[1]], 2, ["x1", "x2", "x3"]) is None
-
-
-def test_a_common_number_that_is_not_simple_is_taken_for_an_accident(monkeypatch):
-    monkeypatch.setattr(module, "_SPARE_BITS", 120)
-    (found,) = relations("zhukovski_volterra_2", 2)
-    assert found.text == "x1^2 + e1*x2^2 + c1*x3^2 - x1 + e2*x2 + c2 = 0"
 
 
 @pytest.mark.parametrize(

@@ -63,8 +63,8 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
     t, *gens = ring(names).gens()
     functions = []
     for k in range(0, len(answer.functions), m):
-        above, below = over_one_denominator(answer.functions[k : k + m], t.context(), gens)
-        functions.append(RationalFunction(sum((P * t**j for j, P in enumerate(above)), 0 * t), below))
+        numerators, denominator = over_one_denominator(answer.functions[k : k + m], t.context(), gens)
+        functions.append(RationalFunction(sum((P * t**j for j, P in enumerate(numerators)), 0 * t), denominator))
     return replace(answer, functions=tuple(functions))
 
 

@@ -91,10 +91,10 @@ def verdict_on(
             left = left * evaluate(factor.denominator, field, here)
             right = right * evaluate(factor.numerator, field, here)
         if is_density:
-            above, below = jacobian_determinant_sides(over, point, image)
-            if field.is_zero(above):
+            numerator, denominator = jacobian_determinant_sides(over, point, image)
+            if field.is_zero(numerator):
                 return None  # the map is not invertible here, and 0 = 0 says nothing
-            left, right = left * below, right * above
+            left, right = left * denominator, right * numerator
         return [left], [right]
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps, root)

@@ -48,14 +48,14 @@ from kahanmaps.maps.implicit import BirationalMap
 class RatioOfIterates:
     """A function I of a piece of an orbit: the ratio of two of the `functions` or, of rank 2, of two minors of them.
 
-    The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `above` and `below` are
-    the places of one function or of two: then F_a F_b~ - F_b F_a~ is meant.
+    The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `numerator` and
+    `denominator` are the places of one function or of two: then F_a F_b~ - F_b F_a~ is meant.
     """
 
     lift: Lift
     functions: tuple[fmpq_mpoly, ...]
-    above: tuple[int, ...]
-    below: tuple[int, ...]
+    numerator: tuple[int, ...]
+    denominator: tuple[int, ...]
 
     @property
     def length(self) -> int:
@@ -74,15 +74,15 @@ class RatioOfIterates:
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
         """The ratio, of rank 2 in letters F0, F1, ..., F0~, ... for the functions, and what these letters stand for."""
         if self.lift.rank == 1:
-            return RationalFunction(self.functions[self.above[0]], self.functions[self.below[0]]), []
+            return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
         taken = self.functions[0].context().names()
         letters = (c * k for k in count(1) for c in "FGKUVW")
         letter = next(c for c in letters if not any(name.startswith(c) for name in taken))
         names = [f"{letter}{k}" for k in range(len(self.functions))]
         gens = ring([*names, *(f"{name}~" for name in names)]).gens()
         here, later = gens[: len(names)], gens[len(names) :]
-        P, Q = (here[a] * later[b] - here[b] * later[a] for a, b in (self.above, self.below))
-        used = sorted({*self.above, *self.below})
+        P, Q = (here[a] * later[b] - here[b] * later[a] for a, b in (self.numerator, self.denominator))
+        used = sorted({*self.numerator, *self.denominator})
         return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in used]
 
     @property
@@ -110,7 +110,7 @@ class RatioOfIterates:
             a, b = places
             return rows[0][a] * rows[1][b] - rows[0][b] * rows[1][a]
 
-        return minor(self.above), minor(self.below)
+        return minor(self.numerator), minor(self.denominator)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def verdict_on_ratio(
 
     where = [*(["every eps"] if map_.has_eps and eps is None else []), *([f"eps = {eps}"] if eps is not None else [])]
     scope = " and ".join([*where, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
-    subject = (map_.symbols, map_.subject, ratio.text, ratio.above, ratio.below)
+    subject = (map_.symbols, map_.subject, ratio.text, ratio.numerator, ratio.denominator)
     identity = Identity(
         n + len(map_.symbols),
         sides,

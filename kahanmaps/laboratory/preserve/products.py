@@ -413,7 +413,7 @@ def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[
         return [one if good else None for good in is_one]
     gens = [gen for gen, name in zip(context.gens(), laboratory.map.names, strict=True) if name in names]
     moved = [over_one_denominator([c], context, gens) for c in answer.functions]
-    return [RationalFunction(above, below) for [above], below in moved]
+    return [RationalFunction(numerator, denominator) for [numerator], denominator in moved]
 
 
 def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:

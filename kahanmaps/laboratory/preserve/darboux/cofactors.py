@@ -77,8 +77,8 @@ class Cofactor:
             return map_.determinant(x, image)
         field = map_.map.field
         given = ([field.convert(c) for c in entries] for entries in (x, image, map_.values))
-        above, below = self.over(map_.map, *given)
-        return int(above), int(below)
+        numerator, denominator = self.over(map_.map, *given)
+        return int(numerator), int(denominator)
 
     @property
     def text(self) -> str:
@@ -113,8 +113,8 @@ def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
     try:
         over = map_.at(eps, field, x[n:])
         image = over.step(x[:n])
-        above, below = jacobian_determinant_sides(over, x[:n], image)
-        J = above / below
+        numerator, denominator = jacobian_determinant_sides(over, x[:n], image)
+        J = numerator / denominator
     except BudgetExceeded:
         D = None
     if D is None:

@@ -224,10 +224,10 @@ def _written(
     def number(map_: ModularMap) -> list[int]:
         """The number by which the cofactor differs from the product."""
         sample, field = Sample.of(map_, cofactors, 1), GF(map_.prime)
-        [(above, below)], [pair] = sample.values(product, 1), sample.pairs
+        [(numerator, denominator)], [pair] = sample.values(product, 1), sample.pairs
         places = ([field.convert(c) for c in (*x, *map_.values, map_.eps)] for x in pair)
         before, after = (int(evaluate(polynomials[0], field, place)) for place in places)
-        return [after * below * pow(before * above, -1, map_.prime) % map_.prime]
+        return [after * denominator * pow(before * numerator, -1, map_.prime) % map_.prime]
 
     [c] = constants_of(laboratory, number)
     if c is None:
@@ -260,9 +260,9 @@ def _judged(
         left = left * evaluate(c.denominator, field, (*place, eps))
         right = right * evaluate(c.numerator, field, (*place, eps))
         for one, power in zip(cofactors, product.powers, strict=True):
-            above, below = one.over(over, point, image, values) if power else (field.one, field.one)
+            numerator, denominator = one.over(over, point, image, values) if power else (field.one, field.one)
             for _ in range(power):
-                left, right = left * below, right * above
+                left, right = left * denominator, right * numerator
         return [left], [right]
 
     subject = (

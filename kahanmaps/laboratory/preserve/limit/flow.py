@@ -124,10 +124,10 @@ class ModularFlow(ModularMap):
             for place, (variable, lower) in self._products:
                 known[place].append(sum(map(mul, known[variable + 1], reversed(known[lower]))) % p)
             slopes = [sum(c * known[place][-1] for c, place in f) for f in self._f]
-            below = pow(order, -1, p)
+            inverse = pow(order, -1, p)
             known[0].append(0)
             for k, slope in enumerate(slopes, 1):
-                known[k].append(slope * below % p)
+                known[k].append(slope * inverse % p)
         factors = monomial_tables(self.dim, degree)
         table = {0: nmod_poly([1], p)}
 
@@ -177,7 +177,7 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
     >>> coefficient_rows([x + 1, y / 2 - x])
     [[2, 0, 2], [0, 1, -2]]
     """
-    below = lcm(*(int(c.q) for P in polynomials for c in P.coeffs()))
-    terms = [{tuple(map(int, m)): int(c * below) for m, c in P.terms()} for P in polynomials]
+    denominator = lcm(*(int(c.q) for P in polynomials for c in P.coeffs()))
+    terms = [{tuple(map(int, m)): int(c * denominator) for m, c in P.terms()} for P in polynomials]
     support = sorted({m for row in terms for m in row})
     return [[row.get(m, 0) for m in support] for row in terms]

@@ -247,8 +247,8 @@ class _Search:
     def _newton(self, vector: Sequence[int], p: int) -> list[int]:
         """The coefficients modulo a power of p, of a P known modulo p; empty where that is no simple solution."""
         field, context = self.field, self.field.rhs[0].context()
-        below = lcm(*(int(common_denominator(f)) for f in field.rhs))
-        f = [component * below for component in field.rhs]
+        denominator = lcm(*(int(common_denominator(f)) for f in field.rhs))
+        f = [component * denominator for component in field.rhs]
         cofactor = [context.from_dict({m: 1}) for m in exponents_up_to(field.dim, max(0, field.degree - 1))]
         terms = [context.from_dict({m: 1}) for m in self.monomials]
 

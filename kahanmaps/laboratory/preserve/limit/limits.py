@@ -364,11 +364,11 @@ def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
         order = min(int(monomial[-1]) for monomial in P.monoms())
         terms = {(*monomial[:-1], 0): c for monomial, c in P.terms() if monomial[-1] == order}
         lowest.append((order, P.context().from_dict(terms)))
-    (above, P), (below, Q) = lowest
+    (order_of_P, P), (order_of_Q, Q) = lowest
     common = P.gcd(Q)
     function = RationalFunction(P / common, Q / common)
     content, primitive = primitive_part(function.numerator)
-    return above - below, content, RationalFunction(primitive, function.denominator)
+    return order_of_P - order_of_Q, content, RationalFunction(primitive, function.denominator)
 
 
 def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fmpq_mpoly:

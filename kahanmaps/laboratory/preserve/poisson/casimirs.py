@@ -84,17 +84,17 @@ def _products(
         exponents = rational_vector(vector, p)
         if exponents is None:
             continue
-        below = lcm(*(int(e.q) for e in exponents))
-        powers = [int(e * below) for e in exponents]
+        common = lcm(*(int(e.q) for e in exponents))
+        powers = [int(e * common) for e in exponents]
         if sum(e != 0 for e in powers) > 1 and max(map(abs, powers)) <= _HIGHEST:
-            above, below_ = (
+            numerator, denominator = (
                 prod(
                     (I ** max(0, sign * e) for I, e in zip(context.gens(), powers, strict=False)),
                     start=context.constant(1),
                 )
                 for sign in (1, -1)
             )
-            yield RationalFunction(above, below_)
+            yield RationalFunction(numerator, denominator)
 
 
 def _polynomials(
@@ -201,10 +201,10 @@ def _moved(
     P = tensor.value(field, eps, tuple(x))
     values, moved = [], []
     for one in integrals:
-        value, below = one.function.value(field, [*x, eps]), evaluate(one.function.denominator, field, [*x, eps])
+        value, denominator = one.function.value(field, [*x, eps]), evaluate(one.function.denominator, field, [*x, eps])
         if P is None or value is None or value == 0:
             raise NoPoint("an integral or the tensor has no value other than 0 at a random point modulo a prime")
         column = (P * field.column(slopes(one.function, field, [*x, eps], map_.dim))).entries()
         values.append(int(value))
-        moved.append([int(entry / (below * below)) for entry in column])
+        moved.append([int(entry / (denominator * denominator)) for entry in column])
     return values, moved

@@ -336,19 +336,8 @@ def _tensors(
     )
     if forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
-    shown = [forms.bases[0][k] for k in _not_multiples(laboratory.maps[0], model, degree)]
-    return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in shown], ""
-
-
-def log_canonical(dim: int) -> frozenset[Exponents]:
-    """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
-    pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
-    return frozenset((*pair, *pair) for pair in pairs)
-
-
-def _not_multiples(map_: ModularMap, space: DarbouxSpace, degree: int) -> list[int]:
-    """Which elements of the basis are not spanned by those before them and by products of an integral and a tensor."""
-    n, prime = map_.dim, map_.prime
+    # Left out is what products of an integral and a tensor span together with the elements before.
+    map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
     places = {exponent: k for k, exponent in enumerate(exponents_up_to(2 * n, degree))}
     rows: list[list[int]] = []
@@ -357,32 +346,32 @@ def _not_multiples(map_: ModularMap, space: DarbouxSpace, degree: int) -> list[i
             wide = [0] * len(places)
             for exponent, c in zip(exponents_up_to(n, degree), integral, strict=True):
                 wide[places[(*exponent, *[0] * n)]] = c
-            rows += [P for v in space.basis if (P := product_of(wide, v, 2 * n, degree + 2, prime)) is not None]
-    found, dimension = [], rank(rows, prime)
-    for k, vector in enumerate(space.basis):
-        rows.append(vector)
-        if rank(rows, prime) > dimension:
-            found.append(k)
-            dimension += 1
-    return found
-
-
-def _tensor_of(bivector: fmpq_mpoly, n: int, names: Sequence[str], denominator: RationalFunction | None) -> GivenTensor:
-    """The matrix of sum P_ij d_i d_j, divided by the denominator."""
-    context = ring(names)
-    entries: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}
-    for monomial, coefficient in bivector.terms():
-        pair = tuple(k for k in range(n) if monomial[n + k])
-        entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
+            products = (product_of(wide, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
+            rows += [P for P in products if P is not None]
+    context, spanned, found = ring(laboratory.map.names), rank(rows, map_.prime), list[GivenTensor]()
     over, times = context.constant(1), context.constant(1)
     if denominator is not None:
         over, times = denominator.numerator, denominator.denominator
+    for vector, bivector in zip(model.basis, forms.bases[0], strict=True):
+        rows.append(vector)
+        if rank(rows, map_.prime) == spanned:
+            continue
+        spanned += 1
+        entries: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}  # of sum P_ij d_i d_j
+        for monomial, coefficient in bivector.terms():
+            pair = tuple(k for k in range(n) if monomial[n + k])
+            entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
+        upper = {pair: context.from_dict(terms) * times for pair, terms in entries.items()}
+        zero = context.constant(0)
+        matrix = [[upper.get((i, j), zero) - upper.get((j, i), zero) for j in range(n)] for i in range(n)]
+        found.append(GivenTensor([[_reduced(P, over) for P in row] for row in matrix]))
+    return found, ""
 
-    def entry(i: int, j: int) -> RationalFunction:
-        P = context.from_dict(entries.get((min(i, j), max(i, j)), {})) * times
-        return _reduced(P if i < j else -P, over)
 
-    return GivenTensor([[entry(i, j) for j in range(n)] for i in range(n)])
+def log_canonical(dim: int) -> frozenset[Exponents]:
+    """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
+    pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
+    return frozenset((*pair, *pair) for pair in pairs)
 
 
 def _reduced(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
@@ -538,11 +527,11 @@ def _pencil(tensors: Sequence[GivenTensor]) -> GivenTensor:
     old, symbols = (*gens[: len(names) - 1], gens[-1]), gens[len(names) - 1 : -1]
 
     def total(entries: Iterable[RationalFunction]) -> RationalFunction:
-        above, below = context.constant(0), context.constant(1)
+        numerator, denominator = context.constant(0), context.constant(1)
         for symbol, entry in zip(symbols, entries, strict=True):
             N, D = (part.compose(*old, ctx=context) for part in (entry.numerator, entry.denominator))
-            above, below = above * D + symbol * N * below, below * D
-        return _reduced(above, below)
+            numerator, denominator = numerator * D + symbol * N * denominator, denominator * D
+        return _reduced(numerator, denominator)
 
     n = tensors[0].dim
     return GivenTensor([[total(one.rows[i][j] for one in tensors) for j in range(n)] for i in range(n)])
