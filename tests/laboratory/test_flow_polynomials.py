@@ -226,6 +226,7 @@ def test_the_weights_of_a_field(variables, rhs, weights):
         assert len({ratio / c for ratio, c in zip(ratios, scales, strict=True)}) == 1
 
 
+@pytest.mark.slow
 def test_a_homogeneous_field_has_a_polynomial_of_degree_6():
     """A published example: of 84 monomials 28 are of degree 6."""
     made = field("x y z", "x*(y/2 + z)", "y*(2*z + x)", "z*(y - 7/5*x)")

@@ -56,6 +56,7 @@ def recurrence(names, image):
 def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeypatch):
     origins = ["denominator b*c", "common cofactor 1"]
     monkeypatch.setitem(module._COFACTOR_DEGREE, 4, 5)
+    monkeypatch.setattr(cofactors, "_MAX_WORK", 200_000)
     monkeypatch.setattr(module, "darboux_spaces", lambda *_: pytest.fail("the relations span too many dimensions"))
     laboratory = Laboratory(recurrence(*FOURTH_ORDER))
     known = laboratory.cofactors()
