@@ -238,11 +238,23 @@ class _Search:
             return False
         terms = {monomial: c for monomial, c in zip(self.monomials, values, strict=True) if c}
         P = primitive_part(self.field.rhs[0].context().from_dict(terms))[1]
-        if str(P) not in self.found:
-            if darboux_cofactor(self.field, P) is None or not self._is_special(P):
-                return False
+        if str(P) in self.found:
+            return True
+        if darboux_cofactor(self.field, P) is None:
+            return False
+        # More than usual has to vanish along the solution from a zero of P, modulo a fresh prime where it has one: of a
+        # pencil with a member for every number any residue lifts to a member, so x^2 + y^2 - 1 + 2 i y would, a product
+        # of conjugate lines of two special members.
+        is_special = None
+        while is_special is None:
+            with suppress(BadPrime):
+                flow = ModularFlow(self.field, random_prime(self.rng), (), self.rng.getrandbits(64))
+                line = _Line(flow, self.degree, self.support, ())
+                zeros = [factor for factor, _ in line.restricted(P).factor()[1] if factor.degree() == 1]
+                is_special = bool(line.special(zeros[0])) if zeros else None
+        if is_special:
             self.found[str(P)] = P
-        return True
+        return is_special
 
     def _newton(self, vector: Sequence[int], p: int) -> list[int]:
         """The coefficients modulo a power of p, of a P known modulo p; empty where that is no simple solution."""
@@ -288,20 +300,6 @@ class _Search:
             K_known = [a + c * modulus for a, c in zip(K_known, step[len(others) :], strict=True)]
             modulus *= p
         return P_known
-
-    def _is_special(self, P: fmpq_mpoly) -> bool:
-        """Whether more than usual vanishes along the solution from a zero of P, modulo a fresh prime where it has one.
-
-        Where a pencil has a member for every number, any residue lifts to a member: so x^2 + y^2 - 1 + 2 i y would, a
-        product of conjugate lines of two special members.
-        """
-        while True:
-            with suppress(BadPrime):
-                flow = ModularFlow(self.field, random_prime(self.rng), (), self.rng.getrandbits(64))
-                line = _Line(flow, self.degree, self.support, ())
-                zeros = [factor for factor, _ in line.restricted(P).factor()[1] if factor.degree() == 1]
-                if zeros:
-                    return bool(line.special(zeros[0]))
 
 
 def _is_irrational(residue: int, modulus: int) -> bool:

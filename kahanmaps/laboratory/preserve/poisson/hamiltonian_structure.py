@@ -11,9 +11,9 @@ the invariant measure dx/det(I - eps f'), for every eps.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count, product
+from itertools import chain, count, product
 from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
@@ -197,20 +197,14 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
     for _ in range(3):
         generic = combination_of([rng.randrange(field.characteristic) for _ in modular], modular)
         if int(generic.det()):
-            # Random small integers end it: the Pfaffian is a polynomial of degree m/2 that is not zero.
-            return next(K for K in (combination_of(c, forms) for c in _small(len(forms), rng)) if K.det() != 0), True
+            # Simple combinations first. Random small integers end it: the Pfaffian is a polynomial that is not zero.
+            n = len(forms)
+            random_ones = ([rng.randint(-(size // 10), size // 10) for _ in range(n)] for size in count(10))
+            small = chain([[int(j == i) for j in range(n)] for i in range(n)], [[1] * n], random_ones)
+            return next(K for K in (combination_of(c, forms) for c in small) if K.det() != 0), True
     degrees = range(m // 2 + 1)
     if len(degrees) ** len(forms) > _GRID:
         return None, False
     # A polynomial of degree at most m/2 in each variable that vanishes on this grid is zero.
     grid = (combination_of(coefficients, forms) for coefficients in product(degrees, repeat=len(forms)))
     return next((K for K in grid if K.det() != 0), None), True
-
-
-def _small(length: int, rng: random.Random) -> Iterator[tuple[int, ...]]:
-    """Vectors of small integers, simple ones first, without end."""
-    for i in range(length):
-        yield tuple(int(j == i) for j in range(length))
-    yield (1,) * length
-    for size in count(10):
-        yield tuple(rng.randint(-(size // 10), size // 10) for _ in range(length))

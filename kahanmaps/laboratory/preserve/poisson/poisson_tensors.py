@@ -277,8 +277,15 @@ def find_poisson(
                 reason = "" if forms else reason + more
         for k, tensor in enumerate(forms, 1):
             progress(f"verifying tensor {k} of {len(forms)}")
-            one = _judged(laboratory, tensor, deadline)
-            found += [one] if one is not None else []
+            law = transformation_identity(laboratory.map, tensor, laboratory.eps)
+            # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
+            verdict, evidence = _verdict(laboratory, law, deadline if dim <= MAX_DIMENSION else 0.0)
+            if not verdict.holds:
+                continue
+            jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, laboratory.eps), deadline)
+            P = _at(tensor, laboratory.maps[0], laboratory.maps[0].random_point())
+            rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], laboratory.maps[0].prime)
+            found.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
         if len(found) < len(forms):
             reason = "a tensor that was found modulo primes did not pass as an identity"
         # Poisson tensors first, those of a high rank before others.
@@ -424,20 +431,6 @@ def tensor_space(
         for (place, _, _), value in zip(unknowns, solution, strict=True):
             vectors[-1][place] = value
     return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime)
-
-
-def _judged(laboratory: Laboratory, tensor: GivenTensor, deadline: float) -> FoundTensor | None:
-    """The tensor with its verdicts; None where it is refuted."""
-    eps, map_ = laboratory.eps, laboratory.maps[0]
-    law = transformation_identity(laboratory.map, tensor, eps)
-    # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
-    verdict, evidence = _verdict(laboratory, law, deadline if tensor.dim <= MAX_DIMENSION else 0.0)
-    if not verdict.holds:
-        return None
-    jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, eps), deadline)
-    P = _at(tensor, map_, map_.random_point())
-    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
-    return FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P)
 
 
 def _at(tensor: GivenTensor, map_: ModularMap, x: Sequence[int]) -> Any:
