@@ -3,6 +3,8 @@
 from fractions import Fraction
 from functools import cache, partial
 from itertools import islice
+from math import inf
+from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -149,3 +151,22 @@ def test_random_systems_have_none():
     found = find_densities(random_system(2, 0), max_degree=5)
     assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
     assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
+
+
+@pytest.mark.parametrize(
+    ("least", "degrees"), [(0, [0]), (3, [0, 1, 2, 4, 3]), (12, [0, 1, 2, 4, 6, 9, 12, 10, 11, 12]), (13, None)]
+)
+def test_the_least_degree_is_found_though_degrees_are_leapt_over(least, degrees, monkeypatch):
+    tried = []
+
+    def space(map_, degree, model=None):
+        tried.extend([degree] if model is None else [])
+        return SimpleNamespace(basis=[1] * (degree >= least))
+
+    laboratory = Laboratory(load("lorenz"))
+    monkeypatch.setattr(module, "_space", space)
+    monkeypatch.setattr(laboratory, "formulas", lambda *_: SimpleNamespace(bases=None, reason="too long"))
+    found, degree, reason = module._search(laboratory, None, None, inf, lambda _: None)
+    assert (found, tried) == ([], degrees or [0, 1, 2, 4, 6, 9, 12])
+    none = "there is a density of degree {} modulo primes, but no closed form: too long".format
+    assert (degree, reason) == ((12, "") if degrees is None else (least, none(least)))

@@ -252,13 +252,19 @@ def _search(
     if product is not None:
         # Only lower degrees are worth a part of the time then, and the others of its own degree.
         until, top = time.monotonic() + (deadline - time.monotonic()) / 3, min(top, product.degree(dim))
-    tried = -1
+    # Where the space of a degree is 0, so are those of lower ones: they are leapt over while monomials at least double.
+    leaps, tried = [top] if product is None else [max(top - 1, 0), top], -1
+    while leaps[0] > 0:
+        halved = (d for d in range(leaps[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + leaps[0], dim))
+        leaps.insert(0, next(halved, leaps[0] - 1))
     try:
-        for degree in range(top + 1):
-            if time.monotonic() > until:
-                break
+        while tried < top and time.monotonic() <= until:
+            degree = next(leap for leap in leaps if leap > tried)
             progress(f"densities of degree {degree}")
             model = _space(laboratory.maps[0], degree)
+            if model.basis and degree > tried + 1:
+                leaps = list(range(top + 1))  # the least degree that has some is wanted
+                continue
             if model.basis and len(model.basis) == len(_space(laboratory.maps[1], degree, model).basis):
                 found, reason = list[FoundDensity](), ""
 
