@@ -5,7 +5,8 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from check_helpers import kahan_step, rank_by_elimination, solve_by_elimination
+from check_helpers import kahan_step
+from flint import fmpq, fmpq_mat
 from helpers import fraction
 from search_helpers import value_of
 
@@ -62,17 +63,11 @@ def unknowns_on(relation, file, eps, points):
                 row[text] += value
             else:
                 row[""] += value * value_of(text, (), (), eps)
-        rows.append([row[name] for name in (*names, "")])
-    if rank_by_elimination(rows) != len(names):
+        rows.append([fmpq(row[name].numerator, row[name].denominator) for name in (*names, "")])
+    echelon, rank = fmpq_mat(rows).rref()
+    if rank != len(names) or any(echelon[k, k] != 1 for k in range(rank)):
         return None
-    if not names:
-        return {}
-    chosen = []
-    for row in rows:
-        if rank_by_elimination([entry[:-1] for entry in [*chosen, row]]) > len(chosen):
-            chosen.append(row)
-    found = solve_by_elimination([row[:-1] for row in chosen], [-row[-1] for row in chosen])
-    return dict(zip(names, found, strict=True))
+    return {name: -echelon[k, rank] for k, name in enumerate(names)}
 
 
 @pytest.mark.parametrize(("name", "degree", "texts"), WRITTEN)
