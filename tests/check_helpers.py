@@ -105,21 +105,6 @@ def solve_by_elimination(matrix: Rows, right: list[Any]) -> list[Any] | None:
     return [row[n] for row in rows]
 
 
-def rank_by_elimination(matrix: Rows) -> int:
-    """The rank of a matrix of Fractions."""
-    rows, found = [list(row) for row in matrix], 0
-    for k in range(len(rows[0])):
-        pivot = next((i for i in range(found, len(rows)) if rows[i][k] != 0), None)
-        if pivot is None:
-            continue
-        rows[found], rows[pivot] = rows[pivot], rows[found]
-        for i in range(found + 1, len(rows)):
-            factor = rows[i][k] / rows[found][k]
-            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[found], strict=True)]
-        found += 1
-    return found
-
-
 def determinant(matrix: Rows) -> Any:
     """The determinant, by expansion along the first row."""
     if len(matrix) == 1:
