@@ -35,6 +35,10 @@ from kahanmaps.checks.claims import combined as combined
 from kahanmaps.checks.conserve import functions_along as functions_along
 from kahanmaps.checks.settings import Settings as Settings
 from kahanmaps.checks.table import CHECKS as CHECKS
+from kahanmaps.display.checks import details as details
+from kahanmaps.display.checks import headline as headline
+from kahanmaps.display.checks import verdict_text as verdict_text
+from kahanmaps.display.checks import witness_lines as witness_lines
 from kahanmaps.display.experiments import summary_markdown as summary_markdown
 from kahanmaps.display.laboratory import analysis_head as analysis_head
 from kahanmaps.display.laboratory import analysis_title as analysis_title
@@ -44,10 +48,6 @@ from kahanmaps.display.latex import latex_rational_function as latex_rational_fu
 from kahanmaps.display.markup import code as code
 from kahanmaps.display.markup import eps_phrase as eps_phrase
 from kahanmaps.display.markup import markdown as markdown
-from kahanmaps.display.report_text import details as details
-from kahanmaps.display.report_text import headline as headline
-from kahanmaps.display.report_text import verdict_text as verdict_text
-from kahanmaps.display.report_text import witness_lines as witness_lines
 from kahanmaps.documents.catalog import load as load
 from kahanmaps.documents.catalog import titles as titles
 from kahanmaps.documents.families import FAMILIES as FAMILIES

@@ -1,4 +1,7 @@
-"""How claims and their verdicts look in a notebook and in a report: words with marks, never colour alone."""
+"""How claims and their verdicts look: in lines of text, in a notebook and on a page, where no colour stands alone.
+
+The text of a report is what the commands write into a pipe and `print` shows: a word and a tab at the front.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,9 @@ from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.display import markup
-from kahanmaps.display import report_text as report_text  # which registers the text of reports
-from kahanmaps.displayed import html_form
+from kahanmaps.displayed import html_form, shorten, text_form
 from kahanmaps.errors import counted
+from kahanmaps.maps.convention import eps_words
 
 _CLAIMS = 30  # in a notebook
 _TEXT = 400
@@ -69,7 +72,7 @@ def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[t
 
 def because(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
     """What decided a claim: a sentence, and the hypotheses that were verified."""
-    return _text(report_text.summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
+    return _text(summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
 
 
 def counts(findings: Iterable[Finding]) -> str:
@@ -114,14 +117,16 @@ def report_html(report: Report) -> str:
     pieces = [f"<p>{markup.verdict(report.verdict)} ({_text(counts(report.findings))})</p>"]
     chosen = list(report.findings)
     if len(chosen) > _CLAIMS:
-        pieces.append(sections_table(report.findings))
+        sections = sections_of(report.findings).items()
+        rows = [(_text(title or "claims"), _text(counts(found))) for title, found in sections]
+        pieces.append(markup.table(["section", "claims"], rows))
         chosen = [f for f in chosen if str(f.verdict) != "proved" and not f.control and f.applies]
     if chosen:
-        rows = [
+        told = [
             (verdict_html(f), _text(f.claim), because(f.evidence) if f.witness is None else _witness(f.witness))
             for f in chosen[:_CLAIMS]
         ]
-        pieces.append(markup.table(["verdict", "claim", "because"], rows))
+        pieces.append(markup.table(["verdict", "claim", "because"], told))
     if len(chosen) > _CLAIMS:
         pieces.append(f"<p>… and {len(chosen) - _CLAIMS} more claims</p>")
     notes = [*filter(None, [ending_sentence(report)]), *report.notes[:5]]
@@ -139,14 +144,8 @@ def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
     return by_section
 
 
-def sections_table(findings: Iterable[Finding]) -> str:
-    """How many claims of each section have which verdict."""
-    rows = [(_text(title or "claims"), _text(counts(found))) for title, found in sections_of(findings).items()]
-    return markup.table(["section", "claims"], rows)
-
-
 def _witness(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
-    lines = report_text.witness_lines(witness, limits.number)
+    lines = witness_lines(witness, limits.number)
     if (more := len(witness.vectors) - limits.entries) > 0:
         lines[limits.entries + 1 : -2] = [f"… and {more} more vectors"]
     return "<br/>".join(_text(line.strip().removeprefix("witness: "), limits.formula) for line in lines)
@@ -154,3 +153,84 @@ def _witness(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
 
 def _text(text: str, width: int = _TEXT) -> str:
     return markup.escape(markup.shortened(text, width))
+
+
+# -- as text
+
+
+@text_form.register
+def report_text(report: Report) -> str:
+    """All findings with their evidence, then the verdict."""
+    lines, told = [headline(report)], set[str]()
+    for finding in report.findings:
+        lines.append(f"{verdict_text(finding)}\t{finding.claim}")
+        lines += [f"\t{line}" for line in details(finding, told)]
+    lines += [f"note\t{note}" for note in report.notes]
+    return "\n".join([*lines, f"verdict\t{report.verdict}"])
+
+
+def headline(report: Report) -> str:
+    """The first line: what was checked, of which systems, with which values of parameters, for which eps."""
+    context = report.context
+    values = [
+        ", ".join(
+            f"{name} = {shorten(str(value), 60)}" for name, value in context.get(key, {}).get("parameters", {}).items()
+        )
+        for key in ("document", "other_document")
+    ]
+    if "other" in context:
+        pair = zip((context["system"], context["other"]), values, strict=True)
+        names = ", ".join(f"{name} ({text})" if text else name for name, text in pair)
+    else:
+        names = ", ".join(filter(None, (context["system"], values[0])))
+    eps = eps_words(context)
+    if "eps2" in context:
+        eps += f", second map at eps2 = {context['eps2']}"
+    return f"{report.check}: {names}{eps}"
+
+
+def verdict_text(finding: Finding) -> str:
+    """The verdict in words, and that a control was refuted as it should be."""
+    verdict = str(finding.verdict)
+    return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
+
+
+def details(finding: Finding, told: set[str], width: int | None = None) -> list[str]:
+    """What stands below a claim; `told` are the hypotheses that the reader has seen already."""
+    lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
+    lines.append(summary(finding.evidence, told))
+    lines += [f"also: {evidence.summary}" for evidence in finding.also]
+    if finding.witness is not None:
+        lines += witness_lines(finding.witness, width)
+    if finding.source:
+        lines.append(f"source: {finding.source}")
+    return [line if width is None else shorten(line, 1200) for line in lines]
+
+
+def summary(evidence: Evidence, told: set[str] | None = None) -> str:
+    """The sentence of the evidence; a hypothesis is spelt out once in a report, of which `told` remembers it."""
+    hypotheses = evidence.data.get("hypotheses")
+    if not hypotheses:
+        return evidence.summary
+    new = [text for text in hypotheses if text not in (told or ())]
+    if told is not None:
+        told.update(new)
+    rest = len(hypotheses) - len(new)
+    above = f"{rest} hypotheses as above" if rest > 1 else "1 hypothesis as above" if rest else ""
+    return f"{evidence.data['theorem']} applies: {'; '.join(new + [above] * bool(above))}"
+
+
+def witness_lines(witness: Witness, width: int | None) -> list[str]:
+    """A witness, the numbers shortened to `width`."""
+
+    def numbers(values: tuple[str, ...]) -> str:
+        return ", ".join(value if width is None else shorten(value, width) for value in values)
+
+    where = "" if witness.field == "QQ" else f" over {witness.field}"
+    more = [f"  {name} = ({numbers(vector)})" for name, vector in witness.vectors.items()]
+    return [
+        f"witness: x = ({numbers(witness.point)}){f', eps = {witness.eps}' if witness.eps else ''}{where}",
+        *more,
+        f"  {witness.left_label} = {numbers(witness.left)}",
+        f"  {witness.right_label} = {numbers(witness.right)}",
+    ]

@@ -107,13 +107,9 @@ def orbit_html(orbit: Orbit) -> str:
 def _cells(point: OrbitPoint, count: int) -> list[str]:
     """One row: the step, the first coordinates of `count`, and the number of digits."""
     is_long = point.digits > _LARGEST_SHOWN
-    texts = ["(long)"] * count if is_long else [_beginning_and_end(text) for text in point.text]
+    texts = [t if len(t) <= 24 else f"{t[:10]}…{t[-10:]}" for t in (["(long)"] * count if is_long else point.text)]
     cells = texts[:_COORDINATES] + ["…"] * (count > _COORDINATES)
     return [str(point.step), *(markup.escape(text) for text in cells), str(point.digits or "")]
-
-
-def _beginning_and_end(number: str) -> str:
-    return number if len(number) <= 24 else f"{number[:10]}…{number[-10:]}"
 
 
 @html_form.register

@@ -116,11 +116,6 @@ def definitions(rows: Iterable[tuple[str, str]]) -> str:
     return "\n".join(["<table><tbody>", *lines, "</tbody></table>"])
 
 
-def details(summary: str, inside: str) -> str:
-    """What is unfolded by a click; `summary` is text, `inside` is HTML already."""
-    return f"<details><summary>{escape(summary)}</summary>\n{inside}\n</details>"
-
-
 def listed(entries: Iterable[str]) -> str:
     """A list whose entries are HTML already."""
     return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])

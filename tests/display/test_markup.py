@@ -29,7 +29,6 @@ def test_escaped_text_is_shown_as_it_is():
     [
         markup.table([EVIL], [["<b>1</b>"]], EVIL),
         markup.definitions([(EVIL, "1")]),
-        markup.details(EVIL, "<p>1</p>"),
         markup.titled(EVIL, "<p>1</p>", EVIL),
         markup.verdict(EVIL),
         markup.listed([markup.escape(EVIL)]),

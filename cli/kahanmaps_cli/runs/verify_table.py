@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from kahanmaps.display import markup
-from kahanmaps.display.report_text import headline, witness_lines
+from kahanmaps.display.checks import headline, witness_lines
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
