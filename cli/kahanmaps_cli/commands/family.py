@@ -8,12 +8,11 @@ from typing import Any
 
 import click
 
-from kahanmaps.errors import quoted
+from kahanmaps.errors import InputError, counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.runs.draw import draw_member, draw_options
-from kahanmaps_cli.screen.numbers import read_matrix
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.screen.progress import say
 from kahanmaps_cli.screen.render import envelope, print_json
@@ -135,7 +134,11 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     if (system is None) == (matrix is None):
         raise click.UsageError("give a SYSTEM of kind [family], or --matrix ROWS, one of the two")
     if matrix is not None:
-        A, variables = read_matrix(matrix), None
+        rows = [list(lib.parse_point(row)) for row in matrix.split(";")]
+        if len(rows) > (most := lib.MAX_DIMENSION) or any(len(row) != len(rows) for row in rows):
+            shape = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
+            raise InputError(f"found {shape}, expected a square matrix, at most {most} x {most}")
+        A, variables = lib.fmpq_mat(rows), None
     else:
         member = _member(system, parameters)[1]
         A, variables = member.A, member.variables

@@ -32,26 +32,24 @@ class _Files:
         self.read: set[Identity] = set()
         self.written: dict[Identity, str] = {}
         with suppress(OSError, ValueError, AttributeError):  # standard input is closed, or there is none
-            self.reads(sys.stdin.fileno())
+            self.note(sys.stdin.fileno())
 
-    def reads(self, path: Any) -> None:
-        """Note a file that is about to be read."""
-        found = _identity(path)
-        if found in self.written:
-            self._refuse(self.written[found])
-        if found is not None:
-            self.read.add(found)
-
-    def writes(self, path: str) -> None:
-        """Note a file that is going to be written."""
-        found = _identity(path)
-        if found in self.read:
-            self._refuse(path)
-        if found is not None:
-            self.written[found] = path
-
-    def _refuse(self, path: str) -> None:
-        raise click.UsageError(f"found {path} both to be read and to be written (-o): it would be written over")
+    def note(self, path: Any, is_written: bool = False) -> None:
+        """Note a file that is about to be read, or one that is going to be written; refuse one that is both."""
+        try:
+            found = os.stat(path)
+        except (OSError, ValueError):
+            return
+        if not stat.S_ISREG(found.st_mode):
+            return  # it holds nothing that could be written over
+        identity = found.st_dev, found.st_ino
+        if identity in (self.read if is_written else self.written):
+            name = path if is_written else self.written[identity]
+            raise click.UsageError(f"found {name} both to be read and to be written (-o): it would be written over")
+        if is_written:
+            self.written[identity] = path
+        else:
+            self.read.add(identity)
 
 
 class OutputFile(click.Path):
@@ -66,8 +64,14 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = os.fsdecode(super().convert(value, param, ctx))
         if path != "-" and ctx is not None and not ctx.resilient_parsing:
-            _require_place(path, self.grows)
-            _files(ctx).writes(path)
+            # Whether there is a place for the file is known before anything is computed.
+            folder, target = lib.resolved(path).parent, Path(path)
+            if not path or not folder.is_dir():
+                raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
+            in_its_place = target.exists() and (self.grows or not target.is_file())
+            if not os.access(path if in_its_place else folder, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+            _files(ctx).note(path, is_written=True)
         return path
 
 
@@ -81,8 +85,19 @@ class OutputFolder(click.Path):
         path = super().convert(value, param, ctx)
         if ctx is not None:
             _files(ctx)  # notes from now on what is read
-            if not ctx.resilient_parsing:
-                _require_folder(Path(os.fsdecode(path)))
+        if ctx is None or ctx.resilient_parsing:
+            return path
+        # Whether files can be written there is found out, before anything is computed, by making it.
+        folder = Path(os.fsdecode(path))
+        missing = [one for one in (folder, *folder.parents) if not one.exists()]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(folder, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+        finally:
+            for one in missing:
+                if one.is_dir():
+                    one.rmdir()
         return path
 
 
@@ -93,7 +108,7 @@ def file_name(name: str) -> str:
 
 def will_write(path: str) -> None:
     """Refuse a file that this command has read."""
-    _files(click.get_current_context()).writes(path)
+    _files(click.get_current_context()).note(path, is_written=True)
 
 
 def _files(context: click.Context) -> _Files:
@@ -106,49 +121,16 @@ def _files(context: click.Context) -> _Files:
 
 @cache  # a hook stays as long as the process
 def _listen() -> None:
-    sys.addaudithook(_hear)
+    def hear(event: str, arguments: tuple[Any, ...]) -> None:
+        """Tell the command that is running of every file that is opened to be read, also databases of results."""
+        if event == "open" and (arguments[2] or 0) & os.O_ACCMODE == os.O_RDONLY and not isinstance(arguments[0], int):
+            path = arguments[0]
+        elif event == "sqlite3.connect":
+            path = unquote(os.fsdecode(arguments[0]).removeprefix("file:").partition("?")[0])
+        else:
+            return
+        context = click.get_current_context(silent=True)
+        if context is not None and _KEY in context.meta:
+            context.meta[_KEY].note(path)
 
-
-def _hear(event: str, arguments: tuple[Any, ...]) -> None:
-    """Tell the command that is running of every file that is opened to be read, databases of results among them."""
-    if event == "open" and (arguments[2] or 0) & os.O_ACCMODE == os.O_RDONLY and not isinstance(arguments[0], int):
-        path = arguments[0]
-    elif event == "sqlite3.connect":
-        path = unquote(os.fsdecode(arguments[0]).removeprefix("file:").partition("?")[0])
-    else:
-        return
-    context = click.get_current_context(silent=True)
-    if context is not None and _KEY in context.meta:
-        context.meta[_KEY].reads(path)
-
-
-def _identity(path: Any) -> Identity | None:
-    """What a name stands for, where that is a file that holds something."""
-    try:
-        found = os.stat(path)
-    except (OSError, ValueError):
-        return None
-    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
-
-
-def _require_folder(path: Path) -> None:
-    """Raise OSError where files cannot be written to the folder, before anything is computed: by making it."""
-    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        if not os.access(path, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-    finally:
-        for folder in missing:
-            if folder.is_dir():
-                folder.rmdir()
-
-
-def _require_place(path: str, grows: bool) -> None:
-    """Raise OSError where there is no place for the file, before anything is computed."""
-    folder = lib.resolved(path).parent
-    if not path or not folder.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
-    is_there = Path(path).exists()
-    if not os.access(path if is_there and (grows or not Path(path).is_file()) else folder, os.W_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+    sys.addaudithook(hear)

@@ -35,15 +35,15 @@ def say(message: str) -> None:
 
 def as_typed(words: Iterable[str]) -> str:
     """The words of a command as one would type them, on one line of UTF-8."""
-    return " ".join(map(_typed, words))
-
-
-def _typed(word: str) -> str:
-    """A word as a shell reads it; what cannot be printed is spelt out, such as bytes that are not UTF-8."""
-    if word.isprintable():
-        return shlex.quote(word)
-    spelt = "".join(chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
-    return f"$'{spelt}'"
+    typed = []
+    for word in words:
+        if word.isprintable():
+            typed.append(shlex.quote(word))
+            continue
+        # What cannot be printed is spelt out as a shell reads it, such as bytes that are not UTF-8.
+        codes = (chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
+        typed.append(f"$'{''.join(codes)}'")
+    return " ".join(typed)
 
 
 class Progress:
@@ -75,7 +75,11 @@ class Progress:
             _write(text + "\n")
             return
         with self._drawing:
-            text = text[: _width() - 1]
+            try:  # a line longer than the terminal below standard error could not be drawn again
+                width = max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
+            except (OSError, ValueError):
+                width = 80
+            text = text[: width - 1]
             _write("\r" + text.ljust(self._shown))
             self._shown = len(text)
 
@@ -158,14 +162,6 @@ def duration(seconds: float) -> str:
     parts = [(whole // 86400, "d"), (whole // 3600 % 24, "h"), (whole // 60 % 60, "min"), (whole % 60, "s")]
     first = next((k for k, (number, _) in enumerate(parts) if number), 3)
     return " ".join(f"{number} {unit}" for number, unit in parts[first : first + 2] if number) or "0 s"
-
-
-def _width() -> int:
-    """Columns of the terminal below standard error: a longer line could not be drawn again."""
-    try:
-        return max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
-    except (OSError, ValueError):
-        return 80
 
 
 def _write(text: str) -> None:

@@ -1,4 +1,4 @@
-"""Reports for people (a rich table on a terminal, plain lines in a pipe) and for scripts (one JSON object)."""
+"""Reports and numbers for people (a rich table on a terminal, plain lines in a pipe) and for scripts (JSON)."""
 
 from __future__ import annotations
 
@@ -115,3 +115,16 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     for note in report.notes:
         tell(f"note: {note}")
     tell(f"verdict\t{report.verdict}", 9)
+
+
+def json_number(value: Any) -> Any:
+    """A JSON number, or the text inf, -inf or nan, which JSON has no numbers for; a complex one as its two parts."""
+    number = complex(value)
+    if isinstance(value, complex) or getattr(value, "dtype", None) == "complex128":
+        return [lib.json_float(number.real), lib.json_float(number.imag)]
+    return lib.json_float(value)
+
+
+def short_float(value: Any) -> str:
+    """Three digits."""
+    return f"{float(value):.3g}"

@@ -7,7 +7,7 @@ import os
 import stat
 import sys
 from contextlib import suppress
-from typing import Any, TextIO
+from typing import Any
 
 
 class _Pipe(io.FileIO):
@@ -48,7 +48,12 @@ def have_standard_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    if _is_pipe(sys.stdout) and isinstance(sys.stdout, io.TextIOWrapper) and _pipe_below(sys.stdout) is None:
+    try:
+        mode = os.fstat(sys.stdout.fileno()).st_mode
+    except (OSError, ValueError):
+        return
+    is_pipe = stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+    if is_pipe and isinstance(sys.stdout, io.TextIOWrapper) and not isinstance(_raw_output(), _Pipe):
         sys.stdout.flush()
         pipe = io.BufferedWriter(_Pipe(sys.stdout.fileno(), "w", closefd=False))
         sys.stdout = io.TextIOWrapper(pipe, encoding=sys.stdout.encoding, errors="backslashreplace")
@@ -56,13 +61,13 @@ def have_standard_streams() -> None:
 
 def is_read() -> bool:
     """Whether somebody may still read what is printed; it is known when a buffer was full, or has been flushed."""
-    pipe = _pipe_below(sys.stdout)
-    return pipe is None or pipe.is_read
+    raw = _raw_output()
+    return not isinstance(raw, _Pipe) or raw.is_read
 
 
 def output_was_lost() -> bool:
     """Whether something was printed though standard output was closed when the program began; once it is flushed."""
-    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    raw = _raw_output()
     return isinstance(raw, _Nowhere) and raw.has_lost
 
 
@@ -76,14 +81,6 @@ def leave_nothing_to_flush() -> None:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _is_pipe(stream: TextIO) -> bool:
-    try:
-        mode = os.fstat(stream.fileno()).st_mode
-    except (OSError, ValueError):
-        return False
-    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
-
-
-def _pipe_below(stream: TextIO) -> _Pipe | None:
-    raw = getattr(getattr(stream, "buffer", None), "raw", None)
-    return raw if isinstance(raw, _Pipe) else None
+def _raw_output() -> Any:
+    """What is below the buffers of standard output."""
+    return getattr(getattr(sys.stdout, "buffer", None), "raw", None)

@@ -12,7 +12,7 @@ import shutil
 import sys
 from collections.abc import Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -40,11 +40,8 @@ def columns() -> int:
     return max(20, shutil.get_terminal_size().columns)
 
 
-def is_coloured(stream: TextIO | None = None) -> bool:
-    """Whether a stream gets colours: --color decides, then NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, a terminal.
-
-    The stream is standard output unless given.
-    """
+def is_coloured() -> bool:
+    """Whether standard output gets colours: --color decides, NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, a terminal."""
     context = click.get_current_context(silent=True)
     if context is not None and context.color is not None:
         return context.color
@@ -52,7 +49,7 @@ def is_coloured(stream: TextIO | None = None) -> bool:
         return False
     if any(os.environ.get(name, "0") not in ("", "0") for name in ("FORCE_COLOR", "CLICOLOR_FORCE")):
         return True
-    return (on_terminal() if stream is None else stream.isatty()) and os.environ.get("TERM") != "dumb"
+    return on_terminal() and os.environ.get("TERM") != "dumb"
 
 
 def paint(text: str, style: str) -> str:
@@ -91,7 +88,13 @@ def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")
-        shown = _laid_out(cells, hang) if on_terminal() else line
+        shown = line
+        if on_terminal() and len(cells) > 1:
+            label = cells[0].ljust(hang) if len(cells[0]) < hang else f"{cells[0]}  "
+            shown = _filled("  ".join(cells[1:]), label, hang)
+        elif on_terminal():
+            margin = len(line) - len(line.lstrip())
+            shown = _filled(line.lstrip(), line[:margin], margin + 4)
         if style or line.startswith("# "):
             shown = "\n".join(paint(piece, style or "bold") if piece else "" for piece in shown.split("\n"))
         for cell in cells[:2]:
@@ -141,33 +144,24 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     console().print(table)
 
 
-def _laid_out(cells: list[str], hang: int) -> str:
-    label, *others = cells
-    if not others:
-        text = label.lstrip()
-        margin = len(label) - len(text)
-        return _filled(text, label[:margin], margin + 4)
-    return _filled("  ".join(others), label.ljust(hang) if len(label) < hang else f"{label}  ", hang)
-
-
 def _filled(text: str, first: str, hang: int) -> str:
     """The text behind `first`, in lines of the terminal's width that are broken at blanks and hang below the text."""
     margins = {"initial_indent": first, "subsequent_indent": " " * hang}
     return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first  # type: ignore[arg-type]
 
 
-def _choose(context: click.Context, parameter: click.Parameter, value: Any) -> None:
-    if value is not None:
-        context.color = _WHEN[value]
-
-
 def colour_option() -> click.Option:
     """The option --color auto|always|never."""
+
+    def choose(context: click.Context, parameter: click.Parameter, value: Any) -> None:
+        if value is not None:
+            context.color = _WHEN[value]
+
     return click.Option(
         ["--color"],
         type=click.Choice(list(_WHEN)),
         metavar="WHEN",
-        callback=_choose,
+        callback=choose,
         expose_value=False,
         is_eager=True,
         help="Colours: auto (the default), always or never.",
