@@ -178,7 +178,7 @@ from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves a
 from kahanmaps.plots.curves.draw_invariant_curves import panels_of as panels_of
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves as InvariantCurves
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves as find_invariant_curves
-from kahanmaps.plots.curves.level_sets import LevelCurves as LevelCurves
+from kahanmaps.plots.curves.level_sets import Levels as Levels
 from kahanmaps.plots.curves.level_sets import level_curves as level_curves
 from kahanmaps.plots.curves.level_sets import levels_through as levels_through
 from kahanmaps.plots.curves.plane_views import view_of as view_of
@@ -218,7 +218,6 @@ from kahanmaps.plots.portraits.trajectories import walked as walked
 from kahanmaps.plots.portraits.windows import Window as Window
 from kahanmaps.plots.portraits.windows import fullest_axes as fullest_axes
 from kahanmaps.plots.portraits.windows import require_window as require_window
-from kahanmaps.plots.recipe import Recipe as Recipe
 from kahanmaps.plots.scan import draw_scan as draw_scan
 from kahanmaps.plots.squares import pair_of_systems as pair_of_systems
 from kahanmaps.plots.squares import pairs_of_member as pairs_of_member

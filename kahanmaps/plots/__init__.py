@@ -2,7 +2,6 @@
 
 style             sizes in centimetres, fonts, colours that the colour-blind and a grey printer tell apart
 figures           an empty figure in a style, its texts and legend; as a file (PDF, SVG, PNG) or as SVG inside a page
-recipe            how a picture was made, for the metadata of its file
 growth            degrees of iterates, heights of exact orbits (growth_records: read from JSON)
 scan              the plane of two parameters, with what a scan found in it
 squares           do two maps commute, seen from one point (draw_squares)

@@ -25,8 +25,8 @@ from xml.sax.saxutils import escape
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.display.latex import latex_name
 from kahanmaps.errors import InputError
-from kahanmaps.plots.recipe import Recipe
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, Style
+from kahanmaps.version import __version__
 from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
@@ -41,6 +41,13 @@ _MAX_DIGITS = 40  # of a number in a label
 _BAND_COLOUR, _BAND_SHARE = "#e8e8e8", 0.09  # where a logarithmic axis shows zeros; of its height
 _MAX_TICKS = 6
 _HANDLE = 5.0  # of a legend, the line or mark with the space around it, in heights of a letter
+# Where programs show the version, the command and the system; dates are left out, so that the same picture is the same
+# file.
+_METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
+    "pdf": (("Creator", "Subject", "Keywords"), {"CreationDate": None}),
+    "svg": (("Creator", "Description", "Source"), {"Date": None}),
+    "png": (("Software", "Description", "Comment"), {}),
+}
 
 
 def require_matplotlib() -> None:
@@ -152,7 +159,7 @@ def _letters(label: str) -> int:
 
 def _room(style: Style) -> float:
     """The width of a picture in heights of a letter of its legend."""
-    return style.width / CENTIMETRES_PER_INCH * 72 / max(3.0, style.font_size - 1)
+    return style.width / CENTIMETRES_PER_INCH * 72 / style.small
 
 
 def legend_above(
@@ -241,22 +248,24 @@ def format_of(path: str, asked: str | None) -> str:
     return found
 
 
-def picture_bytes(figure: Figure, kind: str, style: Style, recipe: Recipe | None = None) -> bytes:
-    """The figure as a PDF, SVG or PNG file, with the recipe in its metadata.
+def picture_bytes(figure: Figure, kind: str, style: Style, command: str = "", system: str = "") -> bytes:
+    """The figure as a PDF, SVG or PNG file; the command that makes it and the system (as TOML) are in its metadata.
 
     The same figure gives the same bytes, with the same version of matplotlib: no dates, no random names. Raises
     InputError for more dots than fit into memory.
     """
     style.require_pixels(*figure.get_size_inches())
+    keys, no_dates = _METADATA[kind]
+    texts = zip(keys, (f"kahanmaps {__version__}", command, system), strict=True)
     held = io.BytesIO()
     with drawing(style):
-        figure.savefig(held, format=kind, metadata=(recipe or Recipe()).metadata(kind))
+        figure.savefig(held, format=kind, metadata={**{key: text for key, text in texts if text}, **no_dates})
     return held.getvalue()
 
 
-def write_picture(figure: Figure, path: str, kind: str, style: Style, recipe: Recipe | None = None) -> None:
+def write_picture(figure: Figure, path: str, kind: str, style: Style) -> None:
     """Write the figure to a file, whole or not at all."""
-    write_whole(Path(path), picture_bytes(figure, kind, style, recipe))
+    write_whole(Path(path), picture_bytes(figure, kind, style))
 
 
 def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:

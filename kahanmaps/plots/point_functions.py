@@ -67,14 +67,6 @@ class PointFunction:
                 return index
         return None
 
-    def used(self) -> frozenset[int]:
-        """Which variables occur in it (eps does not count)."""
-        found = set()
-        for polynomial in (self.function.numerator, self.function.denominator):
-            degrees = polynomial.degrees()[:-1]
-            found |= {index for index, degree in enumerate(degrees) if int(degree) > 0}
-        return frozenset(found)
-
     @property
     def label(self) -> str:
         """The name for a picture, as a formula where it is short."""

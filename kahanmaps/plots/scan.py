@@ -199,4 +199,4 @@ def _curve(one: Component, window: Window) -> list[np.ndarray]:
     context = ring(["u", "v", "eps"])
     equation = one.equations[0].compose(*context.gens()[:2], ctx=context)
     function = PointFunction(one.text, RationalFunction(equation, context.constant(1)))
-    return [piece for pieces in level_curves(function, (0, 1), 2, [0.0], window).pieces for piece in pieces]
+    return list(level_curves(function, (0, 1), 2, [0.0], window)[0])

@@ -88,8 +88,8 @@ def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, 
     kahanmaps(command)
     outcome = kahanmaps(command + " --levels-at=-1/2,1000")
     through, at = (found.levels for found, _ in drawn)
-    assert len(through.levels) == 1
-    assert at.levels == (-0.5, 1000.0)
+    assert len(through) == 1
+    assert [bool(pieces) for pieces in at] == [True, False]
     assert "1 of 2 levels of modified_H have no curve in the window" in outcome.err
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from kahanmaps.documents.catalog import load
+from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.plots.portraits.automatic_starts import COUNT, automatic_starts
-from kahanmaps.plots.portraits.flow import equilibria, plane_flow, solutions
+from kahanmaps.plots.portraits.flow import equilibria, plane_flow, solution
 from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -54,12 +55,12 @@ def test_separatrices_lie_on_the_level_of_their_saddle():
 
 
 def test_a_solution_passes_what_is_a_pole_in_time_and_ends_after_its_time():
-    (curve,) = solutions(planar("x^2", "1"), np.array([[1.0, 0.0]]), BOX)  # x = 1/(1 - t), y = t
+    curve = solution(VectorField(planar("x^2", "1")), np.array([1.0, 0.0]), BOX)  # x = 1/(1 - t), y = t
     assert np.allclose(curve[:, 0] * (1 - curve[:, 1]), 1, atol=1e-8)
     assert curve[-1, 0] > 3
-    (short,) = solutions(planar("y", "-x"), np.array([[1.0, 0.0]]), BOX, time=1.0)
+    rotation, start = VectorField(planar("y", "-x")), np.array([1.0, 0.0])
+    short, past = (solution(rotation, start, BOX, time) for time in (1.0, -1.0))
     assert short[-1] == pytest.approx([np.cos(1), -np.sin(1)], abs=2 / 400 * 6)
-    (past,) = solutions(planar("y", "-x"), np.array([[1.0, 0.0]]), BOX, time=-1.0)
     assert past[-1, 1] > 0 > short[-1, 1]
 
 

@@ -49,10 +49,6 @@ def test_variables_are_recognised(text, variable):
     assert point_function(text, ["x", "y"]).variable == variable
 
 
-def test_which_variables_occur_is_known_without_eps():
-    assert point_function("x/(1 + eps*z)", ["x", "y", "z"], fmpq(1)).used() == {0, 2}
-
-
 @pytest.mark.parametrize(
     ("text", "label"), [("x1", "$x_1$"), ("x1^2*y", "$x_1^2 y$"), ("(x1-1)/y", "(x1-1)/y"), ("y+0*x1", "$y$")]
 )

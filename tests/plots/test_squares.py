@@ -68,20 +68,14 @@ def test_a_gap_too_small_for_machine_numbers_is_a_gap():
     assert 0 < found.gap < 1e-29
 
 
-def test_a_singular_point_is_told_and_leaves_nothing_to_compare():
-    # x~ = x/(1 - 2 eps x) has a pole at x = 5 for eps = 1/10
-    found = squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [5, 2], "1/10")
-    assert found.closes is None
-    assert found.verdict == "no fourth corner"
+def test_a_singular_point_is_told_and_only_what_is_there_is_compared():
+    # x~ = x/(1 - 2 eps x) has a pole at x = 5 for eps = 1/10; from 5/3 it is met at the third step
+    pair = plane_pair(["x^2", "0"], ["0", "y^2"])
+    found = squares(pair, [5, 2], "1/10")
+    assert (found.closes, found.verdict) == (None, "no fourth corner")
     assert found.stopped == "Phi_f: the map has no value at a point on the way"
-
-
-def test_what_is_there_is_compared_where_points_are_missing():
-    # from x = 5/3 the second step of f has no value: x~ = 5/2, then 5 at step 2, and none at step 3
-    found = squares(plane_pair(["x^2", "0"], ["0", "y^2"]), ["5/3", "1/7"], "1/10", 3)
-    assert found.g_after_f[3][0] is None
-    assert found.closes is True
-    assert found.stopped
+    later = squares(pair, ["5/3", "1/7"], "1/10", 3)
+    assert (later.g_after_f[3][0], later.closes, bool(later.stopped)) == (None, True, True)
 
 
 def test_numbers_that_grow_too_long_are_left_out_and_wrong_numbers_of_steps_refused(monkeypatch):
@@ -101,21 +95,17 @@ def test_the_chosen_signs_are_drawn_and_their_neighbour():
     assert control.names == ("J grad H_0", "J grad H_1")
 
 
-def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
-    member = draw_with_chi(parse_chi("t^2 - 2"), seed=3)
-    pair, _ = pairs_of_member(SystemFile.from_member(member))
-    found = squares(pair, START, "1/50")
-    assert found.g_after_f[1][1] == found.g_after_f[0][0]
-
-
-def test_a_recognised_member_is_found():
+def test_members_are_recognised_in_the_plane_with_twice_the_system_as_the_control():
     pair, _ = pairs_of_member(SystemFile.from_system(load("paper_m2").system))
     assert squares(pair, START, "1/50").closes is True
-
-
-def test_in_the_plane_the_control_is_twice_the_system():
     file = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["-6*x*y", "3*y^2 - 3*x^2"]))
     assert [squares(pair, [1, "1/2"], "1/10").closes for pair in pairs_of_member(file)] == [True, False]
+
+
+def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
+    pair, _ = pairs_of_member(SystemFile.from_member(draw_with_chi(parse_chi("t^2 - 2"), seed=3)))
+    found = squares(pair, START, "1/50")
+    assert found.g_after_f[1][1] == found.g_after_f[0][0]
 
 
 def test_systems_that_are_no_pair_are_refused():

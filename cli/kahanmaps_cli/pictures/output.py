@@ -153,10 +153,10 @@ def _deliver(figure: Figure, options: dict[str, Any], file: lib.SystemFile | Non
     style, path = style_from(options), options["output"]
     if options["title"]:
         lib.write_title(figure, printable(options["title"]), style)
-    recipe = lib.Recipe(command_line(), "" if file is None else file.to_toml())
+    system = "" if file is None else file.to_toml()
     with warnings.catch_warnings(record=True) as found:
         warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
-        content = lib.picture_bytes(figure, lib.format_of(path, options["kind"]), style, recipe)
+        content = lib.picture_bytes(figure, lib.format_of(path, options["kind"]), style, command_line(), system)
     if found and not options["quiet"]:
         say("the fonts lack some letters of the texts: they are drawn as boxes")
     if path == "-":

@@ -208,14 +208,14 @@ def _asked_axes(file: lib.SystemFile, eps: Any, options: dict[str, Any]) -> tupl
 
 def _levels(
     function: lib.PointFunction, axes: Sequence[Any], window: lib.Window, starts: Any, at: Any, notes: list[str]
-) -> lib.LevelCurves:
+) -> lib.Levels:
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if len(plane) != 2 or len(axes) != 2:
         raise lib.InputError("level curves are drawn in the plane of two variables: take --axes X,Y with two of them")
     values = lib.levels_through(function, starts) if at is None else lib.to_floats(at).tolist()
     curves = lib.level_curves(function, plane, starts.shape[1], values, window)
-    if curves.missing:
-        notes.append(f"{curves.missing} of {len(values)} levels of {function.name} have no curve in the window")
+    if missing := sum(not pieces for pieces in curves):
+        notes.append(f"{missing} of {len(values)} levels of {function.name} have no curve in the window")
     return curves
 
 

@@ -7,7 +7,6 @@ the curve by Newton's method.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,18 +21,7 @@ GRID = 301  # lines each way
 _NEWTON = 8
 
 
-@dataclass(frozen=True, eq=False)
-class LevelCurves:
-    """Curves F = level in a window: for each level pieces, arrays (n, 2) of vertices; `missing` levels have none."""
-
-    label: str
-    levels: tuple[float, ...]
-    pieces: tuple[tuple[FloatArray, ...], ...]
-
-    @property
-    def missing(self) -> int:
-        """How many levels have no curve in the window."""
-        return sum(not pieces for pieces in self.pieces)
+Levels = tuple[tuple[FloatArray, ...], ...]  # for each level the pieces of its curve, arrays (n, 2) of vertices
 
 
 def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
@@ -48,19 +36,20 @@ def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, 
 
 def level_curves(
     function: PointFunction, plane: Sequence[int], dim: int, levels: Sequence[float], window: Window
-) -> LevelCurves:
-    """The curves F = level in a window of the plane of two variables, given by their indices.
+) -> Levels:
+    """The curves F = level in a window of the plane of two variables, given by their indices; none is no piece.
 
     Raises InputError where F depends on other variables than these two, and for more than 200 levels.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> circle = level_curves(point_function("x^2 + y^2", "xy"), (0, 1), 2, [1.0], ((-2, 2), (-2, 2)))
-    >>> bool(np.allclose((circle.pieces[0][0] ** 2).sum(axis=1), 1, rtol=1e-12))
+    >>> bool(np.allclose((circle[0][0] ** 2).sum(axis=1), 1, rtol=1e-12))
     True
     """
     if len(plane) != 2 or len(window) != 2:
         raise InputError("level curves are for pictures of two variables")
-    further = sorted(function.used() - set(plane))
+    sides = (function.function.numerator.degrees(), function.function.denominator.degrees())
+    further = [k for k in range(dim) if k not in plane and any(int(degrees[k]) > 0 for degrees in sides)]
     if further:
         names = function.function.names
         raise InputError(
@@ -85,7 +74,7 @@ def level_curves(
 
         with np.errstate(all="ignore"):
             found.append(zero_curves(value, window, on_grid[0] - level * on_grid[1]))
-    return LevelCurves(function.label, tuple(levels), tuple(found))
+    return tuple(found)
 
 
 def zero_curves(
@@ -103,35 +92,32 @@ def zero_curves(
     from contourpy import contour_generator
 
     xs, ys, points = _grid(window)
+    mesh = np.array([(high - low) / (GRID - 1) for low, high in window])
+    step = 1e-4 * mesh
     with np.errstate(all="ignore"):
         values = value(points) if on_grid is None else on_grid
-    if not np.isfinite(values).all():
-        values = np.ma.masked_invalid(values)
-    lines = contour_generator(xs, ys, values).lines(0.0)
-    return tuple(_moved_onto(value, np.asarray(line), window) for line in lines)
+        if not np.isfinite(values).all():
+            values = np.ma.masked_invalid(values)
+        lines = [np.asarray(line) for line in contour_generator(xs, ys, values).lines(0.0)]
+        # Each vertex is moved by Newton's method along the gradient, by less than a mesh of the grid.
+        for line in lines:
+            moved = line.copy()
+            for _ in range(_NEWTON):
+                gradient = np.stack(
+                    [
+                        (value(moved + e * step) - value(moved - e * step)) / (2 * step[k])
+                        for k, e in enumerate(np.eye(2))
+                    ],
+                    axis=-1,
+                )
+                scaled = gradient * mesh  # in units of the mesh, so that both axes count alike
+                moved = moved - (value(moved) / (scaled**2).sum(axis=-1))[:, None] * scaled * mesh
+            good = np.isfinite(moved).all(axis=-1) & (np.abs(moved - line) <= mesh).all(axis=-1)
+            good &= np.abs(value(moved)) <= np.abs(value(line))
+            line[good] = moved[good]
+    return tuple(lines)
 
 
 def _grid(window: Window) -> tuple[FloatArray, FloatArray, FloatArray]:
     xs, ys = (np.linspace(low, high, GRID) for low, high in window)
     return xs, ys, np.stack(np.meshgrid(xs, ys), axis=-1)
-
-
-def _moved_onto(value: Callable[[FloatArray], FloatArray], line: FloatArray, window: Window) -> FloatArray:
-    """The vertices moved by Newton's method along the gradient, by less than a mesh of the grid."""
-    mesh = np.array([(high - low) / (GRID - 1) for low, high in window])
-    with np.errstate(all="ignore"):
-        moved = line.copy()
-        for _ in range(_NEWTON):
-            step = 1e-4 * mesh
-            gradient = np.stack(
-                [(value(moved + e * step) - value(moved - e * step)) / (2 * step[k]) for k, e in enumerate(np.eye(2))],
-                axis=-1,
-            )
-            # in units of the mesh, so that both axes count alike
-            scaled = gradient * mesh
-            change = -(value(moved) / (scaled**2).sum(axis=-1))[:, None] * scaled * mesh
-            moved = moved + change
-        good = np.isfinite(moved).all(axis=-1) & (np.abs(moved - line) <= mesh).all(axis=-1)
-        good &= np.abs(value(moved)) <= np.abs(value(line))
-    line[good] = moved[good]
-    return line

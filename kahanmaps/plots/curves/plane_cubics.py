@@ -24,8 +24,8 @@ class PlaneCubic:
     level, as for a point where all the curves meet.
 
     >>> circle = PlaneCubic((1.0, 0.0, -3.0, 0.0), 0.5, 1.0, 0.0)
-    >>> round(circle.length, 12), round(circle.defect(0, circle.length), 12)
-    (0.333333333333, 0.0)
+    >>> round(circle.length, 12), bool(abs(circle.value(np.array([0, circle.length]))) < 1e-12)
+    (0.333333333333, True)
     """
 
     h: tuple[float, float, float, float]
@@ -80,16 +80,6 @@ class PlaneCubic:
     def flow_through(self, u: float, v: float) -> PlaneCubic:
         """The level curve of h itself through a point, on which the differential equation moves."""
         return PlaneCubic(self.h, 0.0, self.h_at(u, v), 1.0)
-
-    def defect(self, u: Any, v: Any) -> float:
-        """How far points are from the curve: the largest of its equation there, over the sum of the terms of it."""
-        u, v = np.atleast_1d(np.asarray(u, dtype=float)), np.atleast_1d(np.asarray(v, dtype=float))
-        a, b, c, d = self.h
-        p, q, r = (self.eps * self.eps * entry for entry in self.D)
-        terms = [self.denominator * term for term in (a * u**3, b * u * u * v, c * u * v * v, d * v**3)]
-        terms += [-self.numerator * term for term in (1 + 0 * u, p * u * u, q * u * v, r * v * v)]
-        size = sum(np.abs(term) for term in terms)
-        return float(np.max(np.abs(sum(terms)) / np.where(size > 0, size, 1.0), initial=0.0))
 
     def gradient(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
         """The derivatives of denominator h - numerator (1 + eps^2 D) along u and v."""

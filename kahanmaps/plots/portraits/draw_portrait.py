@@ -60,7 +60,7 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         if found.flow is not None:
             _draw_flow(figure, axes, found.flow, found.window if in_space else None, style)
         if found.levels is not None:
-            pieces = [piece for pieces in found.levels.pieces for piece in pieces]
+            pieces = [piece for pieces in found.levels for piece in pieces]
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
         if found.euler is not None:
             # In the plane lines go on to the edge; what is far beyond it may be too large to draw.

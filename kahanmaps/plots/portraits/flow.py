@@ -141,25 +141,9 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
         for value, vector in zip(saddle.values.real, saddle.vectors.real.T, strict=True):
             offset = vector / np.linalg.norm(vector / size) * 1e-3
             for start in (saddle.point + offset, saddle.point - offset):
-                branches.append(np.vstack([saddle.point, _curve(f, start, box, np.copysign(np.inf, value))]))
+                branches.append(np.vstack([saddle.point, solution(f, start, box, np.copysign(np.inf, value))]))
     kinds = tuple((one.kind, one.point[order]) for one in shown)
     return Flow(places, arrows, kinds, tuple(curve[:, order] for curve in branches))
-
-
-def solutions(
-    system: QuadraticSystem, starts: FloatArray, box: Window, time: float | None = None
-) -> tuple[FloatArray, ...]:
-    """The solutions through starts (n, dim), as curves (points, dim) that end where they close or leave the box.
-
-    `box` has a range for each variable, and curves may leave it by its own size; `time` (default: any), negative for
-    the past, is how long they are followed.
-
-    >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
-    >>> (circle,) = solutions(rotation, np.array([[1.0, 0.0]]), ((-2, 2), (-2, 2)))
-    >>> bool(np.allclose(np.hypot(*circle.T), 1, rtol=1e-9)), bool((circle[0] == circle[-1]).all())
-    (True, True)
-    """
-    return tuple(_curve(VectorField(system), start, box, time) for start in starts)
 
 
 def projected_solutions(
@@ -175,11 +159,21 @@ def projected_solutions(
     box = window_of(found.points.reshape(-1, system.dim), found.points[0])
     steps = len(found.points) - 1
     time = float(time_step(eps) * steps) * (-1 if backward else 1) if steps else None
-    curves = solutions(system, found.points[0], box, time)
+    curves = (solution(VectorField(system), start, box, time) for start in found.points[0])
     return tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves)
 
 
-def _curve(f: VectorField, start: FloatArray, box: Window, time: float | None) -> FloatArray:
+def solution(f: VectorField, start: FloatArray, box: Window, time: float | None = None) -> FloatArray:
+    """The solution through a start, as a curve (points, dim) that ends where it closes or leaves the box.
+
+    `box` has a range for each variable, and the curve may leave it by its own size; `time` (default: any), negative
+    for the past, is how long it is followed.
+
+    >>> rotation = VectorField(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
+    >>> circle = solution(rotation, np.array([1.0, 0.0]), ((-2, 2), (-2, 2)))
+    >>> bool(np.allclose(np.hypot(*circle.T), 1, rtol=1e-9)), bool((circle[0] == circle[-1]).all())
+    (True, True)
+    """
     low, high = (np.array(side, dtype=np.float64) for side in zip(*box, strict=True))
     size, middle, step = high - low, (low + high) / 2, 1 / _FINE
     sign = -1.0 if time is not None and time < 0 else 1.0

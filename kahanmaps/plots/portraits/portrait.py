@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.plots.curves.level_sets import LevelCurves
+from kahanmaps.plots.curves.level_sets import Levels
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.flow import Flow
 from kahanmaps.plots.portraits.trajectories import Trajectories
@@ -50,7 +50,7 @@ class Portrait:
     left_out: int = 0
     undefined: int = 0
     euler: FloatArray | None = None
-    levels: LevelCurves | None = None
+    levels: Levels | None = None
     flow: Flow | None = None
     joined: tuple[NDArray[np.int64] | None, ...] = ()
 
