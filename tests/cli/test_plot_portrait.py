@@ -44,8 +44,6 @@ def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn)
     assert len(found.flow.solutions) == len(near.flow.solutions) > 0
     top = f"{PLOT} euler_top --eps 1/10 --start 1,1,1 --colour-by F1 -p"
     assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
-    top = f"{PLOT} euler_top --eps 1/10 --start 1,1,1 --levels a1*x1+eps*x2 --axes x1,x2 -p"
-    assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
 
 
 def test_the_points_are_those_of_the_float_orbit(kahanmaps, drawn, tmp_path):

@@ -87,10 +87,7 @@ def test_errors_are_relative_and_absolute_where_the_function_is_0_at_the_start(t
     assert only(found).steps.tolist() == list(range(1, 51))
     assert only(found).errors.tolist() == (abs(values[1:] - values[0]) / (scale or 1)).tolist()
     assert found.relative == {"E": scale is not None}
-
-
-def test_whether_it_is_0_is_decided_exactly():
-    # 1/10 + 1/5 - 3/10 is 0, and 5.6e-17 in doubles.
+    # 1/10 + 1/5 - 3/10 is 0, and 5.6e-17 in doubles: whether the function is 0 is decided exactly.
     assert survey(CIRCLE, ["1/10", "1/5"], 5, [("E", "x + y - 3/10")]).relative == {"E": False}
 
 
@@ -201,7 +198,7 @@ def test_an_exact_0_is_in_the_band_and_not_left_out():
     assert len(axes.patches) == 1
 
 
-def test_what_blows_up_is_an_arrow_and_flattens_nothing():
+def test_what_blows_up_is_an_arrow_and_flattens_nothing_and_an_orbit_that_ends_early_has_a_cross():
     found = survey(SQUARE, ["1/10"], 2000, [("E", "x")], ("generic", "rk4"))
     [axes] = drawn(found).axes
     limit = clipped_from(found, "E")
@@ -209,11 +206,7 @@ def test_what_blows_up_is_an_arrow_and_flattens_nothing():
     assert axes.get_ylim()[1] < 10 * limit < found.curves[1].errors.max()
     assert not axes.patches  # no band for errors of 0, as there are none
     assert any("ended at step" in text.get_text() for text in axes.figure.legends[0].get_texts())
-
-
-def test_an_orbit_that_ends_early_has_a_cross():
-    found = survey(SQUARE, ["1"], 30, [("E", "1/x")], ("generic", "midpoint"))
-    [axes] = drawn(found).axes
+    [axes] = drawn(survey(SQUARE, ["1"], 30, [("E", "1/x")], ("generic", "midpoint"))).axes
     assert [line.get_marker() for line in axes.lines].count("x") == 1
 
 

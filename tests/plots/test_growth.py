@@ -78,9 +78,11 @@ def test_a_long_name_leaves_room_for_what_is_said_of_it():
     assert figure.legends[0].get_window_extent().x1 <= figure.bbox.x1
 
 
-@pytest.mark.parametrize(("degrees", "scale"), [(SQUARES, "linear"), (POWERS, "log"), (NEITHER, "log")])
-def test_exponential_growth_is_drawn_logarithmically(degrees, scale):
-    assert draw_degrees({"x": growth(degrees)}).axes[0].get_yscale() == scale
+def test_exponential_growth_is_drawn_logarithmically_and_two_such_scales_begin_at_the_first_iterate():
+    scales = [draw_degrees({"x": growth(degrees)}).axes[0].get_yscale() for degrees in (SQUARES, POWERS, NEITHER)]
+    assert scales == ["linear", "log", "log"]
+    [axes] = draw_degrees({"top": growth(SQUARES)}, scale="loglog").axes
+    assert marks(axes)[0].get_xdata()[0] == 1
 
 
 def test_a_degree_0_lies_in_the_band_marked_0_and_no_line_leads_there():
@@ -90,11 +92,6 @@ def test_a_degree_0_lies_in_the_band_marked_0_and_no_line_leads_there():
     assert low < points.get_ydata()[3] < 1 < high
     assert [text.get_text() for text in axes.texts] == ["0"]
     assert np.isnan(curve.get_ydata()).tolist() == [False, False, False, True]
-
-
-def test_on_two_logarithmic_scales_the_first_iterate_is_the_first():
-    [axes] = draw_degrees({"top": growth(SQUARES)}, scale="loglog").axes
-    assert marks(axes)[0].get_xdata()[0] == 1
 
 
 @pytest.mark.parametrize("wrong", [{}, {str(k): growth(POWERS) for k in range(8)}])
