@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
@@ -29,11 +28,6 @@ _LARGEST_EPS = 0.5
 _DEFAULT_STEPS, _MAX_STEPS = 800, 5000
 _MAX_TERMS = 2000  # of all polynomials: the browser evaluates them at every step
 _MAX_VARIABLES = 12
-
-
-def explore_script() -> str:
-    """The program of the page."""
-    return (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
 
 
 def explore_sections(found: Analysis) -> list[Section]:

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from importlib import resources
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +27,7 @@ from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.plots.growth import draw_degrees, draw_heights
-from kahanmaps.reports.explore import explore_script, explore_sections
+from kahanmaps.reports.explore import explore_sections
 from kahanmaps.reports.page import CHARACTERS, Html, Section, page, page_template, system_section, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.sources import source
@@ -92,7 +93,8 @@ def report_html(
         lead = ", ".join(filter(None, about))
         default_title = _title(file)
         if explore:
-            sections, script = explore_sections(found), explore_script()
+            sections = explore_sections(found)
+            script = (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
         else:
             lead += f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
             sections = _analysis_sections(found, drawn)

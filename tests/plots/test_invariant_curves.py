@@ -192,7 +192,7 @@ def test_the_lines_drawn_lie_on_the_curve(curves):
     lines = [line for line in axes.lines if line.get_marker() == "None"]
     u, v = (np.concatenate([line.get_data()[k] for line in lines]) for k in (0, 1))
     window = view_of(found.planes[0])
-    inside = np.hypot(u, v) < 10 * max(window.half)  # what is farther is cut off where it is not seen
+    inside = np.hypot(u, v) < 10 * np.abs(window.window).max()  # what is farther is cut off where it is not seen
     assert inside.any()
     assert defect(found.planes[0].orbits[0].cubic, u[inside], v[inside]) < 1e-7
 
@@ -220,15 +220,15 @@ def test_the_disc_shows_every_dot_on_its_curve(curves):
 def test_the_window_counts_what_it_leaves_out(curves):
     plane = curves("m = 2").planes[0]
     view, orbit = view_of(plane), plane.orbits[0]
-    (cx, cy), (hx, hy) = view.centre, view.half
-    assert view.outside == np.sum((abs(orbit.u - cx) > hx) | (abs(orbit.v - cy) > hy))
+    (left, right), (low, high) = view.window
+    is_inside = (left <= orbit.u) & (orbit.u <= right) & (low <= orbit.v) & (orbit.v <= high)
+    assert view.outside == np.sum(~is_inside)
     assert view.outside < 0.25 * len(orbit.u)
 
 
 def test_a_threefold_curve_is_drawn_with_equal_scales(curves):
-    shapes = {plane.shape: view_of(plane) for plane in curves("m = 2").planes}
-    assert shapes[THREE_LINES].half[0] == shapes[THREE_LINES].half[1]
-    assert shapes[ONE_LINE].half[0] != shapes[ONE_LINE].half[1]
+    stretches = {plane.shape: view_of(plane).stretch for plane in curves("m = 2").planes}
+    assert stretches[THREE_LINES] == 1 != stretches[ONE_LINE]
 
 
 def test_wrong_variables_are_refused(curves):

@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
-from kahanmaps_cli.pictures.output import Drawn, picture, style_from, two_variables
+from kahanmaps_cli.pictures.output import Drawn, picture, two_variables
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -62,7 +62,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
         pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
     found = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-    figure = lib.draw_squares(found, style_from(options), chosen, captions)
+    figure = lib.draw_squares(found, options["style"], chosen, captions)
     talk = []
     for square in found:
         names = captions[0] if captions else " and ".join(square.pair.names)

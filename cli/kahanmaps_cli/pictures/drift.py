@@ -10,7 +10,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, picture, style_from
+from kahanmaps_cli.pictures.output import Drawn, picture
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_START = 160  # characters
@@ -91,7 +91,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         progress=progress,
     )
     early = not all(end.is_whole for end in survey.ends.values())
-    figure = lib.draw_drift(survey, style_from(options), scale=options["scale"])
+    figure = lib.draw_drift(survey, options["style"], scale=options["scale"])
     return Drawn(figure, file, [*talk, *_told(survey)], 3 if early else 0)
 
 

@@ -14,7 +14,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.commands.heights import require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
-from kahanmaps_cli.pictures.output import Drawn, picture, style_from
+from kahanmaps_cli.pictures.output import Drawn, picture
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_BYTES = 64_000_000
@@ -93,7 +93,7 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
         add(file.label, found)
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")
-    figure = lib.draw_degrees(growths, style_from(options), scale=options["scale"])
+    figure = lib.draw_degrees(growths, options["style"], scale=options["scale"])
     return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early else 0)
 
 
@@ -150,7 +150,7 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
         eps = opt.the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
         curves, whole = lib.height_curves(survey), survey.is_whole
-    figure = lib.draw_heights(curves, style_from(options), scale=options["scale"])
+    figure = lib.draw_heights(curves, options["style"], scale=options["scale"])
     talk = []
     if short := sum(curve.status == "budget" for curve in curves):
         talk.append(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")

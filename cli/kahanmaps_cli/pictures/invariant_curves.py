@@ -10,7 +10,7 @@ import click
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, picture, style_from, two_variables
+from kahanmaps_cli.pictures.output import Drawn, picture, two_variables
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -61,7 +61,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     texts = [lib.format_point(start) for start in options["starts"]]
     labels = [f"start {text if len(text) <= 30 else text[:30] + '...'}" for text in texts]
     figure = lib.draw_invariant_curves(
-        found, style_from(options), options["projective"], options["flow"], original, labels
+        found, options["style"], options["projective"], options["flow"], original, labels
     )
     is_whole = all(pole is None for pole in found.poles)
     return Drawn(figure, file, list(_told(found, options["projective"])), 0 if is_whole else 3)

@@ -68,14 +68,6 @@ picture_options: Callable[[F], F] = stack(
 )
 
 
-def style_from(options: dict[str, Any]) -> lib.Style:
-    """The style that the options ask for."""
-    given = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
-    if options["size"] is not None:
-        given["width"], given["height"] = options["size"]
-    return lib.Style(**given)
-
-
 @dataclass(frozen=True)
 class Drawn:
     """A picture for `picture` to deliver; None where nothing was found that could be drawn.
@@ -93,22 +85,46 @@ Draw = Callable[[dict[str, Any], Progress], Drawn]
 
 
 def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click.Command]:
-    """A command `kahanmaps plot NAME` with these options and those of all pictures, from what draws by their values."""
+    """A command `kahanmaps plot NAME` with these options and those of all pictures, from what draws by their values.
+
+    What draws finds the `Style` that is asked for in its options, as "style".
+    """
 
     def made(draw: Draw) -> click.Command:
         def command(**options: Any) -> int:
-            """Draw, talk, and deliver."""
+            """Draw, talk, and write the picture to its file or to standard output."""
             # Sizes and formats that are none are refused before anything is computed.
             lib.require_matplotlib()
-            style_from(options)
-            lib.format_of(options["output"], options["kind"])
+            given = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
+            if options["size"] is not None:
+                given["width"], given["height"] = options["size"]
+            style = options["style"] = lib.Style(**given)
+            path, talks = options["output"], not options["quiet"]
+            kind = lib.format_of(path, options["kind"])
             with Progress(options["quiet"]) as progress:
                 drawn = draw(options, progress)
-            if not options["quiet"]:
+            if talks:
                 for sentence in drawn.talk:
                     say(sentence)
-            if drawn.figure is not None:
-                _deliver(drawn.figure, options, drawn.file)
+            figure = drawn.figure
+            if figure is None:
+                return drawn.status
+            if options["title"]:
+                lib.write_title(figure, printable(options["title"]), style)
+            system = "" if drawn.file is None else drawn.file.to_toml()
+            with warnings.catch_warnings(record=True) as found:
+                warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
+                content = lib.picture_bytes(figure, kind, style, command_line(), system)
+            if found and talks:
+                say("the fonts lack some letters of the texts: they are drawn as boxes")
+            if path == "-":
+                sys.stdout.buffer.write(content)
+                sys.stdout.buffer.flush()
+                return drawn.status
+            lib.write_whole(path, content)
+            if talks:
+                width, height = figure.get_size_inches() * 2.54
+                say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
             return drawn.status
 
         update_wrapper(command, draw)
@@ -146,24 +162,3 @@ def command_line() -> str:
     context = click.get_current_context()
     words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
     return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
-
-
-def _deliver(figure: Figure, options: dict[str, Any], file: lib.SystemFile | None) -> None:
-    """Write the figure to its file or to standard output; the options are those of `picture_options`."""
-    style, path = style_from(options), options["output"]
-    if options["title"]:
-        lib.write_title(figure, printable(options["title"]), style)
-    system = "" if file is None else file.to_toml()
-    with warnings.catch_warnings(record=True) as found:
-        warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
-        content = lib.picture_bytes(figure, lib.format_of(path, options["kind"]), style, command_line(), system)
-    if found and not options["quiet"]:
-        say("the fonts lack some letters of the texts: they are drawn as boxes")
-    if path == "-":
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
-        return
-    lib.write_whole(path, content)
-    if not options["quiet"]:
-        width, height = figure.get_size_inches() * 2.54
-        say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")

@@ -12,7 +12,7 @@ from kahanmaps.errors import counted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
+from kahanmaps_cli.pictures.output import Drawn, picture, window_from, window_option
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
@@ -118,7 +118,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         levels=None if levels is None else _levels(levels, axes, shown.window, starts, options["levels_at"], notes),
     )
     note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
-    figure = lib.draw_portrait(shown, style_from(options), lines=options["lines"], equal=options["equal"], note=note)
+    figure = lib.draw_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
     orbits = counted(found.orbits, "orbit")
     origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from chosen starts"

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli import library as lib
-from kahanmaps_cli.pictures.output import Drawn, picture, style_from, window_from, window_option
+from kahanmaps_cli.pictures.output import Drawn, picture, window_from, window_option
 from kahanmaps_cli.runs.scan_run import ending, names_of, primes_of, scan_options, scanned
 from kahanmaps_cli.screen.progress import Progress
 
@@ -51,4 +51,4 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         return Drawn(
             None, talk=["there is no picture: nothing to be drawn was found before the scan ended"], status=status
         )
-    return Drawn(lib.draw_scan(found, style_from(options), window=window, modulo=modulo), found.file, status=status)
+    return Drawn(lib.draw_scan(found, options["style"], window=window, modulo=modulo), found.file, status=status)

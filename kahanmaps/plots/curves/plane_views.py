@@ -12,7 +12,7 @@ from kahanmaps.plots.curves.invariant_curves import InvariantPlane
 from kahanmaps.plots.curves.level_sets import zero_curves
 from kahanmaps.plots.curves.plane_cubics import Floats, PlaneCubic
 from kahanmaps.plots.curves.symmetric_planes import THREE_LINES
-from kahanmaps.plots.portraits.windows import outside, window_of
+from kahanmaps.plots.portraits.windows import Window, outside, window_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,11 +26,15 @@ _MARGIN = 0.08  # of the width, on either side, for the numbers beside the dots
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A rectangle of the plane: its centre, half its width and height; and how many dots lie outside it."""
+    """A window of the plane, and how many dots lie outside it."""
 
-    centre: tuple[float, float]
-    half: tuple[float, float]
+    window: Window
     outside: int
+
+    @classmethod
+    def of(cls, clouds: Sequence[Cloud], window: Window) -> Rectangle:
+        """This window, for these dots."""
+        return cls(window, outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
 
     @classmethod
     def around(cls, clouds: Sequence[Cloud]) -> Rectangle:
@@ -42,23 +46,16 @@ class Rectangle:
         most = np.quantile(sizes, _SHARE, method="higher")
         return cls.of(clouds, window_of(points[sizes <= most] if sizes.max() > 2 * most else points, starts))
 
-    @classmethod
-    def of(cls, clouds: Sequence[Cloud], ranges: Sequence[tuple[float, float]]) -> Rectangle:
-        """The rectangle with these ranges of the two coordinates."""
-        (left, right), (low, high) = ranges
-        beyond = outside(np.concatenate([_rows(cloud) for cloud in clouds]), tuple(ranges))
-        return cls(((left + right) / 2, (low + high) / 2), ((right - left) / 2, (high - low) / 2), beyond)
-
     @property
     def stretch(self) -> float:
         """How much longer a unit upwards appears than one to the right, inverted: what normals are scaled by."""
-        return self.half[1] / self.half[0]
+        (left, right), (low, high) = self.window
+        return (high - low) / (right - left)
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
         """Limits and labels of the axes, which become a square."""
-        (x, y), (a, b) = self.centre, self.half
         axes.set_box_aspect(1)
-        axes.set(xlim=(x - a, x + a), ylim=(y - b, y + b), xlabel=names[0], ylabel=names[1])
+        axes.set(xlim=self.window[0], ylim=self.window[1], xlabel=names[0], ylabel=names[1])
         axes.locator_params(nbins=5)
 
     def place(self, x: Floats, y: Floats) -> Cloud:
@@ -67,8 +64,7 @@ class Rectangle:
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
         """The pieces (n, 2) of a curve, as they are drawn."""
-        ranges = tuple((middle - half, middle + half) for middle, half in zip(self.centre, self.half, strict=True))
-        return zero_curves(cubic.value, ranges)
+        return zero_curves(cubic.value, self.window)
 
 
 @dataclass(frozen=True)
@@ -129,14 +125,13 @@ def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
     The origin is in the middle, and scales are equal along u and v, where the cubic has its threefold symmetry.
     """
     clouds = clouds_of(plane, column)
-    found = Rectangle.around(clouds)
     ranges = []
-    for middle, half in zip(found.centre, found.half, strict=True):
-        low, high = middle - half, middle + half
-        if abs(middle) <= 3 * half:
-            low, high = min(low, -0.1 * half), max(high, 0.1 * half)
-        ranges.append((low, high))
+    for low, high in Rectangle.around(clouds).window:
+        middle, half = (low + high) / 2, (high - low) / 2
+        ranges.append((min(low, -0.1 * half), max(high, 0.1 * half)) if abs(middle) <= 3 * half else (low, high))
     if plane.shape == THREE_LINES and all(low <= 0 <= high for low, high in ranges):
         reach = max(max(abs(low), abs(high)) for low, high in ranges)
         ranges = [(-reach, reach), (-reach, reach)]
-    return Rectangle.of(clouds, [(low - _MARGIN * (high - low), high + _MARGIN * (high - low)) for low, high in ranges])
+    margins = [_MARGIN * (high - low) for low, high in ranges]
+    window = tuple((low - more, high + more) for (low, high), more in zip(ranges, margins, strict=True))
+    return Rectangle.of(clouds, window)
