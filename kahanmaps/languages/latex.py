@@ -37,8 +37,12 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
         # Where a right-hand side is long it is broken between its terms: what is long is a sum, in no braces.
         aligned = []
         for left, right in rows:
-            first, *others = _broken(right)
-            aligned += [f"{left} &= {first}", *(rf"&\quad {piece}" for piece in others)]
+            pieces = [""]
+            for term in re.split(r" (?=[+-] )", right) if len(right) > _LINE else [right]:
+                if pieces[-1] and len(pieces[-1]) + len(term) > _LINE:
+                    pieces.append("")
+                pieces[-1] += f" {term}" if pieces[-1] else term
+            aligned += [f"{left} &= {pieces[0]}", *(rf"&\quad {piece}" for piece in pieces[1:])]
         lines += [f"{title}:", r"\begin{align*}", " \\\\\n".join(aligned), r"\end{align*}", ""]
         if part == "map" and formulas.rhs:
             lines.pop()
@@ -137,12 +141,3 @@ def _quotient(left: str, function: RationalFunction) -> Rows:
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
     quotient = rf"{'-' * is_negative}\frac{{{P}}}{{{Q}}}"
     return [(left, quotient), (P, latex_polynomial(numerator)), (Q, latex_polynomial(denominator))]
-
-
-def _broken(text: str) -> list[str]:
-    lines = [""]
-    for term in re.split(r" (?=[+-] )", text) if len(text) > _LINE else [text]:
-        if lines[-1] and len(lines[-1]) + len(term) > _LINE:
-            lines.append("")
-        lines[-1] += f" {term}" if lines[-1] else term
-    return lines

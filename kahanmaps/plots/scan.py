@@ -66,12 +66,24 @@ def draw_scan(
     if window is None:
         every = [place for some in points.values() for place in some]
         window = window_of(np.array(every)) if len(every) > 1 else _USUAL
-    drawn = []
+    drawn, context = [], ring(["u", "v", "eps"])
     for kind, some in kinds.items():
-        curves = [(one.text, pieces) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
+        curves = []
+        for one in some:
+            if one.dimension != 1:
+                continue
+            equation = one.equations[0].compose(*context.gens()[:2], ctx=context)
+            function = PointFunction(one.text, RationalFunction(equation, context.constant(1)))
+            if pieces := level_curves(function, (0, 1), 2, [0.0], window)[0]:
+                curves.append((one.text, pieces))
         labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(one.text, [_place(one)]) for one in some if one.is_rational_point]
-        labels += [(text, _along(pieces)) for text, pieces in curves]
+        for text, pieces in curves:  # on the longest piece, first where other curves seldom cross it: off the middle
+            longest = max(pieces, key=len)
+            ends = _resampled(longest, _PLACES + 1)
+            parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
+            nearest = (longest[np.hypot(*(longest - end).T).argmin()] for end in ends[parts])  # which is on the curve
+            labels.append((text, [tuple(map(float, point)) for point in nearest]))
         every_piece = [piece for _, pieces in curves for piece in pieces]
         drawn.append(_Kind(kind, points[kind], every_piece, labels if kind != _MANY else []))
     return _draw(found, style, drawn, window, "")
@@ -173,15 +185,6 @@ def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
 
 
-def _along(pieces: list[np.ndarray]) -> list[tuple[float, ...]]:
-    """Places on the longest piece of a curve, first where other curves seldom cross it: off the middle."""
-    longest = max(pieces, key=len)
-    ends = _resampled(longest, _PLACES + 1)
-    parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
-    nearest = (longest[np.hypot(*(longest - ends[k]).T).argmin()] for k in parts)  # which is on the curve
-    return [tuple(map(float, point)) for point in nearest]
-
-
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
     """So many points along a curve, at equal distances."""
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
@@ -192,11 +195,3 @@ def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
 def _place(one: Component) -> tuple[float, float]:
     first, second = (one.values or {}).values()
     return float(first.p) / float(first.q), float(second.p) / float(second.q)
-
-
-def _curve(one: Component, window: Window) -> list[np.ndarray]:
-    """The curve in the window, in pieces."""
-    context = ring(["u", "v", "eps"])
-    equation = one.equations[0].compose(*context.gens()[:2], ctx=context)
-    function = PointFunction(one.text, RationalFunction(equation, context.constant(1)))
-    return list(level_curves(function, (0, 1), 2, [0.0], window)[0])

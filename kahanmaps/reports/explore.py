@@ -16,7 +16,6 @@ from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.written.text import format_number, format_rational_function
 from kahanmaps.display import markup
 from kahanmaps.display.formulas import formula
-from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.maps.floats.doubles import to_float, to_floats
@@ -84,7 +83,11 @@ def explore_data(found: Analysis) -> dict[str, Any]:
         if sum(map(len, sides)) <= _MAX_TERMS:
             text = format_rational_function(function)
             watched.append({"name": name, "text": text, "word": word, "above": sides[0], "below": sides[1]})
-    start, reach = _start(file, found.eps)
+    if file.is_quadratic:  # a start whose orbit stays, in the middle of those that a portrait takes
+        starts = automatic_starts(file.system, DEFAULT_EPS if found.eps is None else found.eps)
+        start, reach = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
+    else:
+        start, reach = to_floats([fmpq(k + 1, 2 * (k + 2)) for k in range(n)]), 3.0
     return {
         "variables": list(file.variables),
         "rows": rows,
@@ -107,11 +110,3 @@ def _terms(polynomial: fmpq_mpoly, names: tuple[str, ...], values: Mapping[str, 
             coefficient *= values[name] ** int(power[name])
         terms.append([to_float(coefficient), *(int(power.get(name, 0)) for name in names)])
     return terms
-
-
-def _start(file: SystemFile, eps: fmpq | None) -> tuple[Any, float]:
-    """A start whose orbit stays, in the middle of those that a portrait takes, and how far the sliders go."""
-    if file.is_quadratic:
-        starts = automatic_starts(file.system, DEFAULT_EPS if eps is None else eps)
-        return starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
-    return to_floats([fmpq(k + 1, 2 * (k + 2)) for k in range(file.dim)]), 3.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from kahanmaps.errors import InputError
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves, InvariantPlane
-from kahanmaps.plots.curves.plane_cubics import Floats, PlaneCubic
+from kahanmaps.plots.curves.plane_cubics import Floats
 from kahanmaps.plots.curves.plane_views import Disc, Rectangle, clouds_of, view_of
 from kahanmaps.plots.figures import RASTERISE_ABOVE, beside, drawing, label_of, new_figure, plain
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOUR_MAP, COLOURS, MARKS, Style
@@ -159,13 +159,10 @@ def _draw_plane(
             for rows in view.curves(orbit.cubic.flow_through(float(orbit.u[0]), float(orbit.v[0]))):
                 axes.plot(*rows.T, color=_FLOW, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1.1)
     for number, (orbit, (x, y)) in enumerate(zip(plane.orbits, clouds_of(plane, column), strict=True)):
-        normals = None if orbit.cubic is None else _normals(orbit.cubic, x[:_NUMBERED], y[:_NUMBERED], view.stretch)
+        normals = None
+        if orbit.cubic is not None:  # unit vectors across the curve as it appears, for the numbers beside the dots
+            across, along = orbit.cubic.gradient(x[:_NUMBERED], y[:_NUMBERED])
+            rows = np.stack([across, along * view.stretch], axis=1)
+            length = np.linalg.norm(rows, axis=1, keepdims=True)
+            normals = np.where(length > 0, rows / np.where(length > 0, length, 1), np.sqrt(0.5))
         pen.orbit(axes, *view.place(x, y), number, normals)
-
-
-def _normals(cubic: PlaneCubic, x: Floats, y: Floats, stretch: float) -> Floats:
-    """Unit vectors across the curve as it appears, for the numbers beside the dots."""
-    across, along = cubic.gradient(x, y)
-    rows = np.stack([across, along * stretch], axis=1)
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    return np.asarray(np.where(length > 0, rows / np.where(length > 0, length, 1), np.sqrt(0.5)))

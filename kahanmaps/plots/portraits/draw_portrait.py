@@ -53,7 +53,13 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         import matplotlib as mpl
         from matplotlib.collections import LineCollection
 
-        figure = new_figure(style, _aspect(found, equal))
+        aspect = _ASPECT
+        if in_space:
+            aspect = 0.9 if found.values is None else 0.8
+        elif equal:  # height over width as the window asks for it, a colour bar beside it
+            (x0, x1), (y0, y1) = found.window
+            aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if found.values is not None else 1.0)))
+        figure = new_figure(style, aspect)
         if in_space:
             mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
@@ -94,16 +100,6 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         elif equal:
             axes.set_aspect("equal", adjustable="box")
     return figure
-
-
-def _aspect(found: Portrait, equal: bool) -> float:
-    """Height over width: what the window asks for where both axes have the same unit."""
-    if len(found.labels) == 3:
-        return 0.9 if found.values is None else 0.8
-    if not equal:
-        return _ASPECT
-    (x0, x1), (y0, y1) = found.window
-    return float(min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if found.values is not None else 1.0))))
 
 
 def _draw_flow(figure: Figure, axes: Any, flow: Flow, window: Window | None, style: Style) -> None:

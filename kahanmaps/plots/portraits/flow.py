@@ -24,7 +24,7 @@ from kahanmaps.plots.portraits.windows import Window, window_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SADDLE, CENTRE, FOCUS, NODE, DEGENERATE = "saddle", "centre", "focus", "node", "degenerate equilibrium"
-_NEWTON_STARTS = 60
+_NEWTON_STARTS, _NEWTON_STEPS = 60, 40
 _MAX_DIMENSION = 20  # in which more than the origin and (1, ..., 1) are taken as starts
 _ZERO = 1e-7  # parts of eigenvalues, relative to the largest
 _ARROWS = 21  # along each side
@@ -74,24 +74,19 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
     drawn = np.random.default_rng(0).uniform(-3, 3, (_NEWTON_STARTS if n <= _MAX_DIMENSION else 0, n))
     found: list[Equilibrium] = []
     for x in (np.zeros(n), np.ones(n), *drawn):
-        point = _newton(f, x)
-        # Where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough.
-        if point is not None and not any(np.allclose(point, other.point, atol=1e-3) for other in found):
-            found.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
+        for _ in range(_NEWTON_STEPS):
+            value, bound = f(x), 1e-12 * (1 + float(np.abs(x).max()))
+            if np.abs(value).max() <= bound:
+                nearest = np.round(x, 9)
+                point = nearest if np.abs(f(nearest)).max() <= bound else x
+                # Where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough.
+                if not any(np.allclose(point, other.point, atol=1e-3) for other in found):
+                    found.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
+                break
+            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
+            if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
+                break
     return found
-
-
-def _newton(f: VectorField, x: FloatArray) -> FloatArray | None:
-    for _ in range(40):
-        value = f(x)
-        scale = 1 + float(np.abs(x).max())
-        if np.abs(value).max() <= 1e-12 * scale:
-            nearest = np.round(x, 9)
-            return nearest if np.abs(f(nearest)).max() <= 1e-12 * scale else x
-        x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
-        if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
-            return None
-    return None
 
 
 @dataclass(frozen=True, eq=False)
