@@ -3,7 +3,7 @@ r"""LaTeX: an article of displayed formulas that compiles as it stands; long sum
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from flint import fmpq_mat
 
@@ -80,7 +80,15 @@ def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
             return title, [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
         return title + claimed, _quotient(r"\varphi", formulas.density)
     rows = [row for name, f in formulas.integrals.items() for row in _quotient(_label(name or "I"), f)]
-    return f"Integrals of the map{claimed if formulas.integrals else ''}", [*rows, *_integrals_by_theorem(formulas)]
+    for k in range(len(formulas.forms)):
+        power = "" if k == 0 else r" A^{\mathsf T}" if k == 1 else rf" (A^{{\mathsf T}})^{{{k}}}"
+        rows.append((rf"\widetilde H_{{{k}}}", rf"\tfrac{{1}}{{\varepsilon}} {_X}^{{\mathsf T}} J{power} {_Y}"))
+    if (member := formulas.file.member) is not None:
+        rows += [("A", _matrix(member.A)), ("J", _matrix(member.chosen.hamiltonian.J))]
+    elif formulas.H is not None:
+        modified = rf"H({_X}) + \tfrac{{1}}{{3}} (\nabla H({_X}))^{{\mathsf T}} ({_Y} - {_X})"
+        rows += [(r"\widehat H", modified), ("H", latex_polynomial(formulas.H))]
+    return f"Integrals of the map{claimed if formulas.integrals else ''}", rows
 
 
 def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> Rows:
@@ -100,18 +108,6 @@ def _equations(formulas: Formulas) -> Rows:
             left = " + ".join(rf"({latex_polynomial(e)}) \widetilde{{{latex_name(name)}}}" for e, name in entries)
             rows.append((left, latex_polynomial(row[-1])))
     return rows
-
-
-def _integrals_by_theorem(formulas: Formulas) -> Iterator[tuple[str, str]]:
-    for k in range(len(formulas.forms)):
-        power = "" if k == 0 else r" A^{\mathsf T}" if k == 1 else rf" (A^{{\mathsf T}})^{{{k}}}"
-        yield rf"\widetilde H_{{{k}}}", rf"\tfrac{{1}}{{\varepsilon}} {_X}^{{\mathsf T}} J{power} {_Y}"
-    if (member := formulas.file.member) is not None:
-        yield "A", _matrix(member.A)
-        yield "J", _matrix(member.chosen.hamiltonian.J)
-    elif formulas.H is not None:
-        yield r"\widehat H", rf"H({_X}) + \tfrac{{1}}{{3}} (\nabla H({_X}))^{{\mathsf T}} ({_Y} - {_X})"
-        yield "H", latex_polynomial(formulas.H)
 
 
 def _matrix(matrix: fmpq_mat) -> str:

@@ -57,6 +57,19 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
             raise click.UsageError("a system file holds the whole system: leave out --what, --symbolic and --name")
         _write(file.to_toml(), file.name, language, output, quiet)
         return
+    # The command that makes the same file again, without the place where it went.
+    words = ["kahanmaps", "convert", *([system] if system is not None else [])]
+    if options["variables"] is not None:
+        words.append(f"--vars={options['variables']}")
+    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
+    for name, value in options["parameters"]:
+        words += ["-p", f"{name}={value}"]
+    words += ["--to", language]
+    for text in options["parts"]:
+        words += ["--what", text]
+    for key in ("symbolic", "name"):
+        if options[key]:
+            words += [f"--{key}", options[key]]
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
     text = lib.convert(
@@ -65,7 +78,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         parts if options["parts"] else None,
         name=options["name"],
         symbols=symbols,
-        command=_command_line(system, language, options),
+        command=as_typed(words),
     )
     _write(text, file.name, language, output, quiet)
 
@@ -81,20 +94,3 @@ def _write(text: str, name: str, language: str, output: str | None, quiet: bool)
 
 def _split(text: str) -> list[str]:
     return [piece.strip() for piece in text.split(",") if piece.strip()]
-
-
-def _command_line(system: str | None, language: str, options: dict[str, Any]) -> str:
-    """The command that makes the same file again, without the place where it went."""
-    words = ["kahanmaps", "convert", *([system] if system is not None else [])]
-    if options["variables"] is not None:
-        words.append(f"--vars={options['variables']}")
-    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
-    for name, value in options["parameters"]:
-        words += ["-p", f"{name}={value}"]
-    words += ["--to", language]
-    for text in options["parts"]:
-        words += ["--what", text]
-    for key in ("symbolic", "name"):
-        if options[key]:
-            words += [f"--{key}", options[key]]
-    return as_typed(words)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -112,11 +111,26 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
     shown = lib.portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
-    shown = replace(
-        shown,
-        flow=_flow(field, eps, axes, shown.window, found, options),
-        levels=None if levels is None else _levels(levels, axes, shown.window, starts, options["levels_at"], notes),
-    )
+    plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
+    if field is None and options["flow"]:
+        raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
+    if field is not None:
+        flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], shown.window)
+        if options["levels"] or options["euler"]:  # arrows among many grey lines show nothing
+            flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
+        if options["flow"]:
+            flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, found, options["backward"]))
+        shown = replace(shown, flow=flow)
+    if levels is not None:
+        if len(plane) != 2 or len(axes) != 2:
+            wrong = "level curves are drawn in the plane of two variables: take --axes X,Y with two of them"
+            raise lib.InputError(wrong)
+        at = options["levels_at"]
+        values = lib.levels_through(levels, starts) if at is None else lib.to_floats(at).tolist()
+        curves = lib.level_curves(levels, plane, file.dim, values, shown.window)
+        if missing := sum(not pieces for pieces in curves):
+            notes.append(f"{missing} of {len(values)} levels of {levels.name} have no curve in the window")
+        shown = replace(shown, levels=curves)
     note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
     figure = lib.draw_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
@@ -204,39 +218,3 @@ def _asked_axes(file: lib.SystemFile, eps: Any, options: dict[str, Any]) -> tupl
     if file.dim < count:
         raise lib.InputError(f"found {file.dim} variables, expected at least {count} for that many axes")
     return None
-
-
-def _levels(
-    function: lib.PointFunction, axes: Sequence[Any], window: lib.Window, starts: Any, at: Any, notes: list[str]
-) -> lib.Levels:
-    plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
-    if len(plane) != 2 or len(axes) != 2:
-        raise lib.InputError("level curves are drawn in the plane of two variables: take --axes X,Y with two of them")
-    values = lib.levels_through(function, starts) if at is None else lib.to_floats(at).tolist()
-    curves = lib.level_curves(function, plane, starts.shape[1], values, window)
-    if missing := sum(not pieces for pieces in curves):
-        notes.append(f"{missing} of {len(values)} levels of {function.name} have no curve in the window")
-    return curves
-
-
-def _flow(
-    field: lib.QuadraticSystem | None,
-    eps: Any,
-    axes: Sequence[Any],
-    window: lib.Window,
-    found: lib.Trajectories,
-    options: dict[str, Any],
-) -> lib.Flow | None:
-    """What is drawn of the differential equation; None where the map has none."""
-    if field is None:
-        if options["flow"]:
-            raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
-        return None
-    variables = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
-    in_plane = len(axes) == 2 and not options["no_field"]
-    flow = lib.plane_flow(field, variables if in_plane else [], window)
-    if options["levels"] or options["euler"]:  # arrows among many grey lines show nothing
-        flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
-    if options["flow"]:
-        flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, found, options["backward"]))
-    return flow

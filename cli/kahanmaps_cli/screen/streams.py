@@ -49,10 +49,10 @@ def have_standard_streams() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        mode = os.fstat(sys.stdout.fileno()).st_mode
+        kind = os.fstat(sys.stdout.fileno()).st_mode
     except (OSError, ValueError):
         return
-    is_pipe = stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+    is_pipe = stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)
     if is_pipe and isinstance(sys.stdout, io.TextIOWrapper) and not isinstance(_raw_output(), _Pipe):
         sys.stdout.flush()
         pipe = io.BufferedWriter(_Pipe(sys.stdout.fileno(), "w", closefd=False))
