@@ -21,7 +21,7 @@ from kahanmaps.plots.figures import (
     svg_text,
     wrapped,
 )
-from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
+from kahanmaps.plots.style import Style
 
 STYLE = Style(width=4)
 
@@ -107,7 +107,3 @@ def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
     tall = Style(width=20, dpi=2000)  # 12 000 x 16 000 dots are few enough, as high as three times that are not
     with pytest.raises(InputError, match="2000"):
         picture_bytes(new_figure(tall, aspect=3), "png", tall)
-
-
-def test_every_colour_has_a_line_style_and_a_mark_of_its_own():
-    assert len({str(line) for line in LINES}) == len(set(MARKS)) == len(set(COLOURS)) == len(COLOURS)

@@ -153,6 +153,8 @@ def test_browsers_are_told_to_run_no_script_and_to_load_nothing(drawn):
     policy = re.search('<meta http-equiv="Content-Security-Policy" content="([^"]*)"/>', drawn)[1]
     assert policy.startswith("default-src 'none'; ")
     assert policy.endswith("; script-src 'none'")
+    assert re.fullmatch(r'@font-face {[^{}]*url\(data:font/woff;base64,[\w+/=]+\) format\("woff"\); }', font_face())
+    assert font_face() in drawn
 
 
 def test_names_and_titles_are_text(volterra):
@@ -239,13 +241,6 @@ def test_a_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch, volterra):
 
 
 # -- the font of formulas
-
-
-def test_the_font_is_part_of_the_page_and_its_licence_lies_beside_it(drawn):
-    folder = resources.files("kahanmaps.reports") / "fonts"
-    assert "LaTeX Project Public License" in (folder / "GUST-FONT-LICENSE.txt").read_text()
-    assert re.fullmatch(r'@font-face {[^{}]*url\(data:font/woff;base64,[\w+/=]+\) format\("woff"\); }', font_face())
-    assert font_face() in drawn
 
 
 def test_the_font_has_every_letter_of_formulas():
