@@ -14,7 +14,7 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.runs.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import Progress, say
 
 _ONLY_FOR = {
@@ -107,13 +107,8 @@ def command(system: str | None, **options: Any) -> int:
             verdict = lib.combined(report.verdict for report in reports)
             status = {lib.Verdict.REFUTED: 1, lib.Verdict.UNDECIDED: 3}.get(verdict, 0)
     content = html.encode()
-    if options["output"] == "-":
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
-    else:
-        lib.write_whole(options["output"], content)
-        if not options["quiet"]:
-            say(f"{options['output']}: {len(content)} bytes")
+    if deliver(options["output"], content) and not options["quiet"]:
+        say(f"{options['output']}: {len(content)} bytes")
     return status
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from kahanmaps.errors import printable
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import OptionType, PointText
-from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import Progress, as_typed, say
 
 if TYPE_CHECKING:
@@ -117,12 +116,7 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
                 content = lib.picture_bytes(figure, kind, style, command_line(), system)
             if found and talks:
                 say("the fonts lack some letters of the texts: they are drawn as boxes")
-            if path == "-":
-                sys.stdout.buffer.write(content)
-                sys.stdout.buffer.flush()
-                return drawn.status
-            lib.write_whole(path, content)
-            if talks:
+            if deliver(path, content) and talks:
                 width, height = figure.get_size_inches() * 2.54
                 say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
             return drawn.status

@@ -106,6 +106,16 @@ def file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "._+-" else "_" for c in name)
 
 
+def deliver(path: str, content: bytes) -> bool:
+    """Write to a file, whole or not at all, or to standard output for `-`; whether it was a file."""
+    if path == "-":
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+        return False
+    lib.write_whole(path, content)
+    return True
+
+
 def will_write(path: str) -> None:
     """Refuse a file that this command has read."""
     _files(click.get_current_context()).note(path, is_written=True)

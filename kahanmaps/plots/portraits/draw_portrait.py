@@ -13,7 +13,7 @@ from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, legend_above, new_figure, points
 from kahanmaps.plots.portraits.flow import CENTRE, DEGENERATE, FOCUS, NODE, SADDLE, Flow
 from kahanmaps.plots.portraits.portrait import Portrait
-from kahanmaps.plots.portraits.windows import Window, main_range
+from kahanmaps.plots.portraits.windows import Window, inside, main_range
 from kahanmaps.plots.style import COLOUR_MAP, COLOURS, MARKS, Style
 
 if TYPE_CHECKING:
@@ -109,8 +109,8 @@ def _draw_flow(figure: Figure, axes: Any, flow: Flow, window: Window | None, sty
         axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
     for word, curves, look in (("separatrix", flow.separatrices, _SEPARATRIX), ("flow", flow.solutions, _SOLUTION)):
         for curve in curves:
-            inside = curve if window is None else _inside(curve[:, None], window)[:, 0]
-            (handles[word],) = axes.plot(*inside.T, zorder=1.2, **look)
+            shown = curve if window is None else _inside(curve[:, None], window)[:, 0]
+            (handles[word],) = axes.plot(*shown.T, zorder=1.2, **look)
     for kind, point in flow.equilibria:
         (handles[kind],) = axes.plot(*point[:, None], linestyle="none", zorder=4, clip_on=False, **_EQUILIBRIA[kind])
     if handles:
@@ -194,10 +194,7 @@ def _draw_coloured(
 
 def _inside(shown: FloatArray, window: Window) -> FloatArray:
     """NaN for points outside the window."""
-    low, high = (np.array(side) for side in zip(*window, strict=True))
-    with np.errstate(invalid="ignore"):
-        inside = np.all((shown >= low) & (shown <= high), axis=2)
-    return np.where(np.asarray(inside)[..., None], shown, np.nan)
+    return np.where(inside(shown, window)[..., None], shown, np.nan)
 
 
 def _make_room(axes: Any, window: Window | None) -> None:

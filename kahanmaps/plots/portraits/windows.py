@@ -7,6 +7,7 @@ from itertools import combinations
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray
@@ -88,13 +89,15 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
     return window
 
 
+def inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
+    """Which points (..., d) lie in the window; NaN does not."""
+    low, high = (np.array(side) for side in zip(*window, strict=True))
+    return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
+
+
 def outside(points: FloatArray, window: Window) -> int:
     """How many points (n, d) lie outside the window; NaN does not count."""
-    there = ~np.isnan(points).any(axis=1)
-    inside = there.copy()
-    for column, (low, high) in zip(points.T, window, strict=True):
-        inside &= (column >= low) & (column <= high)
-    return int(there.sum() - inside.sum())
+    return int((~np.isnan(points).any(axis=1) & ~inside(points, window)).sum())
 
 
 def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
