@@ -178,7 +178,6 @@ from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves a
 from kahanmaps.plots.curves.draw_invariant_curves import panels_of as panels_of
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves as InvariantCurves
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves as find_invariant_curves
-from kahanmaps.plots.curves.level_sets import Levels as Levels
 from kahanmaps.plots.curves.level_sets import level_curves as level_curves
 from kahanmaps.plots.curves.level_sets import levels_through as levels_through
 from kahanmaps.plots.curves.plane_views import view_of as view_of
@@ -205,11 +204,9 @@ from kahanmaps.plots.growth_records import height_curves as height_curves
 from kahanmaps.plots.point_functions import PointFunction as PointFunction
 from kahanmaps.plots.portraits.automatic_starts import automatic_starts as automatic_starts
 from kahanmaps.plots.portraits.draw_portrait import draw_portrait as draw_portrait
-from kahanmaps.plots.portraits.flow import Flow as Flow
 from kahanmaps.plots.portraits.flow import plane_flow as plane_flow
 from kahanmaps.plots.portraits.flow import projected_solutions as projected_solutions
 from kahanmaps.plots.portraits.portrait import portrait_of as portrait_of
-from kahanmaps.plots.portraits.trajectories import Trajectories as Trajectories
 from kahanmaps.plots.portraits.trajectories import ensemble_of_file as ensemble_of_file
 from kahanmaps.plots.portraits.trajectories import euler_orbits as euler_orbits
 from kahanmaps.plots.portraits.trajectories import field_of as field_of
