@@ -14,10 +14,9 @@ from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Whole
 from kahanmaps_cli.runs.ensemble_starts import normal_form_for, requested_starts, starts_record
-from kahanmaps_cli.screen.numbers import json_number, short_float
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, say
-from kahanmaps_cli.screen.render import print_json, record_of
+from kahanmaps_cli.screen.render import json_number, print_json, record_of, short_float
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.signals import interruptible
 
