@@ -74,13 +74,11 @@ from kahanmaps.experiments.results.export import write_jsonl as write_jsonl
 from kahanmaps.experiments.results.export import write_parquet as write_parquet
 from kahanmaps.experiments.results.records import KEPT as KEPT
 from kahanmaps.experiments.results.records import VERDICTS as VERDICTS
-from kahanmaps.experiments.results.records import Executor as Executor
 from kahanmaps.experiments.results.records import Job as Job
 from kahanmaps.experiments.results.records import Record as Record
 from kahanmaps.experiments.results.records import option_words as option_words
 from kahanmaps.experiments.results.records import system_words as system_words
 from kahanmaps.experiments.results.store import Found as Found
-from kahanmaps.experiments.results.store import Planned as Planned
 from kahanmaps.experiments.results.store import Store as Store
 from kahanmaps.experiments.results.summary import summarise as summarise
 from kahanmaps.experiments.running.local import TRIES as TRIES
@@ -88,7 +86,6 @@ from kahanmaps.experiments.running.run import Batch as Batch
 from kahanmaps.experiments.running.run import executor_for as executor_for
 from kahanmaps.experiments.running.run import plan as plan
 from kahanmaps.experiments.spec import MAX_TASKS as MAX_TASKS
-from kahanmaps.experiments.spec import Spec as Spec
 from kahanmaps.experiments.spec import read_spec as read_spec
 from kahanmaps.family.associated import FamilyMember as FamilyMember
 from kahanmaps.family.cubics import cubic_space as cubic_space
@@ -108,7 +105,6 @@ from kahanmaps.family.skew_hamiltonian import diagnosis as diagnosis
 from kahanmaps.family.system_normal_form import NoNormalForm as NoNormalForm
 from kahanmaps.family.system_normal_form import SystemNormalForm as SystemNormalForm
 from kahanmaps.invariants.growth import Growth as Growth
-from kahanmaps.invariants.phase_functions import PhaseFunction as PhaseFunction
 from kahanmaps.laboratory.analysis import Analysis as Analysis
 from kahanmaps.laboratory.analysis import analyze as analyze
 from kahanmaps.laboratory.cycles import Census as Census
@@ -163,7 +159,6 @@ from kahanmaps.maps.floats.stream import NpyFile as NpyFile
 from kahanmaps.maps.kahan import Kahan as Kahan
 from kahanmaps.maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from kahanmaps.maps.normal_form.division import text_in_gamma as text_in_gamma
-from kahanmaps.maps.normal_form.periods import OrbitPeriod as OrbitPeriod
 from kahanmaps.maps.normal_form.periods import period_of as period_of
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock as PlanarBlock
 from kahanmaps.maps.orbits.arithmetic import Arithmetic as Arithmetic
