@@ -13,8 +13,7 @@ from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduced
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.enclosure import (
-    _decimal,
-    _less,
+    decimal,
     degree_above,
     enclose,
     is_birational,
@@ -96,11 +95,11 @@ def test_the_bound_holds_for_compositions_of_quadratic_transformations(permutati
 
 def test_printed_bounds_are_rounded_outward():
     assert lower_bound(10, 3, 1).contains(2)  # x + 1/x = 9/2 - 2
-    assert _less(arb(2)) == "1.999999"
-    assert _less(arb(2).sqrt()) == "1.414213"
-    assert _less(arb(2, 1e-3)) == "1.998999"
-    assert _decimal(arb(2).sqrt().upper()) == "1.414214"
-    assert _decimal(arb(2)) == "2"
+    assert decimal(arb(2), -1) == "1.999999"
+    assert decimal(arb(2).sqrt().lower(), -1) == "1.414213"
+    assert decimal(arb(2, 1e-3).lower(), -1) == "1.998999"
+    assert decimal(arb(2).sqrt().upper()) == "1.414214"
+    assert decimal(arb(2)) == "2"
 
 
 def test_a_map_that_is_not_birational_is_refused(monkeypatch):

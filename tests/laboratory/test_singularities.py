@@ -16,7 +16,7 @@ from kahanmaps.laboratory.singular.jets import (
     image_of,
     images_of_curve,
 )
-from kahanmaps.laboratory.singular.outcomes import NOT_CONFINED, critical_points, pole_points
+from kahanmaps.laboratory.singular.outcomes import NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
@@ -173,7 +173,7 @@ def test_steps_by_elimination_are_those_by_minors(name, monkeypatch):
     rng, field = random.Random(name), GF(PRIME)
     here = load(name).map.at(fmpq(3, 11), field)
     for critical in (
-        pole_points(here.equations, rng)[0] + critical_points(here.equations, here.inverse.equations, rng)[0]
+        critical_points(here.equations, None, rng)[0] + critical_points(here.equations, here.inverse.equations, rng)[0]
     ):
         tangents = outcomes._tangents(critical.point, critical.gradient, field)
         direction = [rng.randrange(PRIME) for _ in critical.point]

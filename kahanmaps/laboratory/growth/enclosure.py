@@ -30,15 +30,15 @@ from math import prod
 from typing import Any
 
 import flint
-from flint import Ordering, arb, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, nmod_mat, nmod_poly
+from flint import arb, fmpq, fmpq_mpoly, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
+from kahanmaps.laboratory.singular.written import forms_over_eps
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import homogeneous_map
@@ -124,7 +124,7 @@ def enclose(
         lower, steps, below, above = found
         with flint.ctx.workprec(128):  # the least (deg f^n)^(1/n) of the iterates that are written out, rounded up
             roots = [arb(degree).root(n) for n, degree in enumerate(_written_degrees(map_, eps, end), 1)]
-            upper = _decimal(min(roots).upper())
+            upper = decimal(min(roots).upper())
         return Enclosure(lower, upper, steps, below, above, over.field.characteristic, int(over.eps))
     return None
 
@@ -207,7 +207,7 @@ def _lower(
         progress(f"dynamical degree: tangents of a conic, degrees of iterate {steps} up to {largest}")
     above = degree_above(largest, _LINES)
     bound = lower_bound(degrees[2 * steps], above, steps)
-    return None if bound is None else (_less(bound), steps, degrees[2 * steps], above)
+    return None if bound is None else (decimal(bound.lower(), -1), steps, degrees[2 * steps], above)
 
 
 def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
@@ -227,46 +227,33 @@ def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
 
 def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Iterator[int]:
     """The degrees of f, f^2, ... from forms without common factor over Q, or Q[eps], while they are short enough."""
-    ring = fmpq_mpoly_ctx.get(("x", "y", "z", "eps"), Ordering.degrevlex)
-    *X, symbol = ring.gens()
-    value = symbol if eps is None else ring.constant(eps)
     try:
-        size = max(degree_in(entry, 2) for row in map_.rows for entry in row)
+        forms = forms_over_eps(map_.rows, eps)
     except TooLarge:  # a composition: the product of the degrees of its factors
         equations = map_.at(fmpq(1) if eps is None else eps).equations
         yield prod(2 * equation.degree for equation in equations)
         return
-
-    def form(entry: fmpq_mpoly) -> fmpq_mpoly:
-        terms: dict[tuple[int, ...], Any] = {(i, j, size - i - j, k): c for (i, j, k), c in entry.terms()}
-        return ring.from_dict(terms).compose(*X, value, ctx=ring)
-
-    def without_common_factor(image: list[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        common = reduce(fmpq_mpoly.gcd, image)
-        return [entry / common for entry in image]
-
     # Minors of composed rows would have the same forms with a power of their common factor, of a far higher degree.
-    forms = without_common_factor(kernel_minors([[form(entry) for entry in row] for row in map_.rows]))
+    ring = forms[0].context()
+    *X, symbol = ring.gens()
     degree = max(degree_in(entry, 3) for entry in forms)
     most_terms = min(_MOST_TERMS, _MOST_NEXT_TERMS // max(1, degree) ** 2)
     iterate = list(X)
     for _ in range(_MOST_WRITTEN):
-        iterate = without_common_factor([entry.compose(*iterate, symbol, ctx=ring) for entry in forms])
+        image = [entry.compose(*iterate, symbol, ctx=ring) for entry in forms]
+        common = reduce(fmpq_mpoly.gcd, image)
+        iterate = [entry / common for entry in image]
         yield max(degree_in(entry, 3) for entry in iterate)
         if time.monotonic() > end or max(map(len, iterate)) > most_terms:
             return
 
 
-def _less(bound: arb) -> str:
-    """The largest number with a few decimals that is less than all of a ball.
+def decimal(end: arb, more: int = 0) -> str:
+    """An exact number rounded up to a few decimals, and so many units of the last one more.
 
-    Less, not at most: that the dynamical degree is more than it holds for all but finitely many eps.
+    With -1 it is less than the number, not at most: that the dynamical degree is more than it holds for all but
+    finitely many eps.
     """
-    return _decimal(bound.lower(), -1)
-
-
-def _decimal(end: arb, more: int = 0) -> str:
-    """An exact number rounded up, and so many units of the last decimal more."""
     units = int((end.fmpq() * 10**_DIGITS).ceil()) + more
     text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"
     return text.rstrip("0").rstrip(".")

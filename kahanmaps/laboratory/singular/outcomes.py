@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import operator
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial, reduce
-from itertools import pairwise
 from typing import Any
 
 from flint import fmpq, nmod_poly
@@ -62,65 +61,40 @@ class CriticalPoint:
 
 
 def critical_points(
-    equations: Sequence[Equation], inverses: Sequence[Equation], rng: random.Random
+    equations: Sequence[Equation], inverses: Sequence[Equation] | None, rng: random.Random
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
     `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
-    inverses; of several factors the product of their E is meant. Returns the points and, for each multiplicity, the
-    number of zeros of E over the closure of GF(p): there may be zeros without points in GF(p).
-    """
-
-    def E(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
-        total = X[0] * 0 + 1
-        for equation, inverse in zip(equations, inverses, strict=True):
-            X = equation.image(X, X[0] * 0, times)
-            total = times(total, _denominator(inverse, X, times))
-        return total
-
-    return _zeros(equations, inverses, E, rng)
-
-
-def pole_points(equations: Sequence[Equation], rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
-    """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
-
-    def determinants(X: Sequence[nmod_poly], times: Product) -> nmod_poly:
-        total = _denominator(equations[0], X, times)
-        for before, equation in pairwise(equations):
-            X = before.image(X, X[0] * 0, times)
-            total = times(total, _denominator(equation, X, times))
-        return total
-
-    return _zeros(equations, None, determinants, rng)
-
-
-def _zeros(
-    equations: Sequence[Equation],
-    inverses: Sequence[Equation] | None,
-    function: Callable[[Sequence[nmod_poly], Product], nmod_poly],
-    rng: random.Random,
-) -> tuple[list[CriticalPoint], dict[int, int]]:
-    """The zeros in GF(p) of a function on a random line, and how many there are in all.
-
-    The function is E or, without inverses, det M; its value is computed from images without their common factors, and
-    poles and infinity, or infinity alone, are divided out.
+    inverses; of several factors the product of their E is meant. Without inverses det M stands for E, and the points
+    are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros over the
+    closure of GF(p): there may be zeros without points in GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
-    value, excluded = nmod_poly([1], p), line[-1] if inverses is None else nmod_poly([1], p)
-    for k, equation in enumerate(equations):
-        if inverses is None:
-            value = value * _denominator(equation, line)
-            if k + 1 == len(equations):
-                break
-        image = equation.image(line, line[-1] * 0)
-        common = reduce(nmod_poly.gcd, image)
-        image = [entry // common for entry in image] if common.degree() > 0 else image
-        if inverses is not None:
-            value = value * _denominator(inverses[k], image)
-            excluded = excluded * image[-1] * common * line[-1]
-        line = image
+    excluded = line[-1]
+
+    def function(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
+        """E or det M; on the line from images without their common factors, which are no zeros to be found."""
+        nonlocal excluded
+        total = X[0] * 0 + 1
+        for k, equation in enumerate(equations):
+            if inverses is None:
+                total = times(total, _denominator(equation, X, times))
+                if k + 1 == len(equations):
+                    break
+            image = equation.image(X, X[0] * 0, times)
+            if is_line and (common := reduce(nmod_poly.gcd, image)).degree() > 0:
+                image = [entry // common for entry in image]
+                excluded = excluded if inverses is None else excluded * common
+            X = image
+            if inverses is not None:
+                total = times(total, _denominator(inverses[k], X, times))
+                excluded = excluded * X[-1] if is_line else excluded
+        return total
+
+    value = function(line, operator.mul, is_line=True)
     while (shared := value.gcd(excluded)).degree() > 0:
         value = value // shared
     if value.degree() < 1:
@@ -149,7 +123,7 @@ def _zeros(
     return found, degrees
 
 
-def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product = operator.mul) -> nmod_poly:
+def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> nmod_poly:
     """The last minor of L at X, whose coordinates are polynomials: up to its sign det M."""
     zero = X[0] * 0
     rows = equation.rows(equation.monomials(X, times), zero)
@@ -342,18 +316,9 @@ def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hype
     return Hypersurface(steps=one.steps), NO_TIME if is_over else POINTS_DIFFER
 
 
-def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """The contracted hypersurfaces without their polynomials, told apart by multiplicity and outcome of random points.
-
-    At one exact `eps` (half the time step), on lines modulo random primes. Poles and infinity are left out. One with a
-    multiplicity of which no point was found is undecided. Source: zander-2021.
-    """
-    return _at_random(map_, eps, rng, limits, False)
-
-
 def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """As `unwritten`, with the poles and infinity: without any polynomial."""
-    found = _at_random(map_, eps, rng, limits, True) + _at_random(map_, eps, rng, limits, False)
+    found = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
         try:
@@ -369,7 +334,14 @@ def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limit
     return found
 
 
-def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool) -> list[Hypersurface]:
+def unwritten(
+    map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False
+) -> list[Hypersurface]:
+    """The contracted hypersurfaces without their polynomials, told apart by multiplicity and outcome of random points.
+
+    At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.
+    One with a multiplicity of which no point was found is undecided. Source: zander-2021.
+    """
     found: dict[tuple[Any, ...], Hypersurface] = {}
     alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
     degrees: dict[int, int] = {}
@@ -382,7 +354,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             equations, inverses = here.equations, here.inverse.equations[::-1]
         except BadPrime:
             continue
-        points, seen = pole_points(equations, rng) if poles else critical_points(equations, inverses, rng)
+        points, seen = critical_points(equations, None if poles else inverses, rng)
         degrees |= seen
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)

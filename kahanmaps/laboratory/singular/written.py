@@ -18,10 +18,10 @@ from functools import reduce
 from math import comb, prod
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import degree_in, ring
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.singular.following import Range
@@ -137,10 +137,10 @@ def period_of(equations: tuple[Equation, ...]) -> int:
 def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | None:
     """The irreducible factors of the Jacobian determinant of forms, with multiplicities; None where it is too large.
 
-    The determinant is not zero, and has this degree.
+    The determinant is not zero, and has this degree. Symbols may follow Z.
     """
     size, context = len(forms), forms[0].context()
-    zero, infinity = context.constant(0), context.gens()[-1]
+    zero, infinity = context.constant(0), context.gen(size - 1)
     if _is_short(size, degree):
         rows = [[*(form.derivative(j) for j in range(size)), zero] for form in forms]
         return [(factor, int(k)) for factor, k in kernel_minors(rows)[-1].factor()[1]]
@@ -149,9 +149,9 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
         return None
     found = []
     for factor, k in finite:
-        total = int(factor.total_degree())
-        form = context.from_dict({(*m[:-1], total - sum(m)): c for m, c in factor.terms()})
-        found.append((form, k))
+        total = degree_in(factor, size)
+        terms = {(*m[: size - 1], total - sum(m[:size]), *m[size:]): c for m, c in factor.terms()}
+        found.append((context.from_dict(terms), k))
         degree -= k * total
     return [*found, (infinity, degree)] if degree else found
 
@@ -247,24 +247,9 @@ def _named(map_: BirationalMap, eps: fmpq, stage: int | None) -> dict[str, str]:
             rows = map_.parts[stage].map.inverse_rows if map_.parts[stage].is_inverse else map_.parts[stage].map.rows
         except InputError:
             return {}
-    n, context, at_eps = len(variables), ring((*variables, "Z", "eps")), ring((*variables, "Z"))
-    degree = max(sum(m[:n]) for row in rows for entry in row for m in entry.monoms())
-
-    def homogeneous(entry: Any) -> Any:
-        return context.from_dict({(*m[:n], degree - sum(m[:n]), m[-1]): c for m, c in entry.terms()})
-
-    forms = kernel_minors([[homogeneous(entry) for entry in row] for row in rows])
-    common = reduce(lambda P, Q: P.gcd(Q), forms)
-    forms = [form / common for form in forms]
-    size = max(sum(m[:-1]) for form in forms for m in form.monoms()) - 1
-    if size < 1:
-        return {}
-    if comb((n + 1) * size + n, n) <= _MAX_TERMS:
-        zero = context.constant(0)
-        critical = kernel_minors([[*(form.derivative(j) for j in range(n + 1)), zero] for form in forms])[-1]
-        factors = critical.factor()[1]
-    else:
-        factors = factors_at_finite_points(forms) or []
+    n, at_eps, forms = len(variables), ring((*variables, "Z")), forms_over_eps(rows)
+    size = max(degree_in(form, n + 1) for form in forms) - 1
+    factors = (_critical_factors(forms, (n + 1) * size) or []) if size > 0 else []
     affine, found = ring((*variables, "eps")), {}
     for factor, _ in factors:
         if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
@@ -275,3 +260,23 @@ def _named(map_: BirationalMap, eps: fmpq, stage: int | None) -> dict[str, str]:
             text = format_polynomial(affine.from_dict({(*m[:n], m[-1]): c for m, c in factor.terms()}))
             found[name_of(parts[0][0], map_)] = text
     return found
+
+
+def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None) -> list[fmpq_mpoly]:
+    """The forms in (X : Z) over Q[eps], or at one eps, of the map with these rows of polynomials in x and eps.
+
+    They have no common factor; their last variables are Z and eps.
+    """
+    n = len(rows)
+    context = ring((*(f"x{k + 1}" for k in range(n)), "Z", "eps"))
+    degree = max(degree_in(entry, n) for row in rows for entry in row)
+    *X, symbol = context.gens()
+    value = symbol if eps is None else context.constant(eps)
+
+    def form(entry: fmpq_mpoly) -> fmpq_mpoly:
+        terms = {(*m[:n], degree - sum(m[:n]), m[-1]): c for m, c in entry.terms()}
+        return context.from_dict(terms).compose(*X, value, ctx=context)
+
+    minors = kernel_minors([[form(entry) for entry in row] for row in rows])
+    common = reduce(fmpq_mpoly.gcd, minors)
+    return [minor / common for minor in minors]
