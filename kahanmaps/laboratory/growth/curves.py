@@ -26,6 +26,7 @@ from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 
@@ -142,35 +143,14 @@ class Line:
         """The coordinates of the next curve as power series, to `length` terms."""
         X = [entry.truncate(length) for entry in self._X]
         values = [entry.truncate(length) for entry in equation.monomials(X)]
-        rows = equation.rows(values, nmod_poly([0], self.prime))
-        n = len(rows)
-        for column in range(n):
-            candidates = [i for i in range(column, n) if int(rows[i][column][0])]
-            if not candidates:
-                raise ZeroDivisionError("the point t = 0 of the line has no image")
-            # The row with the fewest entries fills in the fewest others.
-            chosen = min(candidates, key=lambda i: sum(not entry.is_zero() for entry in rows[i]))
-            rows[column], rows[chosen] = rows[chosen], rows[column]
-            pivot = rows[column]
-            inverse = pivot[column].inverse_series_trunc(length)
-            for j in range(column + 1, n + 1):
-                if not pivot[j].is_zero():
-                    pivot[j] = pivot[j].mul_low(inverse, length)
-            for row in rows[column + 1 :]:
-                self._eliminate(row, row[column], pivot, range(column + 1, n + 1), length)
-        for column in range(n - 1, 0, -1):
-            for row in rows[:column]:
-                self._eliminate(row, row[column], rows[column], range(n, n + 1), length)
-        return [-row[n] for row in rows]
-
-    def _eliminate(
-        self, row: list[nmod_poly], factor: nmod_poly, pivot: list[nmod_poly], at: range, length: int
-    ) -> None:
-        self._require_time()
-        if not factor.is_zero():
-            for j in at:
-                if not pivot[j].is_zero():
-                    row[j] = row[j] - factor.mul_low(pivot[j], length)
+        try:
+            *x, below = kernel(equation.rows(values, nmod_poly([0], self.prime)), 1, length, [], self._require_time)
+        except PrecisionTooLow:
+            raise ZeroDivisionError("the point t = 0 of the line has no image") from None
+        if not int(below[0]):
+            raise ZeroDivisionError("the point t = 0 of the line has no image")
+        inverse = below.inverse_series_trunc(length)
+        return [entry.mul_low(inverse, length) for entry in x]
 
     def _curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
         """The polynomials with these quotients, or None where there are not enough terms to be certain."""

@@ -164,12 +164,11 @@ class Recurrence:
         if period > _MOST_CLASSES:
             return None
         forms = []
-        values = self._extended(self.preperiod + period * (size + 1))
         for residue in range(period):
             first = next(n for n in count(self.preperiod) if n % period == residue)
             at = [first + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
             powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
-            column = fmpq_mat(size, 1, [fmpq(values[n]) for n in at])
+            column = fmpq_mat(size, 1, [fmpq(self.predict(n)) for n in at])
             forms.append(format_univariate(fmpq_poly(powers.solve(column).entries()), "n"))
         if len(set(forms)) == 1:
             return forms[0]
@@ -220,7 +219,11 @@ class Recurrence:
         >>> find_recurrence([1, 2, 4, 8, 16]).predict(10)
         1024
         """
-        return self._extended(n + 1)[n]
+        values, below = list(self.values), [int(c) for c in self.characteristic.coeffs()[:-1]]
+        while len(values) <= n:
+            last = values[len(values) - self.order :]
+            values.append(-sum(c * value for c, value in zip(below, last, strict=True)))
+        return values[n]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; coefficients are text, from x^0 up."""
@@ -230,14 +233,6 @@ class Recurrence:
             "factors": [{"factor": str(factor), "multiplicity": k} for factor, k in self.factors],
             **attributes(self, "growth", "power", "rate", "closed_form", "text"),
         }
-
-    def _extended(self, length: int) -> list[int]:
-        values = list(self.values)
-        below = [int(c) for c in self.characteristic.coeffs()[:-1]]
-        while len(values) < length:
-            last = values[len(values) - self.order :]
-            values.append(-sum(c * value for c, value in zip(below, last, strict=True)))
-        return values
 
 
 def find_recurrence(values: Sequence[int]) -> Recurrence | None:

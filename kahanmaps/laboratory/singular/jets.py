@@ -155,7 +155,7 @@ def _moved(
         return left.mul_low(right, known)
 
     if equation.dim >= _ELIMINATED and equation.explicit is None:
-        return _kernel(_rows(equation, equation.monomials(X, times), known), precision, known, places)
+        return kernel(_rows(equation, equation.monomials(X, times), known), precision, known, places)
     image = equation.image(X, zero, times)
     if not places:
         places.append(_least([image], [0], range(len(image)), precision))
@@ -185,10 +185,17 @@ def _spread(equation: Equation, known: int) -> list[nmod_poly]:
     return [nmod_poly(coefficients, prime) for coefficients in found]
 
 
-def _kernel(rows: list[list[nmod_poly]], precision: int, known: int, places: list[Place]) -> list[nmod_poly]:
+def kernel(
+    rows: list[list[nmod_poly]],
+    precision: int,
+    known: int,
+    places: list[Place],
+    check: Callable[[], None] = lambda: None,
+) -> list[nmod_poly]:
     """The kernel of an n x (n + 1) matrix of series, without a common power of t; its minors have that of all places.
 
     A pivot has the least exponent of all entries that are left, so that nothing but its own power of t is divided out.
+    The exponents are below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     left_rows, left = list(range(len(rows))), list(range(len(rows) + 1))
     solved: list[tuple[int, dict[int, nmod_poly]]] = []
@@ -201,10 +208,12 @@ def _kernel(rows: list[list[nmod_poly]], precision: int, known: int, places: lis
         inverse = rows[i][j].right_shift(power).inverse_series_trunc(known - power)
         normal = {c: rows[i][c].right_shift(power).mul_low(inverse, known - power) for c in left}
         for r in left_rows:
+            check()
             factor = rows[r][j]
             if not factor.is_zero():
                 for c in left:
-                    rows[r][c] = rows[r][c] - factor.mul_low(normal[c], known)
+                    if not normal[c].is_zero():
+                        rows[r][c] = rows[r][c] - factor.mul_low(normal[c], known)
         solved.append((j, normal))
     X = [rows[0][0] * 0 + 1] * (len(rows) + 1)
     for j, normal in reversed(solved):
@@ -215,7 +224,8 @@ def _kernel(rows: list[list[nmod_poly]], precision: int, known: int, places: lis
 def _least(rows: Sequence[Sequence[nmod_poly]], left_rows: Sequence[int], left: Sequence[int], precision: int) -> Place:
     """The entry of the least exponent of t in these rows and columns. Raises PrecisionTooLow where there is none."""
     best: Place | None = None
-    for i in left_rows:
+    # The row with the fewest entries fills in the fewest others.
+    for i in sorted(left_rows, key=lambda i: sum(not rows[i][j].is_zero() for j in left)):
         for j in left:
             power = valuation(rows[i][j], precision)
             if power is not None and (best is None or power < best[0]):

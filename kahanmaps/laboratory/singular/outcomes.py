@@ -205,22 +205,18 @@ class Hypersurface:
 
 
 @dataclass(frozen=True)
-class Followed:
-    """A form over Q whose orders are followed, its exponent in the factor by which the minors of an equation exceed the
-    map, and the number of that map in a word, from 0."""
-
-    form: Any
-    excess: int
-    stage: int
-
-
-@dataclass(frozen=True)
 class Written:
-    """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown)."""
+    """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown).
+
+    `excess` is its exponent in the factor by which the minors of an equation exceed the map, and `stage` the number of
+    that map in a word, from 0.
+    """
 
     form: Any
     is_pole: bool
     multiplicity: int | None
+    excess: int = 0
+    stage: int = 0
 
 
 @dataclass(frozen=True)
@@ -231,8 +227,8 @@ class Tracking:
     and steps are single maps of a word of `period`.
     """
 
-    critical: Sequence[Followed] = ()
-    excess: Sequence[Followed] = ()
+    critical: Sequence[Written] = ()
+    excess: Sequence[Written] = ()
     stage: int | None = None
     period: int = 1
 

@@ -25,7 +25,7 @@ from kahanmaps.algebra.polynomials import degree_in, ring
 from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.singular.following import Range
-from kahanmaps.laboratory.singular.outcomes import Followed, Hypersurface, Tracking, Written, outcome_of
+from kahanmaps.laboratory.singular.outcomes import Hypersurface, Tracking, Written, outcome_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
@@ -77,11 +77,11 @@ def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
     return list(found.values()), critical_degree
 
 
-def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -> tuple[list[Followed], list[Followed]]:
+def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -> tuple[list[Written], list[Written]]:
     """Of the forms of a map those that it contracts, and those in the common factor of the minors of its equation."""
-    contracted = [Followed(one.form, 0, stage) for one in among if one.multiplicity]
+    contracted = [replace(one, stage=stage) for one in among if one.multiplicity]
     common = [] if map_.factor.is_constant() else map_.factor.factor()[1]
-    return contracted, [Followed(factor, int(k), stage) for factor, k in common]
+    return contracted, [Written(factor, False, None, int(k), stage) for factor, k in common]
 
 
 def followed_map_by_map(

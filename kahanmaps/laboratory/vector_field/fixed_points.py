@@ -16,6 +16,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
 from kahanmaps.algebra.small_systems import Component, groebner, normal_form, quotient_monomials, solve_system
 from kahanmaps.algebra.written.plain import attributes
@@ -160,22 +161,14 @@ def _on(system: QuadraticSystem, part: Component, basis: Sequence[fmpq_mpoly]) -
 
 
 def _characteristic(system: QuadraticSystem, point: Sequence[fmpq_mpoly], basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-    """det(lambda I - f') by Faddeev and LeVerrier's recursion, reduced modulo the equations of the points."""
-    n, context = system.dim, point[0].context()
+    """det(lambda I - f'), reduced modulo the equations of the points."""
+    n = system.dim
     letter = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
     joint = ring([letter, *names_of(point[0])])
-    names = joint.gens()
-    jacobian = [[p.derivative(j).compose(*point, ctx=context) for j in range(n)] for p in system.rhs]
-    coefficient, power = context.constant(1), [[context.constant(int(i == j)) for j in range(n)] for i in range(n)]
-    total = names[0] ** n
-    for k in range(1, n + 1):
-        power = [
-            [sum((a * power[m][j] for m, a in enumerate(row)), context.constant(0)) for j in range(n)]
-            for row in jacobian
-        ]
-        trace = sum((power[i][i] for i in range(n)), context.constant(0))
-        coefficient = normal_form(trace, basis) * fmpq(-1, k)
-        for i in range(n):
-            power[i][i] = power[i][i] + coefficient
-        total = total + coefficient.compose(*names[1:], ctx=joint) * names[0] ** (n - k)
-    return total
+    eigenvalue, *x = joint.gens()
+    at_point = [p.compose(*x, ctx=joint) for p in point]
+    rows = [
+        [*((eigenvalue if i == j else 0) - p.derivative(j).compose(*at_point, ctx=joint) for j in range(n)), None]
+        for i, p in enumerate(system.rhs)
+    ]
+    return normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint) for p in basis])
