@@ -21,7 +21,7 @@ import math
 import random
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -209,7 +209,7 @@ class DegreeGrowth(Printed):
         """How the growth is known, by what proof, or how far confinement was looked for where it was not seen."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
-        return f"{self.known}: {self._limit}" if self._limit else str(self.known)
+        return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
 
     @property
     def known(self) -> Known:
@@ -223,15 +223,10 @@ class DegreeGrowth(Printed):
         return Known.ESTIMATED if self.looks_exponential else Known.UNDECIDED
 
     @property
-    def _limit(self) -> str:
-        """How far confinement was looked for, where it was not seen."""
-        return self.patterns.limit if self.patterns is not None else ""
-
-    @property
     def growth_text(self) -> str:
         """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
-        with_basis = self.proof is not None or (self.recurrence is not None and self._limit)
-        return self.kind_text + (f" ({self.basis})" if with_basis else "")
+        is_limited = self.recurrence is not None and self.patterns is not None and self.patterns.limit
+        return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 
     def rows(self) -> list[dict[str, int]]:
         """A row for each iterate, for `pandas.DataFrame(found.rows())` and the like."""
@@ -319,32 +314,27 @@ def degree_growth(
     )
 
 
+@dataclass
 class _Search:
     """The lines, and the degrees found on them so far."""
 
-    def __init__(
-        self,
-        map_: BirationalMap,
-        eps: fmpq | None,
-        deadline: float,
-        max_degree: int,
-        seed: int,
-        steps: int | None,
-        patterns: Patterns | None,
-    ) -> None:
-        self._map, self._eps, self._steps, self._patterns = map_, eps, steps, patterns
-        self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
-        self._rng = random.Random(f"degrees {seed_for(seed, map_.subject, eps)}")
-        self._replaced = 0
-        self._is_explicit = False
-        self.degrees = [1]
-        self.notes: list[str] = []
+    map: BirationalMap
+    eps: fmpq | None
+    deadline: float
+    max_degree: int
+    seed: int
+    steps: int | None
+    patterns: Patterns | None
+    degrees: list[int] = field(default_factory=lambda: [1])
+    notes: list[str] = field(default_factory=list)
+    replaced: int = 0
+    is_explicit: bool = False
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
         """Step after step until something ends it."""
-        matrix = exponent_matrix(self._map, self._eps)
+        matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
-            periodic = monomial_period(self._map, self._eps, matrix) if proof.growth is Growth.BOUNDED else None
+            periodic = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
             # The degrees of a monomial map are exact, those of powers of the matrix.
             power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
             while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
@@ -352,9 +342,9 @@ class _Search:
                 if known is not None and known.checked >= max(6, known.order):
                     break
                 degree = monomial_degree(power)
-                if degree > self._max_degree:
+                if degree > self.max_degree:
                     ended = Ended.DEGREE
-                    message = f"the degree of iterate {len(self.degrees)} is above {self._max_degree}"
+                    message = f"the degree of iterate {len(self.degrees)} is above {self.max_degree}"
                     break
                 self.degrees.append(degree)
                 power = power * matrix
@@ -362,16 +352,17 @@ class _Search:
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
             return self._result(ended, message, proof=periodic or proof)
 
+        rng = random.Random(f"degrees {seed_for(self.seed, self.map.subject, self.eps)}")
+
         def line() -> Line:
             while True:
                 try:
-                    over = reduced(self._map, self._eps, self._rng)
-                    return Line(over, self._rng, self._deadline, self._max_degree)
+                    return Line(reduced(self.map, self.eps, rng), rng, self.deadline, self.max_degree)
                 except BadPrime:
                     continue
 
         lines = [line() for _ in range(_LINES)]
-        self._is_explicit = lines[0].is_explicit
+        self.is_explicit = lines[0].is_explicit
         try:
             while True:
                 self._look_at_fit(max_terms is None)
@@ -389,21 +380,21 @@ class _Search:
             self._follow()
         primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
         found = self._result(ended, message, primes=primes, residues=residues, notes=tuple(self.notes))
-        contracted = self._patterns
-        if contracted is not None and contracted.at and self._eps is None and time.monotonic() <= self._deadline:
-            named = with_eps(self._map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
+        contracted = self.patterns
+        if contracted is not None and contracted.at and self.eps is None and time.monotonic() <= self.deadline:
+            named = with_eps(self.map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
             found = replace(found, patterns=replace(contracted, contracted=named))
         period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
         if period is not None:
-            found = replace(found, proof=linear_iterate(self._map, self._eps, period))
+            found = replace(found, proof=linear_iterate(self.map, self.eps, period))
         if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
             return found
-        left = max(1.0, self._deadline - time.monotonic())
-        return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))
+        left = max(1.0, self.deadline - time.monotonic())
+        return replace(found, enclosure=enclose(self.map, self.eps, seed=self.seed, seconds=left, progress=progress))
 
     def _result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
-        known: dict[str, Any] = {"primes": (), "residues": (), "patterns": self._patterns, **more}
-        return DegreeGrowth(tuple(self.degrees), self._eps, ended, message, self._seed, **known)
+        known: dict[str, Any] = {"primes": (), "residues": (), "patterns": self.patterns, **more}
+        return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, **known)
 
     def _look_at_fit(self, may_stop: bool) -> None:
         """Follow the singularities in good time, and stop where a recurrence is certain."""
@@ -412,12 +403,12 @@ class _Search:
             return
         found = find_recurrence(self.degrees)
         # Above dimension 4 series of maps without short forms are slow and wait until degrees say something.
-        soon = self._map.dim <= WRITTEN_DIMENSION or found is not None or self._is_explicit
+        soon = self.map.dim <= WRITTEN_DIMENSION or found is not None or self.is_explicit
         if soon:
             self._follow()
         if not may_stop:
             return
-        known = self._patterns
+        known = self.patterns
         enough = found is not None and found.checked >= max(6, found.order)
         explained = self._result(Ended.TERMS, "").explained
         if explained is not None:
@@ -437,11 +428,10 @@ class _Search:
 
     def _follow(self) -> None:
         """What the singularities say, if that was not asked before and the map is not affine."""
-        if self._map.root is None and self._patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
-            left = max(0.0, self._deadline - time.monotonic())
-            self._patterns = patterns_of_map(
-                self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
-            )
+        if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
+            left = max(0.0, self.deadline - time.monotonic())
+            given: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "seconds": 0.7 * left}
+            self.patterns = patterns_of_map(self.map, self.eps, **given)
 
     def _step(self, lines: list[Line], line: Callable[[], Line]) -> None:
         """All lines one step on; those in special position are replaced by others."""
@@ -452,7 +442,7 @@ class _Search:
             try:
                 while one.steps < n:
                     k = one.steps + 1
-                    guess = known[k] if k < n else self._map.dim if k == 1 else known[1] * known[-1]
+                    guess = known[k] if k < n else self.map.dim if k == 1 else known[1] * known[-1]
                     if k == n > 1 and known[-2]:
                         # Degrees are as good as log-concave, so that the last ratio bounds the next one. A guess too
                         # low costs a second attempt.
@@ -470,12 +460,12 @@ class _Search:
             if best >= 0 and min(found) == best:
                 self.degrees.append(best)
                 return
-            self._replaced += 1
-            if best < 0 and self._replaced > _LINES:
+            self.replaced += 1
+            if best < 0 and self.replaced > _LINES:
                 raise Stopped(
-                    Ended.SINGULAR, f"iterate {n} exists nowhere: {self._map.denominator_name} = 0 on the image"
+                    Ended.SINGULAR, f"iterate {n} exists nowhere: {self.map.denominator_name} = 0 on the image"
                 )
-            if self._replaced > _REPLACEMENTS:
+            if self.replaced > _REPLACEMENTS:
                 raise Stopped(Ended.LINES, f"random lines do not agree on the degree of iterate {n}: {found}")
             if best >= 0:
                 self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")

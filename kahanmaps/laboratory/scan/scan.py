@@ -150,38 +150,55 @@ def scan(
     jobs = jobs or processors()
     most = _PART * seconds * jobs / cost
     run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs}, seconds, progress)
-    plan = _plan(len(names), primes, most)
-    run.take(plan)
+    run.take(_plan(len(names), primes, most))
     known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
-
-    # Are members on random lines left, as many as a hypersurface has?
-    is_whole = not (missed or run.omitted)
-    lacking = (one.on_lines and _left(one, known) >= 0.5 * one.seen / one.prime for one in run.sweeps)
-    if is_whole and any(lacking) and (lines := run.more_lines(most)):
-        run.sweeps[:] = [one for one in run.sweeps if not one.on_lines]
-        run.take(lines)
-        known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
-    # Are members left, fewer than a curve has, or a hypersurface where they are on random lines?
-    is_whole = not (missed or run.omitted)
-    lacking = (
-        0 < _left(one, known) < 0.5 * (one.prime if one.complete else one.seen / one.prime) for one in run.sweeps
-    )
-    if is_whole and any(lacking) and (further := run.more_primes(primes, most)):
-        run.take(further)
-        known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
+    for more in (run.more_lines, run.more_primes):
+        if not (missed or run.omitted) and (further := more(known, primes, most)):
+            run.take(further)
+            known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
     run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
-    for k, one in enumerate(known):
-        try:
-            run.tell(f"scan: confirms component {k + 1} of {len(known)}")
-            known[k] = _confirmed(one, family, known, rng, run.until(_UNTIL[2]))
-        except TimeOver:
-            run.omit(1, f"the confirmation of {counted(len(known) - k, 'component')}")
-            break
-    check = run.until(1 if analysis is None else _UNTIL[3])
-    known, missed = _with_growth(known, family, run.began + seconds, check, run.tell)
+    before = known
+    known, missed = run.each(
+        before, "confirms component", _UNTIL[2], lambda one, check: _confirmed(one, family, before, rng, check)
+    )
+    run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
+    known.sort(key=lambda one: one.degrees[::-1])
+    enough: dict[Degrees, DegreeGrowth] = {}  # of these one member is enough, if further degrees of others are its own
+    deadline = run.began + seconds
+
+    def with_growth(one: Component, _: Callable[[], None]) -> Component:
+        if one.degrees[-1] < 0 or _goes_on(one, enough.get(one.degrees), family):
+            return one
+        growth = _growth(one, family, deadline)
+        if growth is not None and growth.growth not in _MEASURED_EACH:
+            enough[one.degrees] = growth
+        return replace(one, growth=growth)
+
+    known, missed = run.each(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
     run.omit(missed, f"the growth on {missed} components")
+    kinds = {one.degrees: one.growth.growth for one in reversed(known) if one.growth is not None}
+    known.sort(
+        key=lambda one: (
+            OF_DEGREES.index(kinds.get(one.degrees, Growth.UNKNOWN)),
+            one.degrees[::-1],
+            one.text,
+        )
+    )
     if analysis is not None:
-        known, missed = _with_verdicts(known, family, analysis, run.began + seconds, run.until(1), run.tell)
+        points: set[Degrees] = set()
+
+        def with_verdict(one: Component, _: Callable[[], None]) -> Component:
+            slow = one.growth is not None and one.growth.growth is not Growth.EXPONENTIAL
+            if one.values is None or not slow or one.degrees in points:
+                return one
+            if one.dimension == 0:
+                points.add(one.degrees)
+            member, step = family.member(one.values)
+            left = max(0.1, deadline - time.monotonic())
+            told = analyze(member, eps=step, seconds=min(analysis, left), seed=family.seed)
+            return replace(one, verdict=told.conclusion)
+
+        known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     return run.result(known, tuple(symmetries(run.sweeps, known, names)))
 
@@ -206,6 +223,8 @@ class _Sweeping:
     def tell(self, sentence: str) -> None:
         """Say what is done now."""
         self._doing = sentence
+        if self._interrupted:
+            raise TimeOver
         try:
             self._progress(sentence)
         except TimeOver:
@@ -257,18 +276,44 @@ class _Sweeping:
         generic = max((one.generic for one in self.sweeps), default=())
         self.sweeps[:] = [one for one in self.sweeps if one.generic == generic]
 
-    def more_lines(self, most: float) -> list[Choice]:
-        """More random lines instead of those there were, where they are not more than `most` members."""
-        again: list[Choice] = [
-            (one.prime, _MORE * round(one.seen / one.prime), 1) for one in self.sweeps if one.on_lines
-        ]
-        return again if _size(self.count, again) <= most else []
+    def more_lines(self, known: Sequence[Component], _: Sequence[int] | None, most: float) -> list[Choice]:
+        """More random lines in place of those there were, of which as many members are left as a hypersurface has.
 
-    def more_primes(self, primes: Sequence[int] | None, most: float) -> list[Choice]:
-        """Further primes, unless some are given, while there are not more than `most` members in all."""
-        further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(self.count, ()) if primes is None]
-        sizes = accumulate((_size(self.count, [one]) for one in further), initial=self._total)
-        return [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
+        None where they are more than `most` members.
+        """
+        lines = [one for one in self.sweeps if one.on_lines]
+        again: list[Choice] = [(one.prime, _MORE * round(one.seen / one.prime), 1) for one in lines]
+        is_lacking = any(_left(one, known) >= 0.5 * one.seen / one.prime for one in lines)
+        if not is_lacking or _size(self.count, again) > most:
+            return []
+        self.sweeps[:] = [one for one in self.sweeps if not one.on_lines]
+        return again
+
+    def more_primes(self, known: Sequence[Component], primes: Sequence[int] | None, most: float) -> list[Choice]:
+        """Further primes, unless some are given, while there are not more than `most` members in all.
+
+        Where members are left, fewer than a curve has, or than a hypersurface on random lines.
+        """
+        sizes = ((one, one.prime if one.complete else one.seen / one.prime) for one in self.sweeps)
+        if primes is not None or not any(0 < _left(one, known) < 0.5 * size for one, size in sizes):
+            return []
+        further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(self.count, ())]
+        totals = accumulate((_size(self.count, [one]) for one in further), initial=self._total)
+        return [one for one, total in zip(further, islice(totals, 1, None), strict=True) if total <= most]
+
+    def each(
+        self, known: Sequence[Component], what: str, part: float, work: Callable[..., Component]
+    ) -> tuple[list[Component], int]:
+        """The components with what `work` makes of each in a part of the time, and for how many there was none."""
+        done, missed, check = list(known), 0, self.until(part)
+        for k, one in enumerate(known):
+            try:
+                self.tell(f"scan: {what} {k + 1} of {len(known)}")
+                check()
+                done[k] = work(one, check)
+            except TimeOver:
+                missed += 1
+        return done, missed
 
     def result(self, known: Sequence[Component], symmetric: tuple[Any, ...]) -> Scan:
         """The scan with these components."""
@@ -279,48 +324,18 @@ class _Sweeping:
         return Scan(*asked, tuple(known), sweeps, left, symmetric, ended, tuple(self.omitted))
 
 
-def _with_growth(
-    components: list[Component], family: Scanned, deadline: float, check: Callable[[], None], progress: Progress
-) -> tuple[list[Component], int]:
-    """The components with the growth at a rational member, those with the slowest first; for how many it is missing.
-
-    Where it is bounded or exponential one member of each class is enough, if further degrees of the others are its own.
-    """
-    found = sorted(components, key=lambda one: one.degrees[::-1])
-    enough: dict[Degrees, DegreeGrowth] = {}
-    missed = 0
-    for k, one in enumerate(found):
-        if one.degrees[-1] < 0:
-            continue
-        try:
-            progress(f"scan: growth on component {k + 1} of {len(components)}")
-            check()
-            if _goes_on(one, enough.get(one.degrees), family):
-                continue
-            left = max(0.1, deadline - time.monotonic())
-            known = None
-            if one.values is not None:
-                member, step = family.member(one.values)
-                given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
-                for attempt in range(_ATTEMPTS):  # singularities are followed at a random eps, which may be special
-                    known = degree_growth(member.map, step, seed=family.seed + attempt, **given)
-                    if known.growth is not Growth.UNKNOWN:
-                        break
-            # there may be a special member only
-            if known is None or not _agree(known.degrees, (1, *one.degrees)):
-                known = _beyond(one, family)
-        except TimeOver:
-            missed += 1
-            continue
-        found[k] = replace(one, growth=known)
-        if known is not None and known.growth not in _MEASURED_EACH:
-            enough[one.degrees] = known
-    kinds = {one.degrees: one.growth.growth for one in reversed(found) if one.growth is not None}
-
-    def order(one: Component) -> tuple[int, Degrees, str]:
-        return OF_DEGREES.index(kinds.get(one.degrees, Growth.UNKNOWN)), one.degrees[::-1], one.text
-
-    return sorted(found, key=order), missed
+def _growth(one: Component, family: Scanned, deadline: float) -> DegreeGrowth | None:
+    """The growth at a rational member, or that which more degrees fit where there is none, or it is special."""
+    known = None
+    if one.values is not None:
+        member, step = family.member(one.values)
+        left = max(0.1, deadline - time.monotonic())
+        given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
+        for attempt in range(_ATTEMPTS):  # singularities are followed at a random eps, which may be special
+            known = degree_growth(member.map, step, seed=family.seed + attempt, **given)
+            if known.growth is not Growth.UNKNOWN:
+                break
+    return known if known is not None and _agree(known.degrees, (1, *one.degrees)) else _beyond(one, family)
 
 
 def _beyond(one: Component, family: Scanned, most: int = _LARGE) -> DegreeGrowth | None:
@@ -341,39 +356,6 @@ def _goes_on(one: Component, known: DegreeGrowth | None, family: Scanned) -> boo
 
 def _agree(some: Degrees, others: Degrees) -> bool:
     return all(a == b for a, b in zip(some, others, strict=False))
-
-
-def _with_verdicts(
-    components: list[Component],
-    family: Scanned,
-    seconds: float,
-    deadline: float,
-    check: Callable[[], None],
-    progress: Progress,
-) -> tuple[list[Component], int]:
-    """The components with what an analysis says of a member, where degrees do not grow exponentially; how many lack it.
-
-    Each has so many seconds, as long as there is time.
-    """
-    found: list[Component] = []
-    points: set[Degrees] = set()
-    missed = 0
-    for one in components:
-        asked = one.values is not None and one.growth is not None and one.growth.growth is not Growth.EXPONENTIAL
-        if asked and one.values is not None and one.degrees not in points:
-            member, step = family.member(one.values)
-            try:
-                progress(f"scan: analyzes a member where {one.text}")
-                check()
-                left = max(0.1, deadline - time.monotonic())
-                told = analyze(member, eps=step, seconds=min(seconds, left), seed=family.seed)
-                one = replace(one, verdict=told.conclusion)
-            except TimeOver:
-                missed += 1
-            if one.dimension == 0:
-                points.add(one.degrees)
-        found.append(one)
-    return found, missed
 
 
 def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:
