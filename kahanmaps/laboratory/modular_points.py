@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import random
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -167,14 +168,9 @@ def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: 
 
 def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
     """The value and the gradient at a point of the polynomial of degree at most `degree` with these coefficients."""
-    value, gradient = 0, [0] * len(point)
-    powers = monomial_values(point, degree, prime)
-    for coefficient, slopes, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
-        if coefficient:
-            value += coefficient * power
-            for variable, exponent, place in slopes:
-                gradient[variable] = (gradient[variable] + coefficient * exponent * powers[place]) % prime
-    return value % prime, gradient
+    rows = [monomial_values(point, degree, prime), *slope_values(point, degree, prime)]
+    value, *gradient = (sum(map(operator.mul, vector, row)) % prime for row in rows)
+    return value, gradient
 
 
 def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
@@ -238,7 +234,9 @@ class Independent:
 
     def gradient(self, function: RationalFunction) -> list[int]:
         """A multiple of the gradient of a function of (variables, symbols, eps) with respect to the variables."""
-        return gradient_at(self.map, function, self.point)
+        field = GF(self.map.prime)
+        place = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
+        return [int(entry) for entry in slopes(function, field, place, self.map.dim)]
 
     def adds(self, row: list[int]) -> bool:
         """Whether a gradient is no combination of the others; nothing is added."""
@@ -250,10 +248,3 @@ class Independent:
             return False
         self.rows.append(row)
         return True
-
-
-def gradient_at(map_: ModularMap, function: RationalFunction, point: Point) -> list[int]:
-    """A multiple of the gradient of a function with respect to the variables at a point."""
-    field = GF(map_.prime)
-    place = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
-    return [int(entry) for entry in slopes(function, field, place, map_.dim)]

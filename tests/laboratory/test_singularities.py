@@ -4,14 +4,14 @@ import random
 from itertools import islice
 
 import pytest
-from flint import fmpq, nmod_poly
+from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.singular import jets, outcomes
+from kahanmaps.laboratory.singular import outcomes
 from kahanmaps.laboratory.singular.jets import (
     image_of,
     images_of_curve,
@@ -28,14 +28,6 @@ PRIME = 2_305_843_009_213_693_951
 def runs(name: str, **options):
     system = load(name).system
     return [singularities(system, eps, **options) for eps in default_eps(system, 0)]
-
-
-@pytest.mark.parametrize("known", [1, 5, 24, 25])
-@pytest.mark.parametrize("name", ["paper_m3", "clebsch_first_flow"])
-def test_rows_along_a_curve_are_those_of_the_equation(name, known):
-    equation, rng = KahanMap(load(name).system, fmpq(3, 11), GF(PRIME)).equation, random.Random(known)
-    X = [nmod_poly([rng.randrange(PRIME) for _ in range(known)], PRIME) for _ in range(7)]
-    assert jets._rows(equation, X, known) == equation.rows(X, 0 * X[0])
 
 
 INTEGRABLE = ["weierstrass", "planar_cubic_hamiltonian", "volterra_periodic_4", "paper_m2"]

@@ -62,11 +62,6 @@ def _algebra(run: Run, **_: Any) -> TensorStructure | None:
     return None if isinstance(run.found.normal_form, SystemNormalForm) else tensor_structure(run.field)
 
 
-def _algebra_json(found: Findings) -> dict[str, Any]:
-    known = found.tensor
-    return {"algebra": None if known is None else attributes(known, "text", "C", "rank", chi="chi_text")}
-
-
 def _singularities(run: Run, seconds: float, **budget: Any) -> list[SingularityRun]:
     """What becomes of contracted hypersurfaces, at two values of eps or the given one; none of too large a map."""
     values = default_eps(run.map, run.seed) if run.found.eps is None else (run.found.eps,)
@@ -74,10 +69,6 @@ def _singularities(run: Run, seconds: float, **budget: Any) -> list[SingularityR
     if not all(can_be_written(run.map, value, seconds) for value in values):
         return []
     return [follow(run.map, value, seed=run.seed, seconds=seconds, **budget) for value in values]
-
-
-def _singularities_json(found: Findings) -> dict[str, Any]:
-    return {"singularities": [attributes(run, "eps", "verdict", "followed", "text") for run in found.singularities]}
 
 
 def _degrees(run: Run, **budget: Any) -> DegreeGrowth:
@@ -117,10 +108,6 @@ def _relations(run: Run, **_: Any) -> tuple[SparseRelation, ...]:
         first = 1 + len({name for relation in found for name in relation.names})
         found += sparse_relations(maps, degree, run.map.variables, first=first) or ()
     return found
-
-
-def _relations_json(found: Findings) -> dict[str, Any]:
-    return {"hirota_kimura": [relation.text for relation in found.relations]}
 
 
 def _poisson(run: Run, **budget: Any) -> PoissonSearch | None:
@@ -166,7 +153,12 @@ ANALYSES = (
         reads=("Hamiltonian structure", "a larger algebra"),
         json=_family_json,
     ),
-    Part("a larger algebra", _algebra, result="tensor", json=_algebra_json),
+    Part(
+        "a larger algebra",
+        _algebra,
+        result="tensor",
+        json=lambda found: {"algebra": found.tensor and attributes(found.tensor, "text", "C", "rank", chi="chi_text")},
+    ),
     Part(
         "fixed points",
         lambda run, seconds, **_: fixed_points(run.field, seconds=seconds),
@@ -190,7 +182,9 @@ ANALYSES = (
         share=0.4,
         slow_above=WRITTEN_DIMENSION,
         is_apart=True,
-        json=_singularities_json,
+        json=lambda found: {
+            "singularities": [attributes(run, "eps", "verdict", "followed", "text") for run in found.singularities]
+        },
     ),
     Part("degrees", _degrees, "growth", statements.of_growth, Of.EVERY, share=0.25, reads=("heights",), is_apart=True),
     Part(
@@ -203,7 +197,13 @@ ANALYSES = (
         reads=("the commuting family", "degrees", "invariant curves", "relations along orbits"),
     ),
     Part("invariant curves", _curves, of=Of.MAPS_OVER_Q, result="pencil", json=_curves_json),
-    Part("relations along orbits", _relations, of=Of.EVERY, result="relations", json=_relations_json),
+    Part(
+        "relations along orbits",
+        _relations,
+        of=Of.EVERY,
+        result="relations",
+        json=lambda found: {"hirota_kimura": [relation.text for relation in found.relations]},
+    ),
     Part(
         "Poisson tensors",
         _poisson,

@@ -7,21 +7,21 @@ has degree 1 on projective space, which is decided by composing formulas, d_(n +
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
 import flint
-from flint import arb, fmpq, fmpz_mat, fmpz_poly
+from flint import fmpq, fmpz_mat, fmpz_poly
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.growth.recurrences import GrowthRate
+from kahanmaps.laboratory.growth.recurrences import GrowthRate, growth_rate, polynomial_growth
 from kahanmaps.maps.implicit import BirationalMap
 
 _BUDGET = 1_000_000  # products of terms, to compose formulas
@@ -117,9 +117,7 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     if rate.minimal_polynomial != fmpz_poly([-1, 1]):
         reason = f"the spectral radius of the exponent matrix {rows} of a monomial map"
         return GrowthProof(Growth.EXPONENTIAL, power, rate, reason)
-    classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
-    growth = classes[power] if power < 3 else Growth.POLYNOMIAL
-    return GrowthProof(growth, power, rate, f"powers of the exponent matrix {rows} of a monomial map")
+    return GrowthProof(polynomial_growth(power), power, rate, f"powers of the exponent matrix {rows} of a monomial map")
 
 
 def monomial_period(map_: BirationalMap, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
@@ -165,20 +163,15 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
                 (root.real * root.real + root.imag * root.imag, k) for roots, k in eigenvalues for root, _ in roots
             ]
             largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(square)]
-            # by Horner's rule: python-flint has no value of an integer polynomial at a ball
-            values = [reduce(lambda total, c: total * radius + c, reversed(g.coeffs()), arb(0)) for g in numbers]
-            candidates = [g for g, value in zip(numbers, values, strict=True) if value.contains(0)]
+            roots_of: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in numbers]
+            candidates = [g for g, roots in roots_of if any((root - radius).contains(0) for root, _ in roots)]
             # The square of a modulus is a root of the radical too, so that a ball that meets that of one root only
             # is that root.
             is_decided = all(square > other for other in others) and not any(
                 modulus.overlaps(other) for modulus, _ in largest for other in others
             )
         if is_decided and len(candidates) == 1:
-            (polynomial,), size = candidates, max(k for _, k in largest)
-            if polynomial.degree() == 1:
-                integer = str(-polynomial[0])
-                return GrowthRate(polynomial, integer, integer, size)
-            return GrowthRate(polynomial, radius.str(40), radius.str(21, radius=False), size)
+            return growth_rate(candidates[0], radius, max(k for _, k in largest))
         bits *= 2
 
 
@@ -202,7 +195,10 @@ def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> Growth
         is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
     except (BudgetExceeded, SingularStep):
         return None
-    if not is_identity and _degree([(entry.above, entry.below) for entry in point], n) != 1:
+    common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.below for entry in point))
+    forms = [entry.above * (common / entry.below) for entry in point] + [common]
+    # Coordinates are in lowest terms: this is the degree on projective space.
+    if not is_identity and max(degree_in(form, n) for form in forms) != 1:
         return None
     linear = period
     with suppress(BudgetExceeded, SingularStep):
@@ -215,10 +211,3 @@ def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> Growth
     iterate = "the map" if period == 1 else f"iterate {period}"
     reason = f"Phi^{period} is the identity" if is_identity else f"{iterate} is linear on projective space"
     return GrowthProof(Growth.BOUNDED, 0, GrowthRate(fmpz_poly([-1, 1]), "1", "1", 1), reason, period, is_identity)
-
-
-def _degree(fractions: Sequence[tuple[Any, Any]], n: int) -> int:
-    """The degree on projective space of a map with these coordinates in lowest terms, in the first n variables."""
-    common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (below for _, below in fractions))
-    forms = [above * (common / below) for above, below in fractions] + [common]
-    return max(int(sum(m[:n])) for form in forms for m in form.monoms())

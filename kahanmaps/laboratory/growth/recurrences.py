@@ -56,6 +56,19 @@ class GrowthRate:
         return {**size, "minimal_polynomial": coefficients, "multiplicity": self.multiplicity}
 
 
+def growth_rate(minimal_polynomial: fmpz_poly, ball: arb, multiplicity: int) -> GrowthRate:
+    """The root of an irreducible polynomial that is in the ball."""
+    whole = str(-minimal_polynomial[0])
+    digits = (whole, whole) if minimal_polynomial.degree() == 1 else (ball.str(40), ball.str(21, radius=False))
+    return GrowthRate(minimal_polynomial, *digits, multiplicity)
+
+
+def polynomial_growth(power: int) -> Growth:
+    """The kind of growth as n^power."""
+    classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
+    return classes[power] if power < 3 else Growth.POLYNOMIAL
+
+
 @dataclass(frozen=True)
 class Recurrence:
     """A linear recurrence of a_0, a_1, ..., shortest possible, that holds for all `terms` terms at hand.
@@ -121,10 +134,7 @@ class Recurrence:
         """The kind of growth."""
         if not self.factors:
             return Growth.ZERO
-        if not self.is_polynomial:
-            return Growth.EXPONENTIAL
-        classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
-        return classes[self.power] if self.power < 3 else Growth.POLYNOMIAL
+        return polynomial_growth(self.power) if self.is_polynomial else Growth.EXPONENTIAL
 
     @cached_property
     def rate(self) -> GrowthRate | None:
@@ -147,9 +157,7 @@ class Recurrence:
             if best is None or any(modulus > best[0] for modulus in moduli):
                 return None
             value, factor, multiplicity = best
-            whole = str(-factor[0])
-            digits = (whole, whole) if factor.degree() == 1 else (value.str(40), value.str(21, radius=False))
-            return GrowthRate(factor, *digits, multiplicity)
+            return growth_rate(factor, value, multiplicity)
 
     @cached_property
     def closed_form(self) -> str | None:

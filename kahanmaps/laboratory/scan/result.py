@@ -8,7 +8,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.fields import GF, QQ, Field
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.algebra.written.text import format_number, format_polynomial
@@ -68,11 +68,9 @@ class Component:
             return self.member_text
         return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
 
-    def contains(self, point: Sequence[Any], prime: int | None = None) -> bool:
-        """Whether the equations hold at a rational point, or at one modulo a prime."""
-        field: Field = QQ if prime is None else GF(prime)
-        values = [field.convert(x) for x in point]
-        return all(field.is_zero(evaluate(equation, field, values)) for equation in self.equations)
+    def contains(self, point: Sequence[fmpq]) -> bool:
+        """Whether the equations hold at a rational point."""
+        return not any(evaluate(equation, QQ, point) for equation in self.equations)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; equations as text."""

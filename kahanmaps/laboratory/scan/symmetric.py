@@ -105,13 +105,9 @@ def _matters(change: Change, components: Sequence[Component], names: Sequence[st
 
     def moved_by(equation: fmpq_mpoly) -> fmpq_mpoly:
         """What holds where the image of a point satisfies an equation; a constant where only points at infinity do."""
-        degree, total = equation.total_degree(), 0 * below
-        for exponents, coefficient in equation.terms():
-            term = coefficient * below ** (degree - sum(map(int, exponents)))
-            for image, exponent in zip(images, exponents, strict=True):
-                term *= image ** int(exponent)
-            total += term
-        return primitive_part(total)[1]
+        terms = {(*m, equation.total_degree() - sum(m)): c for m, c in equation.terms()}
+        form = ring([f"x{k}" for k in range(len(images) + 1)]).from_dict(terms)
+        return primitive_part(form.compose(*images, below, ctx=below.context()))[1]
 
     known = {(str(one.equations[0]), one.degrees) for one in components if len(one.equations) == 1}
     matters = False

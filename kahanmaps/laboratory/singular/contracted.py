@@ -30,7 +30,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range
+from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range, divided
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
@@ -180,21 +180,15 @@ class _Curve:
 
     def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
         """The rows of `Orders` for steps along the curve but the last, with forms in place of hypersurfaces."""
-        return tuple((mu, *level) for mu, level in zip(self.divided(run), self.levels(run)[1:], strict=False))
-
-    def divided(self, run: Sequence[Step]) -> list[int]:
-        """The powers of t divided out that belong to the map."""
-        before = [self.own, *(step.orders for step in run)]
-        return [
-            step.common - sum(k * order for k, order in zip(self.excess, orders, strict=True))
-            for step, orders in zip(run, before, strict=False)
-        ]
+        return tuple(
+            (mu, *level) for mu, level in zip(divided(run, self.own, self.excess), self.levels(run)[1:], strict=False)
+        )
 
     def levels(self, run: Sequence[Step]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
         poles, found = len(self.forms.poles), []
         orders = [self.own, *(step.orders for step in run)]
-        for mu, here, there in zip(self.divided(run), orders, orders[1:], strict=False):
+        for mu, here, there in zip(divided(run, self.own, self.excess), orders, orders[1:], strict=False):
             images = zip(self.forms.images, there[poles:-1], strict=True)
             found.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
         return found
@@ -243,8 +237,8 @@ class _Resolved:
 
     def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
         """Those of the steps but the last. Raises OrdersUnknown."""
-        found = []
-        for t, (mu, level) in enumerate(zip(self.curve.divided(run), self.curve.levels(run)[1:], strict=False)):
+        found, mus = [], divided(run, self.curve.own, self.curve.excess)
+        for t, (mu, level) in enumerate(zip(mus, self.curve.levels(run)[1:], strict=False)):
             column = fmpq_mat(len(level), 1, list(level))
             if t not in self.told:
                 self.told[t] = self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column

@@ -154,12 +154,20 @@ class Tracked:
         """The rows of `Orders` for steps along a curve. Where nothing is tracked det M(x) stands for it."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
-        found, before = [], self.first
-        for step in run:
-            divided = step.common - sum(k * order for k, order in zip(self.excess, before, strict=True))
-            found.append((divided, *step.orders[: self.critical]))
-            before = step.orders
-        return tuple(found)
+        pairs = zip(divided(run, self.first, self.excess), run, strict=True)
+        return tuple((mu, *step.orders[: self.critical]) for mu, step in pairs)
+
+
+def divided(run: Sequence[Step], first: Sequence[int], excess: Sequence[int]) -> list[int]:
+    """The powers of t divided out that belong to the map, not to the common factor of the minors of its equation.
+
+    `first` are the orders of the functions before the steps, `excess` their exponents in that factor.
+    """
+    before = [first, *(step.orders for step in run)]
+    return [
+        step.common - sum(k * order for k, order in zip(excess, orders, strict=True))
+        for step, orders in zip(run, before, strict=False)
+    ]
 
 
 NOTHING = Tracked()

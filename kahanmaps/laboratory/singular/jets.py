@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
-from itertools import chain, count
+from itertools import count
 from typing import Any
 
 from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
@@ -25,8 +24,6 @@ Function = Callable[[Sequence[nmod_poly], int], int | None]
 Place = tuple[int, int, int]  # an exponent of t, a row and a column
 _ELIMINATED = 4  # the least dimension in which there are more minors than steps of an elimination
 _FEW = 4  # terms, of which mostly one is the first that is not zero
-_SHORT = 24  # terms of series for which one long product is quicker than many short ones, if there are so many times
-_MANY = 3  # more of these than entries
 
 
 class PrecisionTooLow(ArithmeticError):
@@ -155,34 +152,11 @@ def _moved(
         return left.mul_low(right, known)
 
     if equation.dim >= _ELIMINATED and equation.explicit is None:
-        return kernel(_rows(equation, equation.monomials(X, times), known), precision, known, places)
+        return kernel(equation.rows(equation.monomials(X, times), zero), precision, known, places)
     image = equation.image(X, zero, times)
     if not places:
         places.append(_least([image], [0], range(len(image)), precision))
     return [entry.right_shift(places[0][0]) for entry in image]
-
-
-def _rows(equation: Equation, monomials: Sequence[nmod_poly], known: int) -> list[list[nmod_poly]]:
-    """The entries of L along a curve: where they have many terms, all at once, as sections of one long polynomial."""
-    n, zero = equation.dim, monomials[0] * 0
-    if known > _SHORT or sum(len(entry) for row in equation.terms for entry in row) < _MANY * n * (n + 1):
-        return equation.rows(monomials, zero)
-    long = sum((X * c for X, c in zip(monomials, _spread(equation, known), strict=True)), zero)
-    return [
-        [long.right_shift(known * place).truncate(known) for place in range(i * (n + 1), (i + 1) * (n + 1))]
-        for i in range(n)
-    ]
-
-
-@lru_cache(32)
-def _spread(equation: Equation, known: int) -> list[nmod_poly]:
-    """For each monomial its coefficients in the entries of L, `known` places apart."""
-    n, prime = equation.dim, equation.over.characteristic
-    found = [[0] * (known * n * (n + 1)) for _ in equation.exponents]
-    for place, entry in enumerate(chain.from_iterable(equation.terms)):
-        for k, c in entry:
-            found[k][known * place] = int(c)
-    return [nmod_poly(coefficients, prime) for coefficients in found]
 
 
 def kernel(

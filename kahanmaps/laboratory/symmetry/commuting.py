@@ -197,21 +197,21 @@ def commuting_systems(
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a positive number")
     settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
-    search = _Search(system, shape, settings, time.monotonic() + seconds, C)
+    search = _Search(system, settings, time.monotonic() + seconds, C, CommutingSystems(system, shape))
     search.run()
     return search.found
 
 
+@dataclass
 class _Search:
-    def __init__(
-        self, f: QuadraticSystem, shape: str, settings: Settings, deadline: float, C: fmpq_mat | None = None
-    ) -> None:
-        self.C = C
-        self.f, self.settings, self.deadline = f, settings, deadline
-        self.found = CommutingSystems(f, shape)
-        self.space = CommutingSpace((), (), 0)
-        self.points: list[Component] = []
-        self.families: list[Component] = []
+    f: QuadraticSystem
+    settings: Settings
+    deadline: float
+    C: fmpq_mat | None
+    found: CommutingSystems
+    space: CommutingSpace = field(default_factory=lambda: CommutingSpace((), (), 0))
+    points: list[Component] = field(default_factory=list)
+    families: list[Component] = field(default_factory=list)
 
     def run(self) -> None:
         f, found = self.f, self.found
