@@ -12,7 +12,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, islice, product
 from typing import Any
 
@@ -177,13 +177,8 @@ def scan(
     known, missed = run.each(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
     run.omit(missed, f"the growth on {missed} components")
     kinds = {one.degrees: one.growth.growth for one in reversed(known) if one.growth is not None}
-    known.sort(
-        key=lambda one: (
-            OF_DEGREES.index(kinds.get(one.degrees, Growth.UNKNOWN)),
-            one.degrees[::-1],
-            one.text,
-        )
-    )
+    kinds |= {one.degrees: Growth.UNKNOWN for one in known if one.degrees not in kinds}
+    known.sort(key=lambda one: (OF_DEGREES.index(kinds[one.degrees]), one.degrees[::-1], one.text))
     if analysis is not None:
         points: set[Degrees] = set()
 
@@ -200,43 +195,48 @@ def scan(
 
         known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
-    return run.result(known, tuple(symmetries(run.sweeps, known, names)))
+    sweeps = tuple(run.sweeps)
+    left = tuple(_left(one, known) for one in sweeps)
+    symmetric = tuple(symmetries(sweeps, known, names))
+    ended = "interrupted" if run.is_interrupted else "time" if run.omitted else "complete"
+    found = file, names, exact, seed, sweeps[0].generic if sweeps else (), tuple(known)
+    return Scan(*found, sweeps, left, symmetric, ended, tuple(run.omitted))
 
 
+@dataclass
 class _Sweeping:
     """The sweeps of one scan as they are made, the time for it, and what was left out."""
 
-    def __init__(
-        self,
-        family: Scanned,
-        start: str,
-        measured: dict[str, Any],
-        seconds: float,
-        progress: Progress,
-    ) -> None:
-        self.family, self.count, self.sweeps, self.omitted = family, len(family.names), list[Sweep](), list[str]()
-        self._start, self._measured, self._seconds, self._progress = start, measured, seconds, progress
-        # Not before: loops are compiled with the first members, once on a machine, and that may take all the time.
-        self.began = time.monotonic()
-        self._doing, self._interrupted, self._total = "scan", False, 0
+    family: Scanned
+    start: str  # of the seeds
+    measured: dict[str, Any]
+    seconds: float
+    progress: Progress
+    sweeps: list[Sweep] = field(default_factory=list)
+    omitted: list[str] = field(default_factory=list)
+    # Not before: loops are compiled with the first members, once on a machine, and that may take all the time.
+    began: float = field(default_factory=time.monotonic)
+    doing: str = "scan"
+    is_interrupted: bool = False
+    total: int = 0
 
     def tell(self, sentence: str) -> None:
         """Say what is done now."""
-        self._doing = sentence
-        if self._interrupted:
+        self.doing = sentence
+        if self.is_interrupted:
             raise TimeOver
         try:
-            self._progress(sentence)
+            self.progress(sentence)
         except TimeOver:
-            self._interrupted = True
+            self.is_interrupted = True
             raise
 
     def until(self, part: float) -> Callable[[], None]:
         """What raises TimeOver when a part of the time is over."""
 
         def check() -> None:
-            self.tell(self._doing)
-            if time.monotonic() > self.began + part * self._seconds:
+            self.tell(self.doing)
+            if time.monotonic() > self.began + part * self.seconds:
                 raise TimeOver
 
         return check
@@ -247,25 +247,25 @@ class _Sweeping:
 
     def take(self, plan: list[Choice]) -> None:
         """Sweep modulo these primes; what differs in the generic degrees from the largest ones is dropped."""
-        self._total += _size(self.count, plan)
+        self.total += _size(len(self.family.names), plan)
 
         def told(done: int, _: int) -> None:
             done += sum(one.seen for one in self.sweeps)
-            left = (time.monotonic() - self.began) * max(0, self._total - done) / done
-            self.tell(f"scan: {done} of {self._total} members, {left:.0f} s left")
+            left = (time.monotonic() - self.began) * max(0, self.total - done) / done
+            self.tell(f"scan: {done} of {self.total} members, {left:.0f} s left")
 
         for k, (p, lines, width) in enumerate(plan):
             try:
                 one = sweep(
                     self.family.map,
-                    self.count,
+                    len(self.family.names),
                     p,
                     self.family.eps,
                     on=None if lines is None else (lines, width),
-                    seed=f"{self._start} {p} {lines} {width}",
+                    seed=f"{self.start} {p} {lines} {width}",
                     check=self.until(_UNTIL[0]),
                     progress=told,
-                    **self._measured,
+                    **self.measured,
                 )
                 self.sweeps.append(one)
             except BadPrime:
@@ -284,7 +284,7 @@ class _Sweeping:
         lines = [one for one in self.sweeps if one.on_lines]
         again: list[Choice] = [(one.prime, _MORE * round(one.seen / one.prime), 1) for one in lines]
         is_lacking = any(_left(one, known) >= 0.5 * one.seen / one.prime for one in lines)
-        if not is_lacking or _size(self.count, again) > most:
+        if not is_lacking or _size(len(self.family.names), again) > most:
             return []
         self.sweeps[:] = [one for one in self.sweeps if not one.on_lines]
         return again
@@ -297,8 +297,8 @@ class _Sweeping:
         sizes = ((one, one.prime if one.complete else one.seen / one.prime) for one in self.sweeps)
         if primes is not None or not any(0 < _left(one, known) < 0.5 * size for one, size in sizes):
             return []
-        further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(self.count, ())]
-        totals = accumulate((_size(self.count, [one]) for one in further), initial=self._total)
+        further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(len(self.family.names), ())]
+        totals = accumulate((_size(len(self.family.names), [one]) for one in further), initial=self.total)
         return [one for one, total in zip(further, islice(totals, 1, None), strict=True) if total <= most]
 
     def each(
@@ -308,20 +308,12 @@ class _Sweeping:
         done, missed, check = list(known), 0, self.until(part)
         for k, one in enumerate(known):
             try:
-                self.tell(f"scan: {what} {k + 1} of {len(known)}")
+                self.doing = f"scan: {what} {k + 1} of {len(known)}"
                 check()
                 done[k] = work(one, check)
             except TimeOver:
                 missed += 1
         return done, missed
-
-    def result(self, known: Sequence[Component], symmetric: tuple[Any, ...]) -> Scan:
-        """The scan with these components."""
-        family, sweeps = self.family, tuple(self.sweeps)
-        left = tuple(_left(one, known) for one in sweeps)
-        asked = (family.file, family.names, family.eps, family.seed, sweeps[0].generic if sweeps else ())
-        ended = "interrupted" if self._interrupted else "time" if self.omitted else "complete"
-        return Scan(*asked, tuple(known), sweeps, left, symmetric, ended, tuple(self.omitted))
 
 
 def _growth(one: Component, family: Scanned, deadline: float) -> DegreeGrowth | None:
