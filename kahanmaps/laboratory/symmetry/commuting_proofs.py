@@ -12,14 +12,13 @@ dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M, M
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations_with_replacement
 from typing import Any
 
 from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import Component
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding
@@ -28,8 +27,8 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings
 from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, coefficients_of, combination, field_at
-from kahanmaps.maps.kahan import Kahan, KahanMapOver
-from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+from kahanmaps.maps.kahan import Kahan
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 _FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
 
@@ -97,23 +96,19 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Componen
     n, free = f.dim, family.free
     zero = family.values[0].context().constant(0)
     table = combination(space.fields, family.values, zero)
-    count, first = len(family.values), Kahan(f)
+    # The free parameters are the symbols of g.
+    symbols = [f"{''.join(f.variables)}{k}" for k in range(len(free))]
+    joint = ring((*f.variables, *symbols))
+    places = dict(zip(free, joint.gens()[n:], strict=True))
+    letters = [places.get(k, joint.constant(0)) for k in range(len(family.values))]
+    weights = [value.compose(*letters, ctx=joint) for value in family.values]
+    rhs = [0 * joint.gen(0)] * n
+    for weight, g in zip(weights, space.fields, strict=True):
+        rhs = [total + weight * p.compose(*joint.gens()[:n], ctx=joint) for total, p in zip(rhs, g.rhs, strict=True)]
+    first, second = Kahan(f), Kahan(QuadraticSystem(tuple(rhs), tuple(symbols)))
 
     def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides:
-        parameters = [field.zero] * count
-        for i, value in zip(free, point[n:], strict=True):
-            parameters[i] = value
-        two, tensor = field.convert(2), [field.zero] * (n**3)
-        linear, constants = [], []
-        for i, row in enumerate(table):  # g, whose coefficients are polynomials in the parameters
-            values = [evaluate(p, field, parameters) for p in row]
-            for value, (j, k) in zip(values, combinations_with_replacement(range(n), 2), strict=False):
-                tensor[(i * n + j) * n + k] = tensor[(i * n + k) * n + j] = value * two if j == k else value
-            linear += values[-n - 1 : -1]
-            constants.append(values[-1])
-        g = SystemOver(field, field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants))
-        phi_f, phi_g = first.at(eps, field), KahanMapOver(g, eps)
-        x = point[:n]
+        phi_f, phi_g, x = first.at(eps, field), second.at(eps, field, point[n:]), point[:n]
         return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
 
     labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")

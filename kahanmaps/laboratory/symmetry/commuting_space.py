@@ -110,40 +110,28 @@ class _Terms:
     """A quadratic field given by its coefficients (numbers, or polynomials in b), as steps of power series in eps."""
 
     def __init__(self, rows: Sequence[Sequence[Any]], n: int) -> None:
-        self._n = n
-        pairs = list(itertools.combinations_with_replacement(range(n), 2))
-        self._quadratic = [[(c, j, k) for c, (j, k) in zip(row, pairs, strict=False) if c != 0] for row in rows]
-        self._linear = [[(c, j) for j, c in enumerate(row[len(pairs) : len(pairs) + n]) if c != 0] for row in rows]
-        self._constant = [row[-1] for row in rows]
+        # With 1 as a further coordinate all terms are quadratic.
+        pairs = [*itertools.combinations_with_replacement(range(n), 2), *((j, n) for j in range(n + 1))]
+        self._terms = [[(c, j, k) for c, (j, k) in zip(row, pairs, strict=True) if c != 0] for row in rows]
 
     def step(self, y: Series) -> Series:
         """y + 2 eps v with v = g(y) + eps g'(y) v, order by order."""
+        y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
         for order in range(len(y)):
-            value = list(self._constant) if order == 0 else [fmpq(0)] * self._n
-            for a in range(order + 1):
-                self._add(value, y[a], y[order - a], half=True)
-            for a in range(order):
-                self._add(value, y[a], v[order - 1 - a], half=False)
-            self._add_linear(value, y[order])
-            if order:
-                self._add_linear(value, v[order - 1])
+            value = [fmpq(0)] * len(y[0])
+            for i, terms in enumerate(self._terms):
+                for c, j, k in terms:
+                    for a in range(order + 1):
+                        product = y[a][j] * y[order - a][k]
+                        if a < order:
+                            w = v[order - 1 - a]
+                            product = product + y[a][j] * w[k] + y[a][k] * w[j]
+                        if product != 0:
+                            value[i] = value[i] + c * product
             v.append(value)
-        return [y[0], *([a + 2 * b for a, b in zip(y[k], v[k - 1], strict=True)] for k in range(1, len(y)))]
-
-    def _add(self, value: list[Any], y: Sequence[Any], z: Sequence[Any], half: bool) -> None:
-        """value += Q(y, z), or twice that."""
-        for i, terms in enumerate(self._quadratic):
-            for c, j, k in terms:
-                product = y[j] * z[k] if half else y[j] * z[k] + y[k] * z[j]
-                if product != 0:
-                    value[i] = value[i] + c * product
-
-    def _add_linear(self, value: list[Any], y: Sequence[Any]) -> None:
-        for i, terms in enumerate(self._linear):
-            for c, j in terms:
-                if y[j] != 0:
-                    value[i] = value[i] + c * y[j]
+        moved = [y[0], *([a + 2 * b for a, b in zip(y[k], v[k - 1], strict=True)] for k in range(1, len(y)))]
+        return [row[:-1] for row in moved]
 
 
 @dataclass(frozen=True)
@@ -250,13 +238,10 @@ def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:
     >>> bracket_vanishes(f, f), bracket_vanishes(f, QuadraticSystem.from_text(["x", "y"], ["x", "y"]))
     (True, False)
     """
-    for a, b in zip(f.rhs, g.rhs, strict=True):
-        total = a.context().constant(0)
-        for k in range(f.dim):
-            total = total + a.derivative(k) * g.rhs[k] - b.derivative(k) * f.rhs[k]
-        if not total.is_zero():
-            return False
-    return True
+    return all(
+        sum((a.derivative(k) * g.rhs[k] - b.derivative(k) * f.rhs[k] for k in range(f.dim)), 0 * a).is_zero()
+        for a, b in zip(f.rhs, g.rhs, strict=True)
+    )
 
 
 def _independent_components(f: QuadraticSystem) -> list[int]:
