@@ -24,7 +24,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from math import prod
 from typing import Any
@@ -121,11 +121,9 @@ def enclose(
             continue
         if found is None:
             return None
-        lower, steps, below, above = found
         with flint.ctx.workprec(128):  # the least (deg f^n)^(1/n) of the iterates that are written out, rounded up
             roots = [arb(degree).root(n) for n, degree in enumerate(_written_degrees(map_, eps, end), 1)]
-            upper = decimal(min(roots).upper())
-        return Enclosure(lower, upper, steps, below, above, over.field.characteristic, int(over.eps))
+            return replace(found, upper=decimal(min(roots).upper()))
     return None
 
 
@@ -176,10 +174,8 @@ def lower_bound(below: int, above: int, steps: int) -> arb | None:
         return (arb(fmpq(below - 1, 2 * (above - 1)) - 1).acosh() / steps).exp()
 
 
-def _lower(
-    map_: MapOver, rng: random.Random, end: float, progress: Callable[[str], None]
-) -> tuple[str, int, int, int] | None:
-    """The best lower bound above 1, rounded down, with n, a lower bound of deg f^2n and an upper one of deg f^n."""
+def _lower(map_: MapOver, rng: random.Random, end: float, progress: Callable[[str], None]) -> Enclosure | None:
+    """The best lower bound above 1, rounded down; there is no upper one yet."""
     line = Line(map_, rng, end - 0.5 * max(0.0, end - time.monotonic()), _LARGEST)
     degrees = [1]
     try:
@@ -207,7 +203,10 @@ def _lower(
         progress(f"dynamical degree: tangents of a conic, degrees of iterate {steps} up to {largest}")
     above = degree_above(largest, _LINES)
     bound = lower_bound(degrees[2 * steps], above, steps)
-    return None if bound is None else (decimal(bound.lower(), -1), steps, degrees[2 * steps], above)
+    if bound is None:
+        return None
+    prime, eps = map_.field.characteristic, int(map_.eps)
+    return Enclosure(decimal(bound.lower(), -1), "", steps, degrees[2 * steps], above, prime, eps)
 
 
 def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
