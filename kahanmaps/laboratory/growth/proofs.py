@@ -144,34 +144,26 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
     '1.21060779440608593277, root of t^6 - t^4 - 1'
     """
     minimal = [(factor, int(k)) for factor, k in matrix.minpoly().factor()[1]]
-    # The square of the radius is the product of an eigenvalue and its conjugate, thus the largest real root of this
-    # polynomial, the roots of which are all products of two eigenvalues. FLINT isolates roots from each other.
+    # The square of a modulus is the product of an eigenvalue and its conjugate, thus a root of the polynomial that has
+    # all products of two eigenvalues as roots; that of the radius is the largest real one.
     rows = matrix.tolist()
     square_of = fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
     products = [factor for factor, _ in square_of.charpoly().factor()[1]]
-    radical = reduce(fmpz_poly.__mul__, products)
     numbers = [g for factor in products for g, _ in factor(fmpz_poly([0, 0, 1])).factor()[1]]
     bits = _BITS
     while True:
         with flint.ctx.workprec(bits):
-            isolated: Any = radical.complex_roots()
-            reals = [root.real for root, _ in isolated if root.imag == 0]
-            square, *others = sorted(reals, key=lambda root: root.mid().fmpq(), reverse=True)
-            radius = square.sqrt()
+            isolated: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in numbers]
+            reals = [(root.real, g) for g, roots in isolated for root, _ in roots if root.imag == 0]
+            (radius, polynomial), *others = sorted(reals, key=lambda one: one[0].mid().fmpq(), reverse=True)
             eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
-            moduli = [
-                (root.real * root.real + root.imag * root.imag, k) for roots, k in eigenvalues for root, _ in roots
-            ]
-            largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(square)]
-            roots_of: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in numbers]
-            candidates = [g for g, roots in roots_of if any((root - radius).contains(0) for root, _ in roots)]
-            # The square of a modulus is a root of the radical too, so that a ball that meets that of one root only
-            # is that root.
-            is_decided = all(square > other for other in others) and not any(
-                modulus.overlaps(other) for modulus, _ in largest for other in others
-            )
-        if is_decided and len(candidates) == 1:
-            return growth_rate(candidates[0], radius, max(k for _, k in largest))
+            moduli = [(abs(root), k) for roots, k in eigenvalues for root, _ in roots]
+            largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]
+            # Moduli are among the real roots, so that a ball that meets that of one root only is that root.
+            if all(radius > other for other, _ in others) and not any(
+                modulus.overlaps(other) for modulus, _ in largest for other, _ in others
+            ):
+                return growth_rate(polynomial, radius, max(k for _, k in largest))
         bits *= 2
 
 

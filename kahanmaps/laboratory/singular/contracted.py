@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range, divided
-from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo
+from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo, roots_modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
@@ -398,7 +398,7 @@ def _on_line(
         raise OrdersUnknown("the map or its inverse has no value anywhere")
     radical = product // product.gcd(product.derivative())
     every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
-    points = [tuple((x + int(s) * v) % p for x, v in zip(a, b, strict=True)) for s, _ in radical.roots()]
+    points = [tuple((x + s * v) % p for x, v in zip(a, b, strict=True)) for s in roots_modulo(radical)]
     (inverse,) = map_.inverse.equations
     curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, limits) for point in points]
     return degree, int(radical.degree()), curves

@@ -211,6 +211,19 @@ def _least(rows: Sequence[Sequence[nmod_poly]], left_rows: Sequence[int], left: 
     return best
 
 
+def roots_modulo(polynomial: nmod_poly) -> list[int]:
+    """The different zeros in GF(p) of a polynomial that is no constant.
+
+    Their product is found first: a whole factorization would take a hundred times as long at high degrees.
+
+    >>> sorted(roots_modulo(nmod_poly([1, 0, 1], 5) * nmod_poly([2, 0, 1], 5)))
+    [2, 3]
+    """
+    t = nmod_poly([0, 1], polynomial.modulus())
+    linear = polynomial.gcd(t.pow_mod(polynomial.modulus(), polynomial) - t) if polynomial.degree() > 1 else polynomial
+    return [-int(factor[0]) % polynomial.modulus() for factor, _ in linear.factor()[1]]
+
+
 def modulo(form: Any, field: PrimeField) -> nmod_mpoly:
     """A form over Q modulo a prime. Raises BadPrime."""
     context = nmod_mpoly_ctx.get(form.context().names(), modulus=field.prime, ordering=Ordering.degrevlex)

@@ -34,6 +34,7 @@ from kahanmaps.laboratory.singular.jets import (
     PrecisionTooLow,
     Step,
     form_order,
+    roots_modulo,
 )
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
@@ -100,14 +101,10 @@ def critical_points(
     if value.degree() < 1:
         return [], {}
     found, degrees = [], dict[int, int]()
-    t = nmod_poly([0, 1], p)
     for part, exponent in value.factor_squarefree()[1]:
         power = int(exponent)
         degrees[power] = degrees.get(power, 0) + int(part.degree())
-        # Only zeros in GF(p) are of use: a whole factorization would take a hundred times as long at high degrees.
-        linear = part.gcd(t.pow_mod(p, part) - t) if part.degree() > 1 else part
-        for factor, _ in linear.factor()[1]:
-            s = -int(factor[0])
+        for s in roots_modulo(part):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
             # (t F_v + d F_w)^power G + ... A power of t above all those that count stands for d.
@@ -282,8 +279,7 @@ def outcome_of(
             a, b = ([rng.randrange(p) for _ in range(size)] for _ in range(2))
             line = evaluate(one.form, field, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)])
             tracked = tracking.along(one.form, field)
-            parts = line.factor()[1] if line.degree() > 0 else []
-            roots = [-int(part[0]) for part, _ in parts if part.degree() == 1]
+            roots = roots_modulo(line) if line.degree() > 0 else []
             if not roots or p in outcomes:
                 continue
             point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
