@@ -37,13 +37,11 @@ class Pieces:
     `flats` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
     `forms` has irreducible hypersurfaces by the affine subspace they are in (no rows: the whole space). Each
     is the coefficients of the monomials of `exponents_up_to`, in their order, in the variables that are free there.
-    `left` points are in none of them.
     """
 
     prime: int
     flats: dict[int, list[Rows]] = field(default_factory=dict)
     forms: dict[Rows, list[Form]] = field(default_factory=dict)
-    left: int = 0
 
 
 def pieces(
@@ -107,8 +105,6 @@ def pieces(
         equations = ([[*(int(i == j) for j in range(count)), -y] for i, y in enumerate(x)] for x in rest.tolist())
         single = [tuple(map(tuple, echelon(rows, prime))) for rows in equations]
         found.flats.setdefault(0, []).extend(single)
-        rest = rest[:0]
-    found.left = len(rest)
     return found
 
 
