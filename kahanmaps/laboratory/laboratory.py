@@ -151,9 +151,7 @@ class Laboratory:
             return "not"
         if self.system is None:
             return "symbol"
-        n = self.system.dim
-        terms = [monomial for polynomial in self.system.rhs for monomial in polynomial.monoms()]
-        return "by weight" if all(sum(int(e) for e in m[:n]) == 2 for m in terms) else "symbol"
+        return "by weight" if self.system.is_homogeneous else "symbol"
 
     @property
     def defect(self) -> str:

@@ -119,7 +119,6 @@ class _Known:
     system: QuadraticSystem
     defaults: dict[str, fmpq]
     monomials: tuple[Monomials, ...]
-    is_homogeneous: bool
 
 
 @lru_cache(maxsize=MAX_DIMENSION)
@@ -133,9 +132,7 @@ def _catalogue(dim: int) -> tuple[_Known, ...]:
         if len(file.parameters) <= dim + 2:
             system = with_symbols(file, tuple(file.parameters))
             if system.degree >= 2:
-                terms = [m for p in system.rhs for m in p.monoms()]
-                is_homogeneous = all(sum(m[:dim]) == 2 for m in terms)
-                found.append(_Known(name, system, dict(file.parameters), _quadratic_monomials(system), is_homogeneous))
+                found.append(_Known(name, system, dict(file.parameters), _quadratic_monomials(system)))
     return tuple(sorted(found, key=lambda one: len(one.defaults)))
 
 
@@ -194,7 +191,7 @@ def _matched(
     # No change of scale and no translation is tried first: then parameters are unknowns of linear equations as a rule.
     simple = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     shift, scale = simple[: n + 1], simple[n + 1 :][: len(entries)]
-    always = shift if f.is_homogeneous and g.is_homogeneous else []
+    always = shift if f.is_homogeneous and g.system.is_homogeneous else []
     for start in (always,) if is_scaled else ([*shift, *scale], [*always, *scale]):
         solved = solve_system([*highest, *start], unknowns.gens(), deadline)
         for component in (*solved.components, *solved.unsolved):
