@@ -222,15 +222,11 @@ class Scan(Printed):
                 for one in members
                 if one.verdict is not None
             ]
-        if not self.components:
-            lines.append(
-                (
-                    "found",
-                    f"no condition on the parameters where one of the first {len(self.generic)} degrees is smaller",
-                )
-            )
         if self.components:
             lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
+        else:
+            where = f"where one of the first {len(self.generic)} degrees is smaller"
+            lines.append(("found", f"no condition on the parameters {where}"))
         for images in self.symmetric:
             image = f"({', '.join(images)})" if len(images) > 1 else images[0]
             lines.append(("symmetry", f"{names} -> {image} permutes the slow members"))

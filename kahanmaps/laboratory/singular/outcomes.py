@@ -21,7 +21,6 @@ from typing import Any
 from flint import fmpq, nmod_poly
 
 from kahanmaps.algebra.fields import GF, PrimeField
-from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.residues import random_prime
@@ -444,11 +443,11 @@ def _outcome_at(
 
 def _tangents(point: Sequence[int], gradient: Sequence[int], field: PrimeField) -> list[list[int]] | None:
     """A basis of the tangent space of a hypersurface at a point, modulo the point itself; None in special position."""
-    size = len(point)
-    basis = [[int(entry) for entry in vector] for vector in nullspace(field, field.matrix(1, size, list(gradient)))]
-    # The point itself is tangent to the cone: a basis vector that occurs in it makes room for it. Basis vectors belong
-    # to the columns without the pivot, which is the first that is not zero.
-    pivot = next(k for k in range(size) if gradient[k])
-    free = [k for k in range(size) if k != pivot]
-    occurs = next((index for index, k in enumerate(free) if point[k]), None)
-    return None if occurs is None else basis[:occurs] + basis[occurs + 1 :]
+    p, places = field.prime, range(len(point))
+    pivot = next(k for k in places if gradient[k])
+    inverse = pow(gradient[pivot], -1, p)
+    # The point itself is tangent to the cone: a basis vector that occurs in it makes room for it.
+    occurs = next((k for k in places if k != pivot and point[k]), None)
+    free = [k for k in places if k not in (pivot, occurs)]
+    basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in places] for k in free]
+    return None if occurs is None else [[entry % p for entry in vector] for vector in basis]
