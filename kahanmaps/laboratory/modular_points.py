@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import random
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -168,9 +167,14 @@ def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: 
 
 def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
     """The value and the gradient at a point of the polynomial of degree at most `degree` with these coefficients."""
-    rows = [monomial_values(point, degree, prime), *slope_values(point, degree, prime)]
-    value, *gradient = (sum(map(operator.mul, vector, row)) % prime for row in rows)
-    return value, gradient
+    value, gradient = 0, [0] * len(point)
+    powers = monomial_values(point, degree, prime)
+    for coefficient, slopes, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
+        if coefficient:  # most are 0
+            value += coefficient * power
+            for variable, exponent, place in slopes:
+                gradient[variable] = (gradient[variable] + coefficient * exponent * powers[place]) % prime
+    return value % prime, gradient
 
 
 def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
