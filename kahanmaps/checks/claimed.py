@@ -50,7 +50,7 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
         free = (f"I{k}" for k in count(1) if f"I{k}" not in of_file)
         claims = {c if isinstance(c, str) and c in of_file else next(free): c for c in unnamed}
     if not claims:
-        raise InputError(f"found {claims!r}, expected at least one claim, or None for those of theorems and the file")
+        raise InputError("found no integral, expected at least one, or None for those of theorems and of the file")
     return {name: claimed_function(file, claim) for name, claim in claims.items()}
 
 

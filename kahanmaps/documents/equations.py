@@ -26,6 +26,7 @@ _PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "
 _TOKEN = re.compile(
     r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
 )
+_LATEX = ("dot", "ddot", "frac", "dfrac", "mathrm", "rm", "left", "begin", "d", "dt")
 _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 
 
@@ -309,6 +310,10 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
 
 def _hint(left: Sequence[str], piece: Sequence[str]) -> str:
     """What to type in the place of something that people put between equations."""
+    if "\\" in left:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
+        name = next((token for token in left if is_name(token) and token not in _LATEX), "x")
+        name, primes = name.removeprefix("d" if "dt" in left else ""), "''" if "ddot" in left else "'"
+        return f"; LaTeX is not read: write {name}{primes} = ..., and products with *"
     if left and left[0].isalpha() and not left[0].isascii():
         return f"; a name is made of ASCII letters, digits and _: rename {left[0]}"
     if len(left) == 1 and left[0][0] == "d" and is_name(left[0][1:]):

@@ -119,7 +119,7 @@ class _Lines:
                 self.definitions[words[0]] = f"({self.expanded(tokens[split:])})"
 
     def _values(self, words: list[str], values: dict[str, str]) -> None:
-        """a=1,b=-2.5 c=8/3 d: pairs with commas or blanks between them; a name alone has the value 0."""
+        """a=1,b=-2.5 c=8/3: pairs with commas or blanks between them; an initial value alone is 0, as in XPP."""
         k = 0
         while k < len(words):
             name = words[k]
@@ -132,6 +132,8 @@ class _Lines:
                     end += 2
                     self.notes.append(f"{name} = {''.join(words[k + 1 : end + 1])} is read as it stands, unlike in XPP")
                 value, k = "".join(words[k + 1 : end + 1]), end + 1
+            elif values is self.parameters:  # XPP reads 0, which is rarely what is meant
+                raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")
             values[name] = value
             k += words[k : k + 1] == [","]
 

@@ -231,7 +231,7 @@ def test_two_integrals_of_one_name_and_no_claims_at_all_are_wrong_use():
     file = file_of(LOTKA_VOLTERRA, I="x")
     with pytest.raises(InputError, match="two integrals of the name I"):
         check_integrals(file, QUICK, {"I": "y"}, known=True)
-    with pytest.raises(InputError, match="expected at least one claim"):
+    with pytest.raises(InputError, match="found no integral, expected at least one"):
         check_integrals(file, QUICK, [])
 
 

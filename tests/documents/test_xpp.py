@@ -46,7 +46,6 @@ def test_lines_of_equations_are_read_wherever_they_are_no_toml(where):
         ("x'=q*x\ny'=r\nq=x+1\nr=q-y", ["x^2 + x", "x - y + 1"]),  # definitions follow their use
         ("par a=3\n!b=a/2\nx'=b*y\ny'=-x", ["3/2*y", "-x"]),
         ("p a=1,b=-2 c=.5\nnumber d=1e-3\nx'=a*x+b*y\ny'=c+d", ["x - 2*y", "501/1000"]),
-        ("par a\nx'=a*x+y\ny'=1", ["y", "1"]),
         ("x(0)=1\nx'=y\\\n+1\ny'=x", ["y + 1", "x"]),
         ("x''=-x+x^2", ["vx", "x^2 - x"]),
     ],
@@ -73,6 +72,8 @@ def test_a_fraction_is_read_as_it_stands_and_a_note_says_that_xpp_does_not():
         ("", "found no equations"),
         ("# nothing", "found no equations"),
         ("par a=b\nx'=a*x", "parameters.a"),
+        ("par a\nx'=a*x", "line 1: found the parameter 'a' without a value, expected one: par a=0"),
+        ("par b=1, a c=2\nx'=a*x", "par a=0"),
         ("par eps=1\nx'=eps*x", "rename it"),
         ("x'=x^3", 'discretization = "polarised"'),
         ("\x00\x1b[31m", "line 1"),
