@@ -47,9 +47,19 @@ from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.paper import objects_over
 from kahanmaps.paper.controls import CONTROLS, broken
-from kahanmaps.paper.evaluate import UNDEFINED, Outcome, entries, evaluate, same, witness_of
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import SECTIONS, Claim, Kind, claims
+from kahanmaps.paper.registry import (
+    SECTIONS,
+    UNDEFINED,
+    Claim,
+    Kind,
+    Outcome,
+    claims,
+    entries,
+    evaluate,
+    same,
+    witness_of,
+)
 from kahanmaps.version import __version__
 
 MAX_M = 8

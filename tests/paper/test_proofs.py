@@ -14,8 +14,7 @@ from paper.members import member, named, point, verifier_of
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.paper import verify
-from kahanmaps.paper.evaluate import evaluate
-from kahanmaps.paper.registry import Claim, Kind, claims
+from kahanmaps.paper.registry import Claim, Kind, claims, evaluate
 from kahanmaps.paper.verify import normal_form_proof
 
 IDENTITIES = [c for c in claims() if c.kind is Kind.EQUAL and not c.misprint and c.symplectic]

@@ -17,8 +17,7 @@ from flint import fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.interpolation import Reconstruction, reconstruct
-from kahanmaps.algebra.modular_fit import BlackBox, Point
+from kahanmaps.algebra.interpolation import BlackBox, Point, Reconstruction, reconstruct
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root

@@ -7,9 +7,8 @@ from math import comb
 from typing import Any
 
 from kahanmaps.paper.claims.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
-from kahanmaps.paper.evaluate import entries
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import ClaimFunction, Kind, Pairs, claim
+from kahanmaps.paper.registry import ClaimFunction, Kind, Pairs, claim, entries
 from kahanmaps.paper.variations import VARIATIONS, Variation, jordan_block, varied
 
 _ITERATES = 4  # the first one that tells a planar Hamiltonian map from others

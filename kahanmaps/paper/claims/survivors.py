@@ -17,9 +17,8 @@ from kahanmaps.algebra.polynomials import monomials
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.paper.claims.further_claims import STATEMENTS
-from kahanmaps.paper.evaluate import UNDEFINED, Outcome, same, witness_of
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import ClaimFunction, claims
+from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, Outcome, claims, same, witness_of
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
