@@ -39,7 +39,7 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
     ("systems.quadratic.MAX_DIMENSION", 2, lambda: refused(lambda: km.System(PLANE_TEXT)), "of dimension 2"),
     ("documents.document.MAX_DIMENSION", 2, lambda: refused(lambda: km.parse_system(PLANE)), "found 2 variables"),
     (
-        "documents.composition._MOST_FACTORS",
+        "documents.document._MOST_FACTORS",
         3,
         lambda: refused(lambda: km.parse_system(f"[composition]\nof = [{CUBE}]\n")),
         "found more than",

@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from kahanmaps.algebra.fields import Element, Field, operand
-from kahanmaps.algebra.matrices import EntryMatrix, solve
+from kahanmaps.algebra.matrices import EntryMatrix, solve, trace
 from kahanmaps.errors import InputError, PrecisionLost, SingularMatrix
 
 
@@ -182,10 +182,7 @@ class DualMatrix:
             ratio = solve(self.value, self.slope)
         except (SingularMatrix, PrecisionLost):
             return Dual(self.field, value, self._slope_of_det())
-        total = self.field.base.zero
-        for i in range(self.nrows()):
-            total = total + ratio[i, i]
-        return Dual(self.field, value, value * total)
+        return Dual(self.field, value, value * trace(ratio))
 
     def _slope_of_det(self) -> Any:
         """The sum over all columns of det M0 with that column taken from M1; right for every M0."""

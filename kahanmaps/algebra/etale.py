@@ -141,20 +141,17 @@ class EtaleElement(Element):
 
     def _over(self, other: EtaleElement) -> EtaleElement:
         if max((max(c.p.bit_length(), c.q.bit_length()) for c in other.polynomial.coeffs()), default=0) > _LONG:
-            return self._over_long(other)
+            # A linear system over Q is ten times as fast as Euclid's algorithm for long coefficients.
+            try:
+                solution = other.matrix.solve(fmpq_mat(self.field.degree, 1, self.coefficients))
+            except ZeroDivisionError as error:
+                raise ZeroDivisionError(f"division by a zero divisor in {self.field}") from error
+            return EtaleElement(self.field, fmpq_poly(solution.entries()))
         common, inverse, _ = other.polynomial.xgcd(self.field.chi)
         if common.degree() != 0:
             what = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
             raise ZeroDivisionError(f"division by {what}")
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
-
-    def _over_long(self, other: EtaleElement) -> EtaleElement:
-        """The quotient by a linear system over Q: ten times as fast as Euclid's algorithm for long coefficients."""
-        try:
-            solution = other.matrix.solve(fmpq_mat(self.field.degree, 1, self.coefficients))
-        except ZeroDivisionError as error:
-            raise ZeroDivisionError(f"division by a zero divisor in {self.field}") from error
-        return EtaleElement(self.field, fmpq_poly(solution.entries()))
 
     def _same(self, other: EtaleElement) -> bool:
         return bool(self.polynomial == other.polynomial)

@@ -10,7 +10,6 @@ elements that FLINT does not have.
 from __future__ import annotations
 
 import random
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -28,10 +27,6 @@ from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 # FLINT proves primality of 512 bits in about 0.1 s; the cost grows steeply beyond.
 MAX_PRIME_BITS = 512
 MAX_BALL_BITS = 1_000_000
-
-_DECIMAL = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]{1,8})?"
-_BALL = re.compile(rf"\[(?:{_DECIMAL} )?\+/- {_DECIMAL}\]")
-_COMPLEX = re.compile(r"(?:(.*) ([+-]) )?(.*)j")  # the sign between the parts; that inside a ball is +/-
 
 
 def rational(value: Any) -> fmpq:
@@ -116,12 +111,8 @@ class Field(ABC):
     def convert(self, value: Any) -> Any:
         """The element that an exact number (int, Fraction, text, fmpz, fmpq) or an element stands for."""
 
-    def parse(self, text: str) -> Any:
-        """The element written as an integer, p/q or a decimal."""
-        return self.convert(text)
-
     def format(self, element: Any) -> str:
-        """The element as text; `parse` reads that of a number back."""
+        """The element as text; `convert` reads that of an exact number back."""
         return str(element)
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
@@ -395,7 +386,7 @@ class _Balls(Field):
         self.name = f"{self._letters}({bits})"
 
     def format(self, element: Any) -> str:
-        """Midpoint and radius, `[0.333333 +/- 1.0e-6]`; `parse` reads exact numbers and this form."""
+        """Midpoint and radius, `[0.333333 +/- 1.0e-6]`."""
         with self.working():
             return str(element.str(max(1, int(self.bits * 0.30103))))
 
@@ -441,15 +432,6 @@ class BallField(_Balls):
         with self.working():
             return arb(rational(value))
 
-    def parse(self, text: str) -> arb:
-        match = _BALL.fullmatch(text.strip())
-        if match is None:
-            return self.convert(text)
-        if len(text) > self.bits + 100:
-            raise InputError(f"found a ball of {len(text)} characters, too long for {self.bits} bits")
-        with self.working():
-            return arb(text.strip())
-
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> arb_mat:
         return arb_mat(rows, columns, [self.convert(entry) for entry in entries])
 
@@ -472,16 +454,6 @@ class ComplexBallField(_Balls):
         if isinstance(value, acb):
             return value
         return acb(RR(self.bits).convert(value))
-
-    def parse(self, text: str) -> acb:
-        """The element `a`, `bj`, `a + bj` or `a - bj`, where a and b are written as real balls are."""
-        real, found = RR(self.bits), _COMPLEX.fullmatch(text.strip())
-        if found is None:
-            return acb(real.parse(text))
-        left, sign, right = found.groups()
-        with self.working():
-            imaginary = real.parse(right)
-            return acb(real.zero if left is None else real.parse(left), -imaginary if sign == "-" else imaginary)
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> acb_mat:
         return acb_mat(rows, columns, [self.convert(entry) for entry in entries])
@@ -531,7 +503,7 @@ def RR(bits: int) -> BallField:
 def CC(bits: int) -> ComplexBallField:
     """Complex balls with `bits` bits of precision (2 to 1,000,000).
 
-    >>> CC(64).equal(CC(64).parse("1 + 2j") * CC(64).parse("1 - 2j"), CC(64).convert(5))
+    >>> CC(64).equal(CC(64).convert(acb(1, 2)) * CC(64).convert(acb(1, -2)), CC(64).convert(5))
     True
     """
     _check_bits(bits)

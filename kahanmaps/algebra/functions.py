@@ -247,36 +247,35 @@ class FunctionMatrix(EntryMatrix):
         """The determinant, of rows cleared of denominators, block by block."""
         total: Function = self.field.one
         for block in self._blocks():
-            rows, cleared = self._part(block, block)._polynomial_rows()
-            total = total * Function(self.field, _determinant(self.field, rows), cleared)
+            n = len(block)
+            rows, cleared = FunctionMatrix(
+                self.field, n, n, [self[i, j] for i in block for j in block]
+            )._polynomial_rows()
+            if len(rows) > _BY_MINORS:
+                value = _bareiss(self.field, rows)
+            else:
+                minor = _minors(self.field, [[*row, self.field.context.constant(0)] for row in rows])[-1]
+                value = -minor if len(rows) % 2 else minor
+            total = total * Function(self.field, value, cleared)
         return total
 
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
         """The solution X of self X = right by minors, block by block. Raises ZeroDivisionError if singular."""
-        columns = range(right._columns)
-        solution: dict[int, list[Function]] = {}
+        columns = right._columns
+        solution: list[list[Function]] = [[] for _ in range(self._rows)]
         for block in self._blocks():
-            rows = self._part(block, block)._solve_block(right._part(block, columns)).tolist()
-            solution.update(zip(block, rows, strict=True))
-        return FunctionMatrix(
-            self.field, self._rows, right._columns, [entry for i in range(self._rows) for entry in solution[i]]
-        )
-
-    def _solve_block(self, right: FunctionMatrix) -> FunctionMatrix:
-        n, columns = self._rows, right._columns
-        wide = [entry for mine, its in zip(self.tolist(), right.tolist(), strict=True) for entry in (*mine, *its)]
-        rows, _ = FunctionMatrix(self.field, n, n + columns, wide)._polynomial_rows()
-        solution: list[list[Function]] = []
-        for j in range(n, n + columns):
-            *above, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
-            if self.field.vanishes(last):
-                raise ZeroDivisionError("singular matrix in solve()")
+            n = len(block)
+            wide = [[*(self[i, j] for j in block), *(right[i, j] for j in range(columns))] for i in block]
+            flat = [entry for row in wide for entry in row]
+            rows, _ = FunctionMatrix(self.field, n, n + columns, flat)._polynomial_rows()
             sign = -1 if n % 2 else 1  # the denominator is the determinant itself, as elsewhere
-            solution.append([Function(self.field, entry * -sign, last * sign) for entry in above])
-        return FunctionMatrix(self.field, n, columns, [entry for row in zip(*solution, strict=True) for entry in row])
-
-    def _part(self, rows: Sequence[int], columns: Sequence[int]) -> FunctionMatrix:
-        return FunctionMatrix(self.field, len(rows), len(columns), [self[i, j] for i in rows for j in columns])
+            for j in range(n, n + columns):
+                *above, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
+                if self.field.vanishes(last):
+                    raise ZeroDivisionError("singular matrix in solve()")
+                for i, entry in zip(block, above, strict=True):
+                    solution[i].append(Function(self.field, entry * -sign, last * sign))
+        return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
     def _blocks(self) -> list[list[int]]:
         """The finest partition of the indices into blocks that the matrix does not mix."""
@@ -329,7 +328,13 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
         return minors
     budget = field.budget
     try:
-        minors = _expanded_minors(field, rows)
+        if len(rows) > _BY_MINORS:
+            columns = range(len(rows) + 1)
+            minors = [_bareiss(field, [[*row[:k], *row[k + 1 :]] for row in rows]) * (-1) ** k for k in columns]
+        else:
+            entries = [[None if entry.is_zero() else entry for entry in row] for row in rows]
+            found = kernel_minors(entries, field.times, field.require)
+            minors = [field.context.constant(0) if minor is None else minor for minor in found]
     except BudgetExceeded:
         _keep(key, [], budget + 1)
         raise
@@ -343,23 +348,6 @@ def _keep(key: bytes, minors: list[fmpq_mpoly], products: int) -> None:
         _kept[key] = minors, products
         while len(_kept) > _MOST_KEPT or sum(len(P) for kept, _ in _kept.values() for P in kept) > _MOST_KEPT_TERMS:
             del _kept[next(iter(_kept))]
-
-
-def _expanded_minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
-    if len(rows) > _BY_MINORS:
-        columns = range(len(rows) + 1)
-        return [_bareiss(field, [[*row[:k], *row[k + 1 :]] for row in rows]) * (-1) ** k for k in columns]
-    how = field.times, field.require
-    entries = [[None if entry.is_zero() else entry for entry in row] for row in rows]
-    return [field.context.constant(0) if minor is None else minor for minor in kernel_minors(entries, *how)]
-
-
-def _determinant(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> fmpq_mpoly:
-    """The determinant of a square matrix of polynomials."""
-    if len(rows) > _BY_MINORS:
-        return _bareiss(field, rows)
-    minor = _minors(field, [[*row, field.context.constant(0)] for row in rows])[-1]
-    return -minor if len(rows) % 2 else minor
 
 
 def _bareiss(field: FunctionField, matrix: list[list[fmpq_mpoly]]) -> fmpq_mpoly:

@@ -272,7 +272,11 @@ def _first_prime(values: Values, symbols: int, max_degree: int, rng: random.Rand
         moving = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
         for i in moving:
             if found[i].shape.unknowns <= 2 and set(found[i].shape.above + found[i].shape.below) <= {one}:
-                found[i] = _on_axis(axes[j][i], j, symbols, p)
+                N, D = ([int(c) for c in polynomial.coeffs()] for polynomial in axes[j][i])
+                powers = [tuple(e if k == j else 0 for k in range(symbols)) for e in range(max(len(N), len(D)))]
+                quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, p)
+                assert quotient is not None  # D is monic
+                found[i] = quotient
         moving = [i for i in moving if any(sum(m) != m[j] for m in (*found[i].shape.above, *found[i].shape.below))]
         if not moving:
             continue
@@ -290,7 +294,8 @@ def _first_prime(values: Values, symbols: int, max_degree: int, rng: random.Rand
         groups: dict[tuple[str, ...], list[int]] = {}
         for i in moving:
             groups.setdefault(tuple(keys[i]), []).append(i)
-        pairs = [split_group(group, [_up_to_factor(axes[j][i][0]) for i in group], shapes) for group in groups.values()]
+        monic = [str(N / N.leading_coefficient()) if int(N.degree()) >= 0 else "" for N, _ in axes[j]]
+        pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
         fixed = {i: anchor[i] for i in order[stage + 1 :]}
         for i, quotient in fit(values, shapes, pairs, symbols, rng, fixed).items():
             found[i] = quotient
@@ -299,10 +304,6 @@ def _first_prime(values: Values, symbols: int, max_degree: int, rng: random.Rand
 
 def _size(polynomial: nmod_poly) -> int:
     return max(0, int(polynomial.degree()))
-
-
-def _up_to_factor(polynomial: nmod_poly) -> str:
-    return str(polynomial / polynomial.leading_coefficient()) if int(polynomial.degree()) >= 0 else ""
 
 
 def _along_line(
@@ -361,15 +362,6 @@ def _least_fraction(through: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[n
             return None
         quotient, rest = divmod(before[0], N)
         before, after = after, (rest, before[1] - quotient * D)
-
-
-def _on_axis(pair: tuple[nmod_poly, nmod_poly], j: int, symbols: int, prime: int) -> Quotient:
-    """A function of one symbol from its fraction along the axis."""
-    N, D = ([int(c) for c in polynomial.coeffs()] for polynomial in pair)
-    powers = [tuple(e if i == j else 0 for i in range(symbols)) for e in range(max(len(N), len(D)))]
-    quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, prime)
-    assert quotient is not None  # D is monic
-    return quotient
 
 
 def _extended(shape: Shape, pair: tuple[nmod_poly, nmod_poly], j: int) -> Shape:

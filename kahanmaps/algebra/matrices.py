@@ -15,6 +15,7 @@ from flint import acb_mat, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import Field, operand
 from kahanmaps.algebra.integers import content, over_one
+from kahanmaps.algebra.modular_matrices import split_columns
 from kahanmaps.errors import PrecisionLost, SingularMatrix
 
 
@@ -198,21 +199,11 @@ def _reduced_echelon(field: Field, matrix: Any) -> tuple[Any, list[int]]:
     if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
         rows, pivots = _eliminate(field, matrix)
         return (lambda i, j: rows[i][j]), pivots
-    below: Any = None
     if isinstance(matrix, fmpq_mat):
         reduced, below, rank_found = _integer_rows(matrix).rref()
-    else:
-        reduced, rank_found = matrix.rref()
-    pivots = []
-    column = 0
-    for i in range(rank_found):
-        while reduced[i, column] == 0:
-            column += 1
-        pivots.append(column)
-        column += 1
-    if below is not None:
-        return (lambda i, j: fmpq(reduced[i, j], below)), pivots
-    return (lambda i, j: reduced[i, j]), pivots
+        return (lambda i, j: fmpq(reduced[i, j], below)), split_columns(reduced, rank_found)[0]
+    reduced, rank_found = matrix.rref()
+    return (lambda i, j: reduced[i, j]), split_columns(reduced, rank_found)[0]
 
 
 def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:

@@ -28,7 +28,7 @@ def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[
     return [vector[::-1] for vector in reversed(kernel(form, rank))]
 
 
-def split_columns(form: nmod_mat, rank: int) -> tuple[list[int], list[int]]:
+def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
     """The columns in which the rows of a reduced echelon form begin; the others, which those before them span.
 
     >>> split_columns(*nmod_mat([[0, 2, 4, 0], [0, 1, 2, 3]], 7).rref())

@@ -12,7 +12,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
-from kahanmaps.algebra.integers import over_one
+from kahanmaps.algebra.integers import content, over_one
 from kahanmaps.algebra.written import pickles  # noqa: F401  # results with polynomials come back from other processes
 from kahanmaps.errors import InputError, quoted
 
@@ -131,11 +131,8 @@ def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
     """
     if polynomial.is_zero():
         return fmpq(1), polynomial
-    below = common_denominator(polynomial)
-    above = fmpz(0)
-    for coefficient in polynomial.coeffs():
-        above = above.gcd(coefficient.p * (below // coefficient.q))
-    factor = fmpq(above, below)
+    integers, below = over_one(polynomial.coeffs())
+    factor = fmpq(content(integers), below)
     if polynomial.leading_coefficient() < 0:
         factor = -factor
     return factor, polynomial / factor
@@ -207,16 +204,8 @@ def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:
     """The polynomial with some variables replaced by numbers, in the ring of the remaining variables."""
     names = names_of(polynomial)
-    keep = [i for i, name in enumerate(names) if name not in values]
-    target = ring([names[i] for i in keep])
-    terms: dict[tuple[int, ...], fmpq] = {}
-    for monomial, coefficient in polynomial.terms():
-        for i, exponent in enumerate(monomial):
-            if exponent and names[i] in values:
-                coefficient = coefficient * values[names[i]] ** exponent
-        key = tuple(monomial[i] for i in keep)
-        terms[key] = terms.get(key, fmpq(0)) + coefficient
-    return target.from_dict(terms)
+    known = {name: value for name, value in values.items() if name in names}
+    return polynomial.subs(known).project_to_context(ring([name for name in names if name not in known]))
 
 
 def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:

@@ -86,12 +86,14 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     telling = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
     step = -(-len(telling) // _TOGETHER) or 1
     chosen = [residues[i] for i in telling[::step]]
-    below = _common_denominator(chosen, modulus) if len(chosen) > 1 else None
-    if below is None:
-        below = 1
-        bound = int(fmpz((modulus - 1) // 2).isqrt())
-    else:
-        bound = int(fmpz(modulus ** len(chosen)).root(len(chosen) + 1)) >> _SPARE_BITS
+    below, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
+    if k > 1:
+        # The q > 0 for which q and all q r modulo `modulus` are smallest, if that is smaller than chance allows.
+        rows = [[1, *chosen], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
+        shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
+        size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
+        if q and size ** (k + 1) << (_SPARE_BITS * (k + 1)) <= modulus**k:
+            below, bound = q, int(fmpz(modulus**k).root(k + 1)) >> _SPARE_BITS
     found = []
     for residue in residues:
         n = residue * below % modulus
@@ -105,16 +107,6 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
         else:
             found.append(fmpq(n, below))
     return tuple(found)
-
-
-def _common_denominator(residues: Sequence[int], modulus: int) -> int | None:
-    """The q > 0 for which q and all q r modulo `modulus` are smallest, if that is smaller than chance allows."""
-    k = len(residues)
-    rows = [[1, *residues], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
-    shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
-    q = abs(int(shortest[0]))
-    size = max(abs(int(entry)) for entry in shortest)
-    return q if q and size ** (k + 1) << (_SPARE_BITS * (k + 1)) <= modulus**k else None
 
 
 def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) -> list[int]:

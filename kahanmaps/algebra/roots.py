@@ -53,18 +53,14 @@ class Root:
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
             with suppress(InputError):  # which is said where the real number is needed
-                self._shorten()
-
-    def _shorten(self) -> None:
-        """One text for all numbers that mean the same root: the first decimal of 4, 8, ... digits that does."""
-        root = self._real(256)
-        for digits in (4, 8, 16, 32, 64):
-            text = root.str(digits, radius=False)
-            near = parse_number(text)
-            with suppress(InputError):
-                if self._real(256, near).overlaps(root):
-                    self.near, self._near_text = near, text
-                    return
+                # One text for all numbers that mean the same root: the first decimal of 4, 8, ... digits that does.
+                root = self._real(256)
+                for digits in (4, 8, 16, 32, 64):
+                    text = root.str(digits, radius=False)
+                    with suppress(InputError):
+                        if self._real(256, parse_number(text)).overlaps(root):
+                            self.near, self._near_text = parse_number(text), text
+                            break
 
     @property
     def degree(self) -> int:
@@ -85,7 +81,10 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            return self._bound(field)
+            # For all conjugates: the root is b/q for a b that is integral, and of Cauchy's size at most.
+            q = fmpz(self.polynomial.denom())
+            size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
+            return Bound(field, Size(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
         if isinstance(field, FunctionField) and field.modulus is not None:
             return field.variables[-1]
         raise InputError(f"a {self} is no element of {field}")
@@ -133,12 +132,6 @@ class Root:
                 texts = ", ".join(root.str(6, radius=False) for root in found)
                 raise InputError(f"a {self} may be {texts}: say which, e.g. near {found[-1].str(4, radius=False)}")
             return first
-
-    def _bound(self, field: BoundField) -> Bound:
-        """A bound for all conjugates: the root is b/q for a b that is integral, and of Cauchy's size at most."""
-        q = fmpz(self.polynomial.denom())
-        size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
-        return Bound(field, Size(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Root) and bool(self.polynomial == other.polynomial) and self.near == other.near

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz_mpoly_ctx, fmpz_mpoly_vec
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
@@ -229,7 +229,11 @@ class _Solver:
             return
         for p in sorted(equations, key=degree):
             if degree(p) == 1:
-                self._substitute(p, given, values)
+                context = p.context()
+                gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
+                gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
+                put = [tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (given, values)]
+                self.solve(list(put[0]), put[1])
                 return
         # Factors that the equations have as they were given may be lost in combinations of them, as in x f, y g, z h.
         best = _easiest_product(equations) or _easiest_product(given)
@@ -252,16 +256,6 @@ class _Solver:
             return
         self.solve(basis, values, based=True)
 
-    def _substitute(self, linear: fmpq_mpoly, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
-        context = linear.context()
-        gens = list(context.gens())
-        k = max(i for i, e in enumerate(linear.degrees()) if e)
-        slope = linear.derivative(k).leading_coefficient()
-        gens[k] = gens[k] - linear / slope
-        self.solve(
-            [p.compose(*gens, ctx=context) for p in equations], tuple(v.compose(*gens, ctx=context) for v in values)
-        )
-
     def _finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
         """Branch on the rational values of a linear form, where the Groebner basis says that solutions are finite."""
         free = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
@@ -279,7 +273,10 @@ class _Solver:
         for factor, _ in factors:
             if factor.degree() > 1:
                 text = f"groups of {factor.degree()} conjugate solutions"
-                self._no_rational_point(text, [*basis, _at(factor, form)], values)
+                value = form * 0
+                for coefficient in reversed(factor.coeffs()):
+                    value = value * form + coefficient
+                self._no_rational_point(text, [*basis, value], values)
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
 
@@ -299,14 +296,6 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
     products = [p.factor()[1] for p in equations]
     reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
     return min(reducible, key=lambda one: (max(map(degree, one)), sum(map(len, one))), default=None)
-
-
-def _at(factor: fmpq_poly, form: fmpq_mpoly) -> fmpq_mpoly:
-    """The value of a polynomial in one variable at another polynomial."""
-    value = form.context().constant(0)
-    for coefficient in reversed(factor.coeffs()):
-        value = value * form + coefficient
-    return value
 
 
 def groebner(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:

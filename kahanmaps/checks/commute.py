@@ -17,7 +17,7 @@ from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.family.associated import FamilyMember
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -169,7 +169,15 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         proof = theorems.evidence(
             "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
         )
-        findings.append(_pair_finding(first, second, settings, proof, orbit if k < tried else None))
+        claim = f"the Kahan maps of f_{first.label} and f_{second.label} commute"
+        names = (f"f_{first.label}", f"f_{second.label}")
+        formula = f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}"
+        if k >= tried and proof is not None:
+            findings.append(Finding(claim, Verdict.PROVED, proof, formula=formula, source=SOURCE))
+            continue
+        identity = commutativity(first.system, second.system, settings.eps, names)
+        walked = orbit if k < tried else None
+        findings.append(judge(claim, identity, settings, proof, walked, formula=formula, source=SOURCE))
     if len(pairs) > tried:
         notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
@@ -205,22 +213,6 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         )
     context = settings.context([file], orbit=orbit.to_json(), m=member.m, factors=[str(f) for f in member.factors])
     return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit))
-
-
-def _pair_finding(
-    first: AssociatedSystem,
-    second: AssociatedSystem,
-    settings: Settings,
-    proof: Evidence | None,
-    orbit: OrbitRun | None,
-) -> Finding:
-    claim = f"the Kahan maps of f_{first.label} and f_{second.label} commute"
-    names = (f"f_{first.label}", f"f_{second.label}")
-    formula = f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}"
-    if orbit is None and proof is not None:
-        return Finding(claim, Verdict.PROVED, proof, formula=formula, source=SOURCE)
-    identity = commutativity(first.system, second.system, settings.eps, names)
-    return judge(claim, identity, settings, proof, orbit, formula=formula, source=SOURCE)
 
 
 def _control(member: FamilyMember, settings: Settings, orbit: OrbitRun) -> Finding:

@@ -13,16 +13,14 @@ from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, linear_combinations
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claimed import claimed_function, claimed_functions, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION, judge
-from kahanmaps.checks.settings import Settings, run_orbit
+from kahanmaps.checks.settings import Settings, claimed_function, claimed_functions, run_orbit, settings_and_claim
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.invariants.integrals import (
     ClaimedIntegral,
     CommutantIntegral,
@@ -78,13 +76,33 @@ def _conservation_in_iterates(map_: BirationalMap, integral: ClaimedFunction, ep
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
     """The integrals that a theorem gives for the system: each with its proof and source."""
     found: list[tuple[PhaseFunction, Evidence | None, str]] = []
-    if file.member is not None:
-        return _family_integrals(file.member)
-    if file.hamiltonian is not None:
-        proof = theorems.cubic_hamiltonian(file.hamiltonian)
-        found.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
-        if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
-            found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
+    member = file.member
+    if member is None:
+        if file.hamiltonian is not None:
+            proof = theorems.cubic_hamiltonian(file.hamiltonian)
+            found.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
+            if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
+                found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
+        return found
+    # Modified H in both normalizations, K~_s for every rational associated system, and those of the commutant. Where
+    # there are many factors the K~ of several minus signs are combinations of those listed.
+    associates = theorems.listed_associates(member)
+    base = associates[0]
+    proof = theorems.shared_integral(member, base)
+    found += [
+        (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
+        (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
+    ]
+    for associate in associates[1:]:
+        integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
+        found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
+    # m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots.
+    hamiltonian = member.chosen.hamiltonian
+    letter = "H" if all(sign > 0 for sign in member.signs) else "K"
+    for k in range(1, member.m):
+        commutant = CommutantIntegral(hamiltonian, member.A, k, letter)
+        name = "A^T" if k == 1 else f"(A^T)^{k}"
+        found.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
     return found
 
 
@@ -242,26 +260,3 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
     except BudgetExceeded:
         return False
     return is_constant(value.above, value.below, H.dim)
-
-
-def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:
-    """Modified H in both normalizations, K~_s for every rational associated system, and those of the commutant."""
-    # Where there are many factors the K~ of several minus signs are combinations of those listed.
-    associates = theorems.listed_associates(member)
-    base = associates[0]
-    proof = theorems.shared_integral(member, base)
-    found: list[tuple[PhaseFunction, Evidence | None, str]] = [
-        (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
-        (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
-    ]
-    for associate in associates[1:]:
-        integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
-        found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
-    # m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots.
-    hamiltonian = member.chosen.hamiltonian
-    letter = "H" if all(sign > 0 for sign in member.signs) else "K"
-    for k in range(1, member.m):
-        commutant = CommutantIntegral(hamiltonian, member.A, k, letter)
-        name = "A^T" if k == 1 else f"(A^T)^{k}"
-        found.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
-    return found

@@ -124,8 +124,10 @@ class Identity:
                     continue
             with suppress(BadPrime):
                 point = tuple(field.random(rng) for _ in range(self.dim))
-                eps = _draw_eps(self, field, rng)
-                sides = self.at(field, point, eps)
+                eps = field.zero if self.eps is None else field.convert(self.eps)
+                while self.eps is None and eps == 0:
+                    eps = field.random(rng)
+                sides = None if eps == 0 else self.at(field, point, eps)  # 0: the prime divides eps
             if sides is None:
                 yield Trial()
             else:
@@ -318,15 +320,3 @@ def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: An
 def _equal(field: Field, sides: Sides) -> bool:
     left, right = sides
     return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))
-
-
-def _draw_eps(identity: Identity, field: PrimeField, rng: random.Random) -> Any:
-    if identity.eps is not None:
-        eps = field.convert(identity.eps)
-        if eps == 0:
-            raise BadPrime("the prime divides eps", field.prime)
-        return eps
-    while True:
-        eps = field.random(rng)
-        if eps != 0:
-            return eps

@@ -9,11 +9,10 @@ from flint import fmpq
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claimed import claimed_function, claimed_tensor, settings_and_claim
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import Contradiction, judge
-from kahanmaps.checks.settings import Settings, run_orbit
+from kahanmaps.checks.settings import Settings, claimed_function, claimed_tensor, run_orbit, settings_and_claim
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, jacobian_determinant_sides

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
@@ -39,14 +39,10 @@ def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence |
 
 def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> list[tuple[str, bool]]:
     """What makes `associate` an associated system of f_0 = J grad H, each verified here and now."""
-    n = member.dim
-    power, total = QQ.identity(n), fmpq_mat(n, n)
-    for coefficient in associate.coefficients:
-        total = total + power * coefficient
-        power = power * member.A
+    at_A = evaluate_at_matrix(fmpq_poly(list(associate.coefficients)), member.A)
     return [
-        (f"B_{associate.label} is a polynomial in A", bool(total == associate.B)),
-        (f"B_{associate.label}^2 = I", bool(associate.B * associate.B == QQ.identity(n))),
+        (f"B_{associate.label} is a polynomial in A", bool(at_A == associate.B)),
+        (f"B_{associate.label}^2 = I", bool(associate.B * associate.B == QQ.identity(member.dim))),
         (
             f"grad K_{associate.label} = B_{associate.label} grad H",
             gradient(associate.K) == linear_combinations(associate.B, gradient(member.H)),

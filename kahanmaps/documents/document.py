@@ -6,25 +6,26 @@ Every part is read as far as it can be, so that all mistakes of a file are told 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.polynomials import RationalFunction, names_of, substitute
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring, substitute
 from kahanmaps.algebra.roots import Root, parse_root
 from kahanmaps.algebra.written.numerals import check_names
-from kahanmaps.algebra.written.text import format_number, parse_polynomial
-from kahanmaps.documents.composition import CompositionReader
+from kahanmaps.algebra.written.text import format_number, parse_polynomial, parse_rational_function
 from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.expressions import number
 from kahanmaps.documents.iterates import iterates_in
-from kahanmaps.documents.reader import KINDS, json_like
+from kahanmaps.documents.reader import EXPECTED, KEYS, KINDS, PartReader, json_like
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, quoted, show, suggestion
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.bilinear import bilinear_map
+from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
 from kahanmaps.maps.kahan import Kahan
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _LONGEST_NAME = 1000
+_MOST_FACTORS = 64  # of a composition, those of its parts counted too
 _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one shows mistakes as well
 
 
@@ -56,6 +58,18 @@ _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], Biration
 }
 
 
+Values = dict[str, RationalFunction]
+
+
+class _Part(NamedTuple):
+    """A map of a composition, its power, the values of its symbols, and the entry with the map as a table."""
+
+    map: BirationalMap
+    power: int
+    values: Values
+    plain: dict[str, Any]
+
+
 class Contents(NamedTuple):
     """What a system file holds; the fields are those of `SystemFile`."""
 
@@ -72,7 +86,7 @@ class Contents(NamedTuple):
     integrals_in_iterates: Mapping[str, RationalFunction] = {}
 
 
-class DocumentReader(CompositionReader):
+class DocumentReader(PartReader):
     """One pass over a document: every part is read as far as it can be, mistakes are collected."""
 
     def read(self) -> Contents:
@@ -90,7 +104,8 @@ class DocumentReader(CompositionReader):
                 f"found {found} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
             )
         self._read_parameters()
-        name = self.document.get("name", self._default_name())
+        stem = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
+        name = self.document.get("name", "".join(c if c.isprintable() else "_" for c in stem))
         if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
             # It stands in the first line of many outputs, where nothing may break the line or color the terminal.
             self._mistake(
@@ -195,10 +210,6 @@ class DocumentReader(CompositionReader):
         if kind == "composition":
             return self._read_composition(section)
         return self._read_bilinear(section) if kind == "bilinear" else self._read_map(section)
-
-    def _default_name(self) -> str:
-        name = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
-        return "".join(c if c.isprintable() else "_" for c in name)
 
     def _read_parameters(self) -> None:
         for name, value in (self._table("parameters") or {}).items():
@@ -440,3 +451,122 @@ class DocumentReader(CompositionReader):
                             "catalog.sources", f"unknown source {quoted(str(item))}, expected a key of sources.py"
                         )
         read_structured_facts(section, self.variables, self._mistake)
+
+    # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
+
+    def _read_composition(self, section: Mapping[str, Any]) -> BirationalMap | None:
+        """The composition; what its parts name is put in their places, so that the document says all by itself."""
+        given = self._required("composition", section, "of")
+        if not isinstance(given, list) or not given:
+            if given is not None:
+                self._mistake("composition.of", f"found {show(given)}, expected {EXPECTED['composition', 'of']}")
+            return None
+        parts = [self._part(f"composition.of[{k + 1}]", entry) for k, entry in enumerate(given)]
+        known = [part for part in parts if part is not None]
+        if len(known) < len(parts) or self.unsure:
+            return None
+        if sum(abs(part.power) for part in known) > _MOST_FACTORS:
+            self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
+            return None
+        self.document = {**self.document, "composition": {"of": [part.plain for part in known]}}
+        values = [part.values for part in known]
+        make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
+        return self._made("composition.of", make, *((part.map, part.power) for part in known))
+
+    def _part(self, path: str, entry: Any) -> _Part | None:
+        if not isinstance(entry, dict):
+            self._mistake(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
+            return None
+        before = len(self.mistakes)
+        for key in entry:
+            if key not in KEYS["composition.of"]:
+                expected = ", ".join(sorted(KEYS["composition.of"]))
+                self._mistake(f"{path}.{key}", f"unknown key, expected one of {expected}")
+        named = [key for key in ("file", "system", "map") if key in entry]
+        if len(named) != 1:
+            self._mistake(path, f"found {' and '.join(named) or 'none'} of file, system and map, expected exactly one")
+            return None
+        (key,) = named
+        power, inverse = entry.get("power", 1), entry.get("inverse", False)
+        if type(power) is not int or power == 0:
+            self._mistake(f"{path}.power", f"found {show(power)}, expected an integer other than 0")
+        for name in ("inverse", "involution"):
+            if not isinstance(entry.get(name, False), bool):
+                self._mistake(f"{path}.{name}", f"found {show(entry[name])}, expected true or false")
+        numbers, values = self._part_parameters(path, entry)
+        if len(self.mistakes) > before:
+            return None
+        try:
+            reader = self._part_reader(key, entry[key], numbers, values)
+            if values:
+                map_ = reader.read_map(next(kind for kind in KINDS if kind in reader.document), list(values))
+            else:
+                map_ = reader.read().map
+        except InputError as error:
+            self._mistake(f"{path}.{key}", str(error))
+            return None
+        if entry.get("involution") and not is_involution(map_):
+            self._mistake(f"{path}.involution", "found a map whose square is not the identity, expected an involution")
+            return None
+        plain = {name: value for name, value in entry.items() if name not in named}
+        found = dict(reader.document)
+        if key != "map":
+            found.setdefault("parameters", {})  # so that, as a table, it knows no others
+        elif "parameters" not in entry[key]:
+            del found["parameters"]
+        return _Part(map_, -power if inverse else power, values, {"map": json_like(found), **plain})
+
+    def _part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
+        """The values of parameters of a part: numbers, and functions of the symbols."""
+        numbers: dict[str, fmpq] = {}
+        values: Values = {}
+        given = entry.get("parameters", {})
+        if not isinstance(given, dict):
+            self._mistake(f"{path}.parameters", f"found {show(given)}, expected a table of numbers")
+            return numbers, values
+        table = entry.get("map")
+        if isinstance(table, dict) and "parameters" not in table:  # it knows those around it
+            context = ring(self.symbols)
+            for name, symbol in zip(self.symbols, context.gens(), strict=True):
+                values[name] = RationalFunction(symbol, context.constant(1))
+        for name, value in given.items():
+            text = self._text(f"{path}.parameters.{name}", value)
+            if text is None:
+                continue
+            place = f"{path}.parameters.{name}"
+            function = self._made(place, parse_rational_function, text, self.symbols, self.parameters)
+            if function is None:
+                continue
+            values.pop(name, None)
+            above, below = function.numerator, function.denominator
+            if above.is_constant() and below.is_constant():
+                numbers[name] = above.leading_coefficient() / below.leading_coefficient() if above else fmpq(0)
+            else:
+                values[name] = function
+        return numbers, values
+
+    def _part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
+        """What reads a part of a composition."""
+        self.parts[0] += 1
+        if self.parts[0] > _MOST_FACTORS:
+            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected at most so many")
+        name, place, other = "map", "", self.other
+        if key == "map":
+            if not isinstance(value, dict):
+                raise InputError(f"found {show(value)}, expected a table like a system file")
+            # A table without parameters of its own knows those of the file that it stands in.
+            outer = {name: format_number(number) for name, number in self.parameters.items()}
+            document = {"parameters": {**outer, **dict.fromkeys(self.symbols, 1)}, **value}
+        elif not isinstance(value, str):
+            raise InputError(f"found {show(value)}, expected a name in quotes")
+        elif self.other is None:
+            raise InputError(f"found {quoted(value)}, expected map = {{ ... }}: files are not looked up here")
+        else:
+            name = value
+            document, place, other = self.other(key, value)
+            if key == "file" and place in self.inside:
+                raise InputError(f"found {quoted(name)} as a part of itself")
+        document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
+        reader = type(self)(document, name, numbers, other)
+        reader.inside, reader.parts = (*self.inside, place), self.parts
+        return reader

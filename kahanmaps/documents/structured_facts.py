@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
+from math import comb
 from typing import Any, NamedTuple
 
 from flint import fmpq, fmpq_mpoly
@@ -76,7 +77,16 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
     (x^2 + y^2, 1)
     """
     if isinstance(given, str):
-        return _up_to(given, variables)
+        match = _UP_TO.fullmatch(given)
+        if match is None:
+            raise InputError(f'found {quoted(given)}, expected "degree <= d" or a list of polynomials')
+        top = int(match[1])
+        count = comb(top + len(variables), top)
+        if count > MAX_MONOMIALS:
+            raise InputError(f"found {quoted(given)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
+        context = ring(variables)
+        exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
+        return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
     if len(given) > MAX_MONOMIALS:
         raise InputError(f"found {len(given)} functions, expected at most {MAX_MONOMIALS}")
     functions = tuple(parse_polynomial(text, variables) for text in given)
@@ -88,20 +98,6 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
             raise InputError(f"found function {k + 1} twice, expected different ones")
         seen.add(str(function))
     return functions
-
-
-def _up_to(text: str, variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
-    match = _UP_TO.fullmatch(text)
-    if match is None:
-        raise InputError(f'found {quoted(text)}, expected "degree <= d" or a list of polynomials')
-    top, count = int(match[1]), 1
-    for k in range(len(variables)):
-        count = count * (top + k + 1) // (k + 1)
-    if count > MAX_MONOMIALS:
-        raise InputError(f"found {quoted(text)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
-    context = ring(variables)
-    exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
-    return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
 
 
 def read_structured_facts(

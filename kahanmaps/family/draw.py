@@ -64,6 +64,7 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     2
     """
     m = _require_m(chi.degree())
+    _require_size(size)
     chi = chi / chi.leading_coefficient()
     rng = random.Random(integer(seed, "the seed"))
     companion = fmpq_mat(m, m)
@@ -85,11 +86,32 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
         for k in range(j, m):
             coefficient = fmpq(1) if k == m - 1 else chi[k + 1]
             Y[k - j] = Y[k - j] + coefficient * forms[m + j]
-    products = _Products(chi, zero)
+
+    def products(left: Sequence[fmpq_mpoly], right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
+        """The product of two elements of (Q[t]/chi)[x], lists of m polynomials in x."""
+        full = [zero] * (2 * m - 1)
+        for i, a in enumerate(left):
+            if not a.is_zero():
+                for j, b in enumerate(right):
+                    full[i + j] = full[i + j] + a * b
+        for power in range(2 * m - 2, m - 1, -1):
+            for k in range(m):
+                if chi[k] != 0:
+                    full[power - m + k] = full[power - m + k] - chi[k] * full[power]
+        return full[:m]
+
     squares = [products(X, X), products(X, Y), products(Y, Y)]
     cubes = [products(squares[0], X), products(squares[0], Y), products(squares[2], X), products(squares[2], Y)]
+    drawn: list[list[int]] = []
+    # The discriminant is to be invertible: a genuine map on the part of every factor.
+    while not drawn or _discriminant(*map(fmpq_poly, drawn)).gcd(chi).degree() != 0:
+        drawn = []
+        while len(drawn) < 4:
+            element = [rng.randint(-size, size) for _ in range(m)]
+            if any(element):
+                drawn.append(element)
     H = zero
-    for cube, coefficients in zip(cubes, _planar_coefficients_over(chi, rng, size), strict=True):
+    for cube, coefficients in zip(cubes, drawn, strict=True):
         factor: list[fmpq_mpoly] = [zero + c for c in coefficients]
         H += products(factor, cube)[m - 1]
     return FamilyMember(_hidden(normal, S), H)
@@ -134,27 +156,6 @@ def random_eigenvalues(m: int, seed: int) -> list[int]:
     return random.Random(f"eigenvalues {seed}").sample(values, m)
 
 
-class _Products:
-    """Multiplication in (Q[t]/chi)[x], elements as lists of m polynomials in x."""
-
-    def __init__(self, chi: fmpq_poly, zero: fmpq_mpoly) -> None:
-        self.chi = chi
-        self.zero = zero
-
-    def __call__(self, left: Sequence[fmpq_mpoly], right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        m = len(left)
-        full = [self.zero] * (2 * m - 1)
-        for i, a in enumerate(left):
-            if not a.is_zero():
-                for j, b in enumerate(right):
-                    full[i + j] = full[i + j] + a * b
-        for power in range(2 * m - 2, m - 1, -1):
-            for k in range(m):
-                if self.chi[k] != 0:
-                    full[power - m + k] = full[power - m + k] - self.chi[k] * full[power]
-        return full[:m]
-
-
 def _hidden(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
     """A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
     return symplectic_inverse(S).transpose() * normal * S.transpose()
@@ -172,25 +173,9 @@ def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> list[fmpq_mpol
     return forms
 
 
-def _planar_coefficients_over(chi: fmpq_poly, rng: random.Random, size: int) -> list[list[int]]:
-    """A binary cubic over Q[t]/chi with invertible discriminant: a genuine map on the part of every factor."""
-    while True:
-        drawn = [_coefficients(rng, chi.degree(), size) for _ in range(4)]
-        if _discriminant(*(fmpq_poly(element) for element in drawn)).gcd(chi).degree() == 0:
-            return drawn
-
-
 def _discriminant(a: Any, b: Any, c: Any, d: Any) -> Any:
     """The discriminant of a x^3 + b x^2 y + c x y^2 + d y^3."""
     return b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d
-
-
-def _coefficients(rng: random.Random, m: int, size: int) -> list[int]:
-    _require_size(size)
-    while True:
-        coefficients = [rng.randint(-size, size) for _ in range(m)]
-        if any(coefficients):
-            return coefficients
 
 
 def _require_m(m: int) -> int:

@@ -32,8 +32,8 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import third_derivatives
+from kahanmaps.family.skew_hamiltonian import bits_of, format_univariate
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
-from kahanmaps.family.skew_hamiltonian import format_univariate
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 _CUBIC = ("X^3", "X^2*Y", "X*Y^2", "Y^3")
@@ -275,7 +275,7 @@ def normal_form(member: FamilyMember) -> NormalForm:
     for e1 in _cyclic_vectors(member.A.transpose()):
         S = _symplectic_basis(member.A.transpose(), e1)
         coefficients = _coefficients(modulus, S, tensors)
-        size = sum(map(_bits, S.entries())) + sum(_bits(entry) for c in coefficients for entry in c.coeffs())
+        size = sum(map(bits_of, S.entries())) + sum(bits_of(entry) for c in coefficients for entry in c.coeffs())
         found.append((size, S, coefficients))
     _, S, coefficients = min(found, key=lambda choice: choice[0])
     return NormalForm(member.A, H, S, coefficients)
@@ -357,11 +357,6 @@ def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
 
 def _unit(n: int, i: int) -> fmpq_mat:
     return fmpq_mat(n, 1, [int(i == j) for j in range(n)])
-
-
-def _bits(number: fmpq) -> int:
-    """The length of a number: 0 for zero."""
-    return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
 
 
 def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) -> str:

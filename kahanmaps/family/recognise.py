@@ -27,7 +27,7 @@ from kahanmaps.algebra.polynomials import gradient, linear_combinations, names_o
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
 from kahanmaps.family.cubics import third_derivatives
-from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix, factors_of_chi
+from kahanmaps.family.skew_hamiltonian import Factor, bits_of, evaluate_at_matrix, factors_of_chi
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
@@ -72,7 +72,7 @@ class RecognisedMember:
     @property
     def is_standard(self) -> bool:
         """Whether T = I: the member has the coordinates of the system."""
-        return self.T == _identity(self.member.dim)
+        return self.T == QQ.identity(self.member.dim)
 
     @property
     def text(self) -> str:
@@ -153,8 +153,12 @@ def recognised_member(hamiltonian: CubicHamiltonian) -> RecognisedMember | None:
     if _reason_against(hamiltonian):
         return None
     _require_size(hamiltonian.dim)
-    T = _identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
-    names = hamiltonian.variables if hamiltonian.is_standard else _other_names(hamiltonian.variables)
+    T = QQ.identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
+    names, letters = hamiltonian.variables, "y"
+    if not hamiltonian.is_standard:  # y1, y2, ..., or yy1, ... where the system itself uses these
+        while any(name.startswith(letters) for name in names):
+            letters += "y"
+        names = tuple(f"{letters}{i + 1}" for i in range(len(names)))
     H = _pulled_back(hamiltonian.H, T, names)
     space = structure_space(H)
     if len(space) == 1 and hamiltonian.dim > 2:
@@ -221,7 +225,7 @@ def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
         entries = [(i, j) for i in range(n) for j in range(i + 1, n) if rest[i, j] != 0]
         if not entries:
             raise InputError("J is singular, expected an invertible matrix")
-        i, j = min(entries, key=lambda place: _bits(rest[place]))
+        i, j = min(entries, key=lambda place: bits_of(rest[place]))
         pivot = rest[i, j]
         a, b = (fmpq_mat([[rest[k, column]] for k in range(n)]) for column in (i, j))
         first.append(b.entries())
@@ -244,7 +248,7 @@ class _Part:
 
 def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
     """An element with as many distinct eigenvalues as can be, made of small numbers."""
-    parts = list(_parts(space, _identity(space[0].nrows())))
+    parts = list(_parts(space, QQ.identity(space[0].nrows())))
     A = fmpq_mat(space[0].nrows(), space[0].nrows())
     # The largest idempotent gets the eigenvalue 1: then A = I + ..., in which it does not occur.
     simple = sorted((part for part in parts if part.factor.degree() == 1), key=lambda part: -_size(part.E))
@@ -282,9 +286,14 @@ def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq
         return _Part(E, E * 0, _T)
     # In a commutative algebra the trace form has the rank of its semisimple part, the number of roots to be found.
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(own, 2))
-    target = _semisimple_dimension(own) if is_commutative else 0
+    flat, turned = (fmpq_mat([M.entries() for M in Ms]) for Ms in (own, [X.transpose() for X in own]))
+    target = rank(QQ, flat * turned.transpose()) if is_commutative else 0
     found: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
-    for tried, X in enumerate(_candidates(own)):
+    rng = random.Random(len(own))
+    # The basis, then combinations with small coefficients, which grow slowly.
+    bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
+    more = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
+    for tried, X in enumerate(itertools.chain(own, more)):
         if len(pieces := _projections(X, E)) > 1:
             return pieces
         polynomial = _factors_on(X, E)[0].polynomial
@@ -292,7 +301,7 @@ def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq
         while power != 0 * power:  # the least k with polynomial(X)^k E = 0, times the degree
             power, length = power * value, length + polynomial.degree()
         for Y, minimal in _variants(X, E, polynomial):
-            height = sum(map(_bits, minimal.coeffs()))
+            height = sum(map(bits_of, minimal.coeffs()))
             found.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
         if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in found) >= target:
             break
@@ -312,15 +321,6 @@ def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
         signs = [2 * (i == which) - 1 for i in range(len(factors))]
         found.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
     return found
-
-
-def _candidates(basis: Sequence[fmpq_mat]) -> Iterator[fmpq_mat]:
-    """The basis, then combinations with small coefficients, which grow slowly. Without end."""
-    yield from basis
-    rng = random.Random(len(basis))
-    for count in itertools.count(2 * _DRAWS):
-        bound = count // _DRAWS - 1
-        yield combination_of([rng.randint(-bound, bound) for _ in basis], basis)
 
 
 def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
@@ -350,13 +350,6 @@ def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple
     yield X, polynomial
 
 
-def _semisimple_dimension(basis: Sequence[fmpq_mat]) -> int:
-    """The rank of tr(X Y): of a commutative algebra modulo its nilpotent elements."""
-    flat = fmpq_mat([X.entries() for X in basis])
-    turned = fmpq_mat([X.transpose().entries() for X in basis])
-    return rank(QQ, flat * turned.transpose())
-
-
 def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
     """The skew S with S F symmetric for each F of `conditions`: a basis."""
     place = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
@@ -383,7 +376,10 @@ def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
 def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
     """A reduced basis of all integer matrices in the span; empty for zeros."""
     lattice = fmpz_mat([primitive_integers(tuple(matrix.entries())) for matrix in matrices])
-    if not _is_saturated(lattice):
+    rows = lattice.tolist()
+    alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
+    # Where every row has an entry 1 or -1 that is alone in its column, the rows generate all integer points.
+    if not all(any(single and abs(entry) == 1 for entry, single in zip(row, alone, strict=True)) for row in rows):
         reduced = lattice.lll()
         d = lattice.rank()
         lattice = fmpz_mat(
@@ -396,13 +392,6 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
         lattice = (fmpq_mat(G).inv() * fmpq_mat(lattice)).numer_denom()[0]
     shape = matrices[0].nrows(), matrices[0].ncols()
     return [fmpq_mat(*shape, primitive_integers(tuple(map(fmpq, row)))) for row in lattice.lll().tolist()]
-
-
-def _is_saturated(lattice: fmpz_mat) -> bool:
-    """Whether every row has an entry 1 or -1 that is alone in its column: then the rows generate all integer points."""
-    rows = lattice.tolist()
-    alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
-    return all(any(single and abs(entry) == 1 for entry, single in zip(row, alone, strict=True)) for row in rows)
 
 
 def _reason_against(hamiltonian: CubicHamiltonian) -> str:
@@ -424,27 +413,10 @@ def _require_size(dim: int) -> None:
 def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:
     """H(T y) in the variables `names`."""
     context = ring(names)
-    if T == _identity(T.nrows()):
+    if T == QQ.identity(T.nrows()):
         return context.from_dict(H.to_dict())
     return H.compose(*linear_combinations(T, context.gens()), ctx=context)
 
 
-def _other_names(names: Sequence[str]) -> tuple[str, ...]:
-    """y1, y2, ..., or yy1, ... where the system itself uses these."""
-    letters = "y"
-    while any(name.startswith(letters) for name in names):
-        letters += "y"
-    return tuple(f"{letters}{i + 1}" for i in range(len(names)))
-
-
-def _identity(n: int) -> fmpq_mat:
-    return fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
-
-
-def _bits(number: fmpq) -> int:
-    """The length of a number: 1 for 1, 0 for zero."""
-    return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
-
-
 def _size(matrix: fmpq_mat) -> int:
-    return sum(map(_bits, matrix.entries()))
+    return sum(map(bits_of, matrix.entries()))

@@ -114,11 +114,6 @@ def chi(A: fmpq_mat) -> fmpq_poly:
     return product
 
 
-def is_generic(A: fmpq_mat) -> bool:
-    """Whether chi has no repeated root."""
-    return all(factor.multiplicity == 1 for factor in factors_of_chi(A))
-
-
 def diagnosis(A: fmpq_mat) -> str:
     """In words: how chi factors over Q, and what that means for A and its associated systems."""
     factors = factors_of_chi(A)
@@ -205,6 +200,11 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
                 if i != j:
                     add(m + j, i, shear)
     return S
+
+
+def bits_of(number: fmpq) -> int:
+    """The length of a number: 1 for 1, 0 for zero."""
+    return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
 
 
 def symplectic_inverse(S: fmpq_mat) -> fmpq_mat:

@@ -21,4 +21,3 @@ class Growth(StrEnum):
 
 
 OF_DEGREES = tuple(kind for kind in Growth if kind not in (Growth.PERIODIC, Growth.LOGARITHMIC, Growth.UNDECIDED))
-OF_HEIGHTS = tuple(kind for kind in Growth if kind not in (Growth.ZERO, Growth.POLYNOMIAL, Growth.UNKNOWN))

@@ -164,14 +164,9 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
 
 def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
     """Whether the quotient of two polynomials does not depend on the first `dim` variables; `below` is not 0."""
-    monomial = below.monoms()[0][:dim]
-    P, Q = (_coefficient(part, monomial) for part in (above, below))
-    difference = above * Q - below * P
+    monomial, coefficients = below.monoms()[0][:dim], list[fmpq_mpoly]()
+    for part in (above, below):  # of that monomial in the first variables: polynomials in the others, in the same ring
+        terms = {(*(0,) * dim, *m[dim:]): value for m, value in part.terms() if m[:dim] == monomial}
+        coefficients.append(part.context().from_dict(terms))
+    difference = above * coefficients[1] - below * coefficients[0]
     return bool((difference if root is None else root.remainder(difference, dim)).is_zero())
-
-
-def _coefficient(polynomial: fmpq_mpoly, monomial: tuple[int, ...]) -> fmpq_mpoly:
-    """That of a monomial in the first variables, a polynomial in the others, in the same ring."""
-    n = len(monomial)
-    terms = {(*(0,) * n, *m[n:]): value for m, value in polynomial.terms() if m[:n] == monomial}
-    return polynomial.context().from_dict(terms)

@@ -37,20 +37,8 @@ class Normalized:
 
     def combination(self, name: str) -> str:
         """The integral as a formula in I, which is called `name`, the symbols and eps: "(F1 - 1)/eps^2"."""
-        names = [name, *(other for other in self.function.names if other != name)]
-        target = ring(names)
-        places = [names.index(other) for other in self.function.names]
-
-        def over(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-            terms: dict[tuple[int, ...], fmpq] = {}
-            for monomial, value in polynomial.terms():
-                exponents = [0] * len(names)
-                for place, exponent in zip(places, monomial, strict=True):
-                    exponents[place] = int(exponent)
-                terms[tuple(exponents)] = value
-            return target.from_dict(terms)
-
-        alpha, beta, gamma = map(over, self.coefficients)
+        target = ring([name, *(other for other in self.function.names if other != name)])
+        alpha, beta, gamma = (coefficient.project_to_context(target) for coefficient in self.coefficients)
         return format_rational_function(RationalFunction(alpha * target.gen(0) + beta, gamma))
 
 

@@ -124,19 +124,13 @@ class MemberObjects(PaperObjects):
 
     @property
     def _is_split(self) -> bool:
-        return self.roots is not None and is_split(self.member)
-
-
-def is_split(member: FamilyMember) -> bool:
-    """Whether chi has m distinct rational roots."""
-    return all(factor.degree == 1 and factor.multiplicity == 1 for factor in member.factors)
+        return self.roots is not None and rational_roots(self.member) is not None
 
 
 def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
     """The roots of chi in the order of the signs, where they are rational and distinct."""
-    if not is_split(member):
-        return None
-    return tuple(factor.root for factor in member.factors if factor.root is not None)
+    found = [factor.root for factor in member.factors if factor.root is not None and factor.multiplicity == 1]
+    return tuple(found) if len(found) == len(member.factors) else None
 
 
 def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
@@ -317,12 +311,6 @@ def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
     with K.working():
         enclosures: Any = chi.numer().complex_roots()
         return tuple(K.convert(root) for root, _ in enclosures)
-
-
-def root_enclosures(member: FamilyMember, bits: int) -> list[str]:
-    """The complex roots of chi as text, to 20 digits at most."""
-    with CC(bits).working():
-        return [str(root.str(20)) for root in complex_roots(member, bits)]
 
 
 def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:

@@ -30,7 +30,7 @@ from flint import fmpq_poly
 
 from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.chance import random_prime_field, seed_for
-from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.written.text import format_number
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
@@ -231,33 +231,29 @@ class Verifier:
         needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)
         if key not in self._points:
-            self._points[key] = self._new_point(needs_split, number)
+            self._points[key] = None
+            member, order = self.member, self.options.order
+            if member is None:
+                rng = random.Random(f"universal {self._seed} {number}")
+                self._points[key] = objects_over.random_objects(self.m, random_prime_field(rng), rng, order)
+                return self._points[key]
+            rng = random.Random(f"verify {self._seed} {needs_split} {number}")
+            if needs_split and not member.is_generic:
+                return None
+            while self._points[key] is None:
+                with suppress(BadPrime):
+                    if needs_split:
+                        self.settings.progress("looking for a prime at which chi splits")
+                        # One prime in m! splits at worst, so that this fails with probability e^-40.
+                        found = objects_over.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
+                        if found is None:
+                            return None
+                        K, roots = found
+                    else:
+                        K = random_prime_field(rng)
+                        roots = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
+                    self._points[key] = objects_over.point_over(member, K, roots, self.settings.eps, rng, order)
         return self._points[key]
-
-    def _new_point(self, needs_split: bool, number: int) -> PaperObjects | None:
-        member, order = self.member, self.options.order
-        if member is None:
-            rng = random.Random(f"universal {self._seed} {number}")
-            return objects_over.random_objects(self.m, random_prime_field(rng), rng, order)
-        rng = random.Random(f"verify {self._seed} {needs_split} {number}")
-        if needs_split and not member.is_generic:
-            return None
-        while True:
-            try:
-                if needs_split:
-                    self.settings.progress("looking for a prime at which chi splits")
-                    # One prime in m! splits at worst, so that this fails with probability e^-40.
-                    found = objects_over.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
-                    if found is None:
-                        return None
-                    K, mod_roots = found
-                    roots: tuple[Any, ...] | None = mod_roots
-                else:
-                    K = random_prime_field(rng)
-                    roots = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
-                return objects_over.point_over(member, K, roots, self.settings.eps, rng, order)
-            except BadPrime:
-                continue
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
         """A random point over Q; None in general, and where the roots of chi are needed and not rational."""
@@ -463,7 +459,9 @@ class Verifier:
         if self.member.is_generic and not self.options.controls:
             found.append(NOTE_ON_PROOFS)
         if self.options.ball_bits is not None and self.member.is_generic:
-            enclosures = objects_over.root_enclosures(self.member, self.options.ball_bits)
+            with CC(self.options.ball_bits).working():
+                roots = objects_over.complex_roots(self.member, self.options.ball_bits)
+                enclosures = [str(root.str(20)) for root in roots]
             found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
         return found
 
@@ -581,7 +579,21 @@ class ClaimAtPoints:
                 yield Trial()
                 continue
             if not outcome.holds:
-                yield Trial(decision=self._refutation(outcome))
+                field, decision = outcome.objects.K.name, None
+                for exact_number in range(12):  # a rational point is better to look at
+                    exact = self._verifier.exact_point(self._roots, exact_number)
+                    if exact is None:
+                        break
+                    with suppress(*UNDEFINED, LookupError):
+                        if not (found := evaluate(self._claim, exact)).holds:
+                            evidence = Evidence("exact rational point", "fails at a rational point, exactly")
+                            decision = Decision(Verdict.REFUTED, evidence, witness_of(found))
+                            break
+                if decision is None:
+                    why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
+                    evidence = Evidence("point over GF(p)", f"fails at a point over {field}, where {why}")
+                    decision = Decision(Verdict.REFUTED, evidence, witness_of(outcome))
+                yield Trial(decision=decision)
             elif not outcome.pairs:
                 text = "it does not apply to this member: there is nothing to compare"
                 yield Trial(decision=Decision(Verdict.UNDECIDED, Evidence("outside the hypotheses", text)))
@@ -591,23 +603,6 @@ class ClaimAtPoints:
     def data(self, undefined: int) -> dict[str, Any]:
         """What evidence says beside the bounds."""
         return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
-
-    def _refutation(self, outcome: Outcome) -> Decision:
-        for number in range(12):
-            objects = self._verifier.exact_point(self._roots, number)
-            if objects is None:
-                break
-            try:
-                exact = evaluate(self._claim, objects)
-            except (*UNDEFINED, LookupError):
-                continue
-            if not exact.holds:
-                evidence = Evidence("exact rational point", "fails at a rational point, exactly")
-                return Decision(Verdict.REFUTED, evidence, witness_of(exact))
-        text = f"fails at a point over {outcome.objects.K.name}, where all denominators are units, so it fails over Q"
-        if self._roots:
-            text = f"fails at a point over {outcome.objects.K.name}, where chi splits"
-        return Decision(Verdict.REFUTED, Evidence("point over GF(p)", text), witness_of(outcome))
 
 
 @lru_cache(maxsize=4096)

@@ -298,7 +298,11 @@ class _Arithmetic:
         def add(left: _Polynomial, right: _Polynomial) -> _Polynomial:
             return self.add(left, right, column)
 
-        number = _total(numbers, lambda left, right: self.add_numbers(left, right, column)) if numbers else fmpq(0)
+        def add_numbers(left: fmpq, right: fmpq) -> fmpq:
+            self.spend(1, max(left.height_bits(), right.height_bits()), column)
+            return self.checked(left + right, column)
+
+        number = _total(numbers, add_numbers) if numbers else fmpq(0)
         if not polynomials and not fractions:
             return number
         if number != 0:
@@ -330,7 +334,12 @@ class _Arithmetic:
             if value.below is not None:
                 below = value.below if below is None else self.times(below, value.below, column)
         column = pieces[1].start_pos
-        number = _total(numbers, lambda left, right: self.times_numbers(left, right, column)) if numbers else fmpq(1)
+
+        def times_numbers(left: fmpq, right: fmpq) -> fmpq:
+            self.spend(1, left.height_bits() + right.height_bits(), column)
+            return self.checked(left * right, column)
+
+        number = _total(numbers, times_numbers) if numbers else fmpq(1)
         return number if above is None else _Quotient(self.scaled(above, number, column), below)
 
     def negated(self, signs: list[Token], value: _Value) -> _Value:
@@ -387,14 +396,6 @@ class _Arithmetic:
         return _Quotient(self.scaled(value.above, fmpq(-1), column), value.below)
 
     # Arithmetic of numbers and polynomials: estimate, refuse or compute.
-
-    def add_numbers(self, left: fmpq, right: fmpq, column: int) -> fmpq:
-        self.spend(1, max(left.height_bits(), right.height_bits()), column)
-        return self.checked(left + right, column)
-
-    def times_numbers(self, left: fmpq, right: fmpq, column: int) -> fmpq:
-        self.spend(1, left.height_bits() + right.height_bits(), column)
-        return self.checked(left * right, column)
 
     def polynomial(self, value: _Value) -> _Polynomial:
         """The numerator of a value, as a polynomial even if it is a number."""

@@ -33,15 +33,6 @@ def _of_matrix(A: fmpq_mat | fmpz_mat) -> tuple[Any, ...]:
     return type(A), (A.nrows(), A.ncols(), A.entries())
 
 
-def _of_polynomial(P: fmpq_poly | fmpz_poly) -> tuple[Any, ...]:
-    return type(P), (P.coeffs(),)
-
-
-def _of_polynomial_in_names(P: fmpq_mpoly) -> tuple[Any, ...]:
-    context = P.context()
-    return _polynomial, (context.names(), context.ordering().name, P.to_dict())
-
-
 def _polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[int, ...], fmpq]) -> fmpq_mpoly:
     return fmpq_mpoly_ctx.get(names, Ordering[ordering]).from_dict(terms)
 
@@ -52,20 +43,17 @@ def _of_ball(x: arb) -> tuple[Any, ...]:
     return arb, tuple(end.man_exp() if end.is_finite() else float(end) for end in ends)
 
 
-def _of_residue(x: fmpz_mod) -> tuple[Any, ...]:
-    return _residue, (int(x), int(0 * x - 1) + 1)  # which is the modulus: it does not say it itself
-
-
 def _residue(value: int, modulus: int) -> fmpz_mod:
     return fmpz_mod_ctx(modulus)(value)
 
 
 copyreg.pickle(fmpq_mat, _of_matrix)
 copyreg.pickle(fmpz_mat, _of_matrix)
-copyreg.pickle(fmpq_poly, _of_polynomial)
-copyreg.pickle(fmpz_poly, _of_polynomial)
-copyreg.pickle(fmpq_mpoly, _of_polynomial_in_names)
+copyreg.pickle(fmpq_poly, lambda P: (fmpq_poly, (P.coeffs(),)))
+copyreg.pickle(fmpz_poly, lambda P: (fmpz_poly, (P.coeffs(),)))
+copyreg.pickle(fmpq_mpoly, lambda P: (_polynomial, (P.context().names(), P.context().ordering().name, P.to_dict())))
 copyreg.pickle(arb, _of_ball)
 copyreg.pickle(acb, lambda x: (acb, (x.real, x.imag)))
 copyreg.pickle(nmod, lambda x: (nmod, (int(x), x.modulus())))
-copyreg.pickle(fmpz_mod, _of_residue)
+# The modulus of a residue: it does not say it itself.
+copyreg.pickle(fmpz_mod, lambda x: (_residue, (int(x), int(0 * x - 1) + 1)))

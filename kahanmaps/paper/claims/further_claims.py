@@ -323,13 +323,6 @@ STATEMENTS: list[tuple[ClaimFunction, str, tuple[str, ...], dict[str, Any], str]
 ]
 
 
-def _register() -> None:
-    for function, formula, breaks, how, answers in STATEMENTS:
-        for (name, variation), answer in zip(VARIATIONS.items(), answers, strict=True):
-            if answer != " ":
-                _register_cell(function, formula, breaks, how, name, variation, answer == "+")
-
-
 def _register_cell(
     function: ClaimFunction,
     formula: str,
@@ -361,4 +354,7 @@ def _register_cell(
     )(cell)
 
 
-_register()
+for _function, _formula_text, _breaks, _how, _answers in STATEMENTS:
+    for (_name, _variation), _answer in zip(VARIATIONS.items(), _answers, strict=True):
+        if _answer != " ":
+            _register_cell(_function, _formula_text, _breaks, _how, _name, _variation, _answer == "+")

@@ -185,7 +185,9 @@ def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
     """The Jacobi identity of `factor` Pi, a constant matrix."""
     Pi = factor * o.Pi(o.x)
     rows = [o.K.column([Pi[i, k] for k in range(o.n)]) for i in range(o.n)]
-    along = [factor * (_derivative_of_square(o, row) * -(o.eps * o.eps)) for row in rows]  # Pi = J - eps^2 f'^2 J
+    seconds = [o.second(o.f, row) for row in rows]
+    # Pi = J - eps^2 f'^2 J, so that its derivative along v is - eps^2 (f''v f' + f' f''v) J.
+    along = [factor * ((f2 * o.df + o.df * f2) * o.J * -(o.eps * o.eps)) for f2 in seconds]
     for i, j, k in combinations(range(o.n), 3):
         yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
 
@@ -406,9 +408,3 @@ def _two_sums(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:
     derivative = o.second(o.f, o.unit(l))
     eighth = o.number(1, 8)
     return (o.trace(B.transpose() * derivative * o.df) * eighth, o.trace(B.transpose() * o.df * derivative) * eighth)
-
-
-def _derivative_of_square(o: PaperObjects, v: Any) -> Any:
-    """The derivative of f'^2 J along v."""
-    second = o.second(o.f, v)
-    return (second * o.df + o.df * second) * o.J
