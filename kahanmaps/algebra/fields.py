@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import random
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
 from numbers import Rational
@@ -380,10 +380,23 @@ class _Balls(Field):
     exact = False
     characteristic = 0
     _letters: str
+    _ball: Callable[..., Any]
+    _matrix: Callable[..., Any]
 
     def __init__(self, bits: int) -> None:
         self.bits = bits
         self.name = f"{self._letters}({bits})"
+
+    @property
+    def zero(self) -> Any:
+        return self._ball(0)
+
+    @property
+    def one(self) -> Any:
+        return self._ball(1)
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
+        return self._matrix(rows, columns, [self.convert(entry) for entry in entries])
 
     def format(self, element: Any) -> str:
         """Midpoint and radius, `[0.333333 +/- 1.0e-6]`."""
@@ -416,15 +429,7 @@ class _Balls(Field):
 class BallField(_Balls):
     """Real numbers enclosed in balls of `bits` bits of precision; elements are arb. Made by `RR`."""
 
-    _letters = "RR"
-
-    @property
-    def zero(self) -> arb:
-        return arb(0)
-
-    @property
-    def one(self) -> arb:
-        return arb(1)
+    _letters, _ball, _matrix = "RR", arb, arb_mat
 
     def convert(self, value: Any) -> arb:
         if isinstance(value, arb):
@@ -432,31 +437,17 @@ class BallField(_Balls):
         with self.working():
             return arb(rational(value))
 
-    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> arb_mat:
-        return arb_mat(rows, columns, [self.convert(entry) for entry in entries])
-
 
 class ComplexBallField(_Balls):
     """Complex numbers, each enclosed in a rectangle of two real balls; elements are acb. Made by `CC`."""
 
-    _letters = "CC"
-
-    @property
-    def zero(self) -> acb:
-        return acb(0)
-
-    @property
-    def one(self) -> acb:
-        return acb(1)
+    _letters, _ball, _matrix = "CC", acb, acb_mat
 
     def convert(self, value: Any) -> acb:
         """The element that an exact number, a real ball or a complex one stands for."""
         if isinstance(value, acb):
             return value
         return acb(RR(self.bits).convert(value))
-
-    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> acb_mat:
-        return acb_mat(rows, columns, [self.convert(entry) for entry in entries])
 
 
 QQ = RationalField()

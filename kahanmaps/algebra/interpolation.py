@@ -150,11 +150,6 @@ class Quotient:
     above: tuple[int, ...]
     below: tuple[int, ...]
 
-    def numerator_up_to_factor(self, prime: int) -> tuple[int, ...]:
-        """The coefficients of the numerator, the first made 1."""
-        factor = pow(self.above[0], -1, prime) if self.above else 1
-        return tuple(c * factor % prime for c in self.above)
-
     @classmethod
     def of(cls, shape: Shape, above: Sequence[int], below: Sequence[int], prime: int) -> Quotient | None:
         """The fraction normalised and without its zero terms; None where no denominator is left."""
@@ -492,10 +487,9 @@ def _lift(
     groups: dict[object, list[int]] = {}
     for i, quotient in enumerate(first):
         groups.setdefault((quotient.shape.below, quotient.below), []).append(i)
-    pairs = [
-        split_group(group, [str(first[i].numerator_up_to_factor(modulus)) for i in group], shapes)
-        for group in groups.values()
-    ]
+    # Numerators up to a factor: the first coefficient made 1.
+    monic = [str([c * pow(one.above[0], -1, modulus) % modulus for c in one.above]) for one in first]
+    pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
     misfits = 0
     while True:
         functions = _recognised(list(shapes.values()), residues, modulus, names)
@@ -546,20 +540,14 @@ def _refuting(
     """The black box modulo a prime where the functions do not give its value, if one of some fresh primes is such."""
     for _ in range(_CONFIRMATIONS):
         values = fresh()
-        if not _confirmed(functions, values, rng):
+        values.take(values.anywhere(len(functions[0].names) if functions else 0, rng))
+        field = GF(values.prime)
+        point = [field.convert(entry) for entry in values.points[-1]]
+        try:
+            found = [function.value(field, point) for function in functions]
+        except BadPrime as error:
+            raise Unlucky(str(error)) from error
+        pairs = zip(found, values.values[-1], strict=True)
+        if not all(mine is not None and field.convert(mine) == value for mine, value in pairs):
             return values
     return None
-
-
-def _confirmed(functions: tuple[RationalFunction, ...], values: Values, rng: random.Random) -> bool:
-    """Whether the functions give the value of the black box at one more point."""
-    values.take(values.anywhere(len(functions[0].names) if functions else 0, rng))
-    field = GF(values.prime)
-    point = [field.convert(entry) for entry in values.points[-1]]
-    try:
-        found = [function.value(field, point) for function in functions]
-    except BadPrime as error:
-        raise Unlucky(str(error)) from error
-    return all(
-        mine is not None and field.convert(mine) == value for mine, value in zip(found, values.values[-1], strict=True)
-    )

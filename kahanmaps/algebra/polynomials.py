@@ -204,7 +204,7 @@ def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:
     """The polynomial with some variables replaced by numbers, in the ring of the remaining variables."""
     names = names_of(polynomial)
-    known = {name: value for name, value in values.items() if name in names}
+    known: dict[Any, Any] = {name: value for name, value in values.items() if name in names}
     return polynomial.subs(known).project_to_context(ring([name for name in names if name not in known]))
 
 

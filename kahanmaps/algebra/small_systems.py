@@ -268,15 +268,19 @@ class _Solver:
             return
         gens = basis[0].context().gens()
         form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free)), basis[0].context().constant(0))
-        matrix = _multiplication(form, quotient, basis)
+        context, places = form.context(), {m: k for k, m in enumerate(quotient)}
+        matrix = fmpq_mat(len(quotient), len(quotient))  # of the multiplication by the form in the quotient ring
+        for k, m in enumerate(quotient):
+            for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
+                matrix[places[tuple(int(e) for e in monomial)], k] = value
         _, factors = matrix.charpoly().factor()
         for factor, _ in factors:
             if factor.degree() > 1:
                 text = f"groups of {factor.degree()} conjugate solutions"
-                value = form * 0
+                at_form = form * 0
                 for coefficient in reversed(factor.coeffs()):
-                    value = value * form + coefficient
-                self._no_rational_point(text, [*basis, value], values)
+                    at_form = at_form * form + coefficient
+                self._no_rational_point(text, [*basis, at_form], values)
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
 
@@ -337,17 +341,6 @@ def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list
         raised = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free))
         layer = list(dict.fromkeys(raised))
     return found
-
-
-def _multiplication(form: fmpq_mpoly, quotient: Sequence[tuple[int, ...]], basis: Sequence[fmpq_mpoly]) -> fmpq_mat:
-    """The matrix of multiplication by `form` in the quotient ring."""
-    context = form.context()
-    places = {m: k for k, m in enumerate(quotient)}
-    matrix = fmpq_mat(len(quotient), len(quotient))
-    for k, m in enumerate(quotient):
-        for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
-            matrix[places[tuple(int(e) for e in monomial)], k] = value
-    return matrix
 
 
 def without_contained(components: Sequence[Component]) -> list[Component]:

@@ -30,14 +30,6 @@ _LATEX = ("dot", "ddot", "frac", "dfrac", "mathrm", "rm", "left", "begin", "d", 
 _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 
 
-class Equations(NamedTuple):
-    """Right-hand sides by variable, the variables that are velocities, and which names were made, in sentences."""
-
-    sides: dict[str, str]
-    velocities: list[str]
-    notes: list[str]
-
-
 class _Derivative(NamedTuple):
     name: str
     order: int
@@ -132,7 +124,7 @@ def _without_outer_brackets(tokens: list[str]) -> list[str]:
 
 def read_equations(
     pieces: Sequence[list[str]], variables: Sequence[str] = (), parameters: Collection[str] = ()
-) -> Equations:
+) -> tuple[dict[str, str], list[str], list[str]]:
     """The right-hand sides of equations of first and second order, one for each variable.
 
     Args:
@@ -141,7 +133,8 @@ def read_equations(
         parameters: names that are taken.
 
     Returns:
-        The sides: of the variables as they come, then of their velocities.
+        The right-hand sides by variable, these as they come, then their velocities; the variables that are velocities;
+        and which names were made, in sentences.
 
     Raises:
         InputError: for an equation that is none, with what to write instead, and for two of one variable.
@@ -172,7 +165,7 @@ def read_equations(
         sides[name] = velocities.get(name, "") or _formula(name, formula, orders, velocities)
     for name, velocity in velocities.items():
         sides[velocity] = _formula(name, formulas[name], orders, velocities)
-    return Equations(sides, list(velocities.values()), notes)
+    return sides, list(velocities.values()), notes
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:

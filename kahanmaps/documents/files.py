@@ -11,6 +11,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed, shorten
-from kahanmaps.documents.catalog import text_of
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
 from kahanmaps.documents.iterates import iterates_in, with_iterates
@@ -284,10 +284,11 @@ def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
         made = family_member(name)
         if made is not None:
             return made[1], made[0], None
-        try:
-            return _TOML.document(text_of(name), name), name, None
-        except KeyError:
-            raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue") from None
+        folder = resources.files("kahanmaps.documents").joinpath("catalog")
+        for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
+            if name.isidentifier() and found.is_file():
+                return _TOML.document(found.read_bytes(), name), name, None
+        raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
     return _document(_TOML.read(path), name)[0], os.path.abspath(path), partial(_named, path.parent)
 

@@ -68,10 +68,10 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
             for l in range(n):
                 row = [zero] * len(exponents)
                 for k, value in by_row[i]:
-                    key = _sorted(k, j, l)
+                    key = tuple(sorted((k, j, l)))
                     row[place[key]] += value * weight[key]
                 for k, value in by_row[j]:
-                    key = _sorted(i, k, l)
+                    key = tuple(sorted((i, k, l)))
                     row[place[key]] -= value * weight[key]
                 flat += row
                 equations += 1
@@ -158,17 +158,11 @@ def third_derivatives(H: fmpq_mpoly) -> list[fmpq_mat]:
     return [fmpq_mat(n, n, tensor) for tensor in tensors]
 
 
-def _indices(exponents: tuple[int, ...]) -> tuple[int, int, int]:
+def _indices(exponents: tuple[int, ...]) -> tuple[int, ...]:
     """The variables of a cubic monomial, in increasing order."""
-    a, b, c = (i for i, exponent in enumerate(exponents) for _ in range(exponent))
-    return a, b, c
+    return tuple(i for i, exponent in enumerate(exponents) for _ in range(exponent))
 
 
-def _sorted(a: int, b: int, c: int) -> tuple[int, int, int]:
-    x, y, z = sorted((a, b, c))
-    return x, y, z
-
-
-def _symmetry(key: tuple[int, int, int]) -> int:
+def _symmetry(key: tuple[int, ...]) -> int:
     """The third derivative of the monomial: 6 for x^3, 2 for x^2 y, 1 for x y z."""
     return {1: 6, 2: 2, 3: 1}[len(set(key))]

@@ -72,7 +72,7 @@ class RecognisedMember:
     @property
     def is_standard(self) -> bool:
         """Whether T = I: the member has the coordinates of the system."""
-        return self.T == QQ.identity(self.member.dim)
+        return bool(self.T == QQ.identity(self.member.dim))
 
     @property
     def text(self) -> str:

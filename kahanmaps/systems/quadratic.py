@@ -15,7 +15,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.fields import Field, rational
+from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinations, names_of, ring
 from kahanmaps.algebra.written.numerals import check_names
 from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial
@@ -84,44 +84,29 @@ class QuadraticSystem(PolynomialField, DisplayedAsFormula):
         """Whether B = 0 and c = 0."""
         return all(sum(m[: self.dim]) == 2 for polynomial in self.rhs for m in polynomial.monoms())
 
+    @property
+    def _numbers(self) -> SystemOver:
+        """The system over Q. Raises InputError where there are symbols."""
+        if self.symbols:
+            raise InputError(f"found the symbols {', '.join(self.symbols)} in the coefficients, expected numbers")
+        return self.over(QQ)
+
     @cached_property
     def Q(self) -> tuple[fmpq_mat, ...]:
         """The symmetric matrix of each quadratic form, without symbols."""
-        n = self.dim
-        entries = [fmpq(0)] * n**3
-        for i, indices, coefficient in self._coefficients(2):
-            j, k = indices
-            entries[(i * n + j) * n + k] += coefficient / 2
-            entries[(i * n + k) * n + j] += coefficient / 2
+        n, entries = self.dim, (self._numbers.tensor / 2).entries()
         return tuple(fmpq_mat(n, n, entries[i * n * n : (i + 1) * n * n]) for i in range(n))
 
     @cached_property
     def B(self) -> fmpq_mat:
         """The matrix of the linear part, without symbols."""
-        n = self.dim
-        entries = [fmpq(0)] * (n * n)
-        for i, (j,), coefficient in self._coefficients(1):
-            entries[i * n + j] = coefficient
-        return fmpq_mat(n, n, entries)
+        linear: fmpq_mat = self._numbers.B
+        return linear
 
     @cached_property
     def c(self) -> tuple[fmpq, ...]:
         """The constants, without symbols."""
-        entries = [fmpq(0)] * self.dim
-        for i, _, coefficient in self._coefficients(0):
-            entries[i] = coefficient
-        return tuple(entries)
-
-    def _coefficients(self, of_degree: int) -> list[tuple[int, list[int], fmpq]]:
-        """Component, indices of the variables and coefficient of every term of one degree."""
-        if self.symbols:
-            raise InputError(f"found the symbols {', '.join(self.symbols)} in the coefficients, expected numbers")
-        return [
-            (i, _indices(monomial), coefficient)
-            for i, polynomial in enumerate(self.rhs)
-            for monomial, coefficient in polynomial.terms()
-            if sum(monomial) == of_degree
-        ]
+        return tuple(self._numbers.c.entries())
 
     def scaled(self, factor: Any) -> QuadraticSystem:
         """The system x' = factor f(x). Its Kahan map at eps is that of f at factor eps."""

@@ -9,8 +9,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from flint import arb, fmpq, fmpz, fmpz_mod_ctx, nmod
-from helpers import FIELDS, SMALLEST_LARGE_PRIME, encloses, over_exact_fields, rationals, some, together
+from flint import acb, arb, fmpq, fmpz, fmpz_mod_ctx, nmod
+from helpers import FIELDS, SMALLEST_LARGE_PRIME, over_exact_fields, rationals, some, together
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
