@@ -99,14 +99,11 @@ def check_commute(
                 "give a second system, or one of kind [family], whose associated maps are compared pairwise"
             )
         return _check_member(file, file.member, settings)
-    return _check_pair(file, as_file(other), settings, eps2)
-
-
-def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: fmpq | None) -> Report:
+    second = as_file(other)
     f = file.map
-    g, note = matched(file, other)
+    g, note = matched(file, second)
     notes = [note] if note else []
-    as_they_are = set(f.variables) != set(other.variables) or f.variables == other.variables
+    as_they_are = set(f.variables) != set(second.variables) or f.variables == second.variables
     ratio, is_same_step = SAME_STEP, True
     if eps2 is not None:
         if settings.eps is None:
@@ -116,7 +113,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         ratio = eps2 / settings.eps
         note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
-        if other.is_quadratic and isinstance(g, Kahan):
+        if second.is_quadratic and isinstance(g, Kahan):
             # For it depends on the product eps g only.
             g, ratio, is_same_step = Kahan(g.system.scaled(ratio)), SAME_STEP, ratio == 1
         else:
@@ -124,17 +121,17 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
         notes.append(f"{note}; the evidence below is stated for eps")
     _require_another_than_identity(file, "f", f, settings.eps, settings.seed)
     at_g = None if settings.eps is None else settings.eps * ratio
-    _require_another_than_identity(other, "g", g, at_g, settings.seed)
+    _require_another_than_identity(second, "g", g, at_g, settings.seed)
     proof = None
-    if is_same_step and as_they_are and file.member is not None and other.member is not None:
-        proof = theorems.commuting_by_involution_of_members(file.member, other.member)
-    if proof is None and file.is_quadratic and other.is_quadratic and isinstance(g, Kahan):
+    if is_same_step and as_they_are and file.member is not None and second.member is not None:
+        proof = theorems.commuting_by_involution_of_members(file.member, second.member)
+    if proof is None and file.is_quadratic and second.is_quadratic and isinstance(g, Kahan):
         proof = theorems.commuting_by_splitting(file.system, g.system)
     identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
     orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
-    kahan = "Kahan maps" if file.is_quadratic and other.is_quadratic else "maps"
+    kahan = "Kahan maps" if file.is_quadratic and second.is_quadratic else "maps"
     finding = judge(
-        f"the {kahan} of {file.labelled('f')} and {other.labelled('g')} commute",
+        f"the {kahan} of {file.labelled('f')} and {second.labelled('g')} commute",
         identity,
         settings,
         proof,
@@ -143,7 +140,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
         source=SOURCE if proof is not None and "Theorem 9" in proof.summary else "",
     )
     more = {"eps2": format_number(eps2)} if eps2 is not None else {}
-    context = settings.context([file, other], orbit=orbit.to_json(), **more)
+    context = settings.context([file, second], orbit=orbit.to_json(), **more)
     return Report("commute", (finding,), context, notes, settings.cut_short(orbit))
 
 

@@ -83,25 +83,8 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         terms = [f"{'+' if signs[j] > 0 else '-'} x{j + 1}" for j in sorted(signs, key=lambda j: -signs[j])]
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
-    return {
-        "variables": x,
-        "catalog": {
-            "title": f"Bogoyavlenskij-Itoh system LV({n},{k})",
-            "sources": ["itoh-1987", "bogoyavlenskij-1988", "damianou-2017", "kouloukas-quispel-vanhaecke-2016"],
-            "convention": "the sources treat the flow, the last one with a Kahan map of time step 2 eps",
-            "facts": _facts(n, k),
-            "degrees": [degree(n, k, m) for m in range(1, _SHOWN_DEGREES + 1)],
-            "growth": "quadratic" if k else "linear",
-        },
-        "system": {"rhs": [f"{x[i]}*({row})" for i, row in enumerate(rows)]},
-        "integrals": integrals,
-        "density": {"phi": "*".join(x)},
-    }
-
-
-def _facts(n: int, k: int) -> list[str]:
-    """What is known of the flow and the map, each with its status."""
     cross, whole = n - 2 * k - 2, n == 2 * k + 1
+    # What is known of the flow and the map, each with its status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
         "and cross-ratios.",
@@ -125,7 +108,20 @@ def _facts(n: int, k: int) -> list[str]:
             "2k + 1."
         )
     facts.append("Measured: for all n up to 7 the degrees of the iterates have a formula in n, k and m.")
-    return facts
+    return {
+        "variables": x,
+        "catalog": {
+            "title": f"Bogoyavlenskij-Itoh system LV({n},{k})",
+            "sources": ["itoh-1987", "bogoyavlenskij-1988", "damianou-2017", "kouloukas-quispel-vanhaecke-2016"],
+            "convention": "the sources treat the flow, the last one with a Kahan map of time step 2 eps",
+            "facts": facts,
+            "degrees": [degree(n, k, m) for m in range(1, _SHOWN_DEGREES + 1)],
+            "growth": "quadratic" if k else "linear",
+        },
+        "system": {"rhs": [f"{x[i]}*({row})" for i, row in enumerate(rows)]},
+        "integrals": integrals,
+        "density": {"phi": "*".join(x)},
+    }
 
 
 FAMILIES = {"lv": NamedFamily("lv(n,k)", "lv(7,3)", "Bogoyavlenskij-Itoh systems, 2k + 1 <= n", lotka_volterra)}

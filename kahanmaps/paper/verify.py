@@ -240,6 +240,7 @@ class Verifier:
             rng = random.Random(f"verify {self._seed} {needs_split} {number}")
             if needs_split and not member.is_generic:
                 return None
+            in_K: tuple[Any, ...] | None
             while self._points[key] is None:
                 with suppress(BadPrime):
                     if needs_split:
@@ -248,11 +249,11 @@ class Verifier:
                         found = objects_over.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if found is None:
                             return None
-                        K, roots = found
+                        K, in_K = found
                     else:
                         K = random_prime_field(rng)
-                        roots = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
-                    self._points[key] = objects_over.point_over(member, K, roots, self.settings.eps, rng, order)
+                        in_K = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
+                    self._points[key] = objects_over.point_over(member, K, in_K, self.settings.eps, rng, order)
         return self._points[key]
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
