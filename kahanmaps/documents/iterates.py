@@ -62,7 +62,14 @@ def parse_with_iterates(
     """
     if not isinstance(text, str) or "~" not in text:
         return parse_rational_function(text, (*variables, *others), constants)
-    formula, *behind = _at_commas(text)
+    pieces, depth = [""], 0
+    for character in text:  # cut at commas that are in no brackets
+        depth += (character == "(") - (character == ")")
+        if character == "," and depth <= 0:
+            pieces.append("")
+        else:
+            pieces[-1] += character
+    formula, *behind = pieces
     definitions = {}
     for piece in behind:
         name, equals, value = (part.strip() for part in piece.partition("="))
@@ -99,15 +106,3 @@ def parse_with_iterates(
     values = [later(P, steps) for steps in range(outer + 1) for P in functions]
     above, below = (part.compose(*values, *gens, ctx=context) for part in parts)
     return RationalFunction(above, below)
-
-
-def _at_commas(text: str) -> list[str]:
-    """The pieces of a text between commas that are in no brackets."""
-    pieces, depth = [""], 0
-    for character in text:
-        depth += (character == "(") - (character == ")")
-        if character == "," and depth <= 0:
-            pieces.append("")
-        else:
-            pieces[-1] += character
-    return pieces

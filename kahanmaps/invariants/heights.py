@@ -237,7 +237,21 @@ def height_growth(
     method = choose_method(None, "exact", normal_form, None if every == 1 else at).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
         iterates = Orbit(kahan_map, start, at=at, normal_form=normal_form, max_digits=max_digits)
-        heights, end = _reached(iterates, deadline)
+        # A return to the start is noticed here: at a multiple of the period, where steps are left out.
+        heights: list[int] = []
+        origin, back = None, None
+        for point in _in_time(iterates, deadline):
+            if origin is None:
+                origin = point.value
+            elif back is None and point.value == origin:
+                back = point.step
+            heights.append(height_of(point))
+        if not heights:  # the start alone is over the budget; an orbit that is walked delivers it all the same
+            heights.append(height(iterates.start))
+        assert iterates.end is not None
+        end = iterates.end
+        if back is not None:
+            end = OrbitEnd("periodic", end.steps, f"at step {back} the orbit is at its start")
     else:
         form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
         orbit = Orbit(kahan_map, start, at[-1], normal_form=form, max_digits=max_digits)
@@ -264,25 +278,6 @@ def _in_time(orbit: Orbit, deadline: float | None) -> Iterator[OrbitPoint]:
         yield point
         if deadline is not None and time.monotonic() > deadline:
             orbit.interrupt()
-
-
-def _reached(iterates: Orbit, deadline: float | None) -> tuple[list[int], OrbitEnd]:
-    """Heights of iterates that are reached directly, the start among them; a return to the start is noticed here."""
-    heights: list[int] = []
-    first, back = None, None
-    for point in _in_time(iterates, deadline):
-        if first is None:
-            first = point.value
-        elif back is None and point.value == first:
-            back = point.step
-        heights.append(height_of(point))
-    if not heights:  # the start alone is over the budget; an orbit that is walked delivers it all the same
-        heights.append(height(iterates.start))
-    assert iterates.end is not None
-    end = iterates.end
-    if back is not None:
-        end = OrbitEnd("periodic", end.steps, f"at step {back} the orbit is at its start")  # a multiple of the period
-    return heights, end
 
 
 def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
