@@ -430,27 +430,26 @@ class Verifier:
             except UNDEFINED:  # a point where the map has no value: no evidence, and none is claimed
                 pass
         if self.options.ball_bits is not None:
-            yield self._by_balls(claim, self.member, self.options.ball_bits, rng)
-
-    def _by_balls(self, claim: Claim, member: FamilyMember, bits: int, rng: random.Random) -> Evidence:
-        objects = objects_over.ball_objects(member, bits, rng, self.settings.eps, self.options.order)
-        widest, pairs = -math.inf, 0
-        try:
-            with objects.K.working():
-                for left, right in claim.function(objects):
-                    pairs += 1
-                    if not same(objects.K, left, right):
-                        raise Contradiction(f"{claim.place}: {claim.title}: two balls that must overlap do not")
-                    for a, b in zip(entries(left), entries(right), strict=True):
-                        distance = abs(objects.K.convert(a) - objects.K.convert(b)).abs_upper()
-                        if distance != 0:
-                            widest = max(widest, float(distance.log().mid()) / math.log(2))
-        except (PrecisionLost, *UNDEFINED):
-            return Evidence("complex balls", f"balls of {bits} bits are too wide to compare", {"bits": bits})
-        text = f"over complex balls of {bits} bits the sides overlap"
-        if widest > -math.inf:
-            text += f", to within 2^{math.ceil(widest)}"
-        return Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
+            bits = self.options.ball_bits
+            objects = objects_over.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
+            widest, pairs = -math.inf, 0
+            try:
+                with objects.K.working():
+                    for left, right in claim.function(objects):
+                        pairs += 1
+                        if not same(objects.K, left, right):
+                            raise Contradiction(f"{claim.place}: {claim.title}: two balls that must overlap do not")
+                        for a, b in zip(entries(left), entries(right), strict=True):
+                            distance = abs(objects.K.convert(a) - objects.K.convert(b)).abs_upper()
+                            if distance != 0:
+                                widest = max(widest, float(distance.log().mid()) / math.log(2))
+            except (PrecisionLost, *UNDEFINED):
+                yield Evidence("complex balls", f"balls of {bits} bits are too wide to compare", {"bits": bits})
+                return
+            text = f"over complex balls of {bits} bits the sides overlap"
+            if widest > -math.inf:
+                text += f", to within 2^{math.ceil(widest)}"
+            yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
         """What holds for the whole table."""

@@ -15,8 +15,8 @@ from kahanmaps.algebra.polynomials import evaluate, gradient, monomials
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.families import degree
+from kahanmaps.documents.files import parse_system
 from kahanmaps.experiments.results.recipes import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
