@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps.errors import InputError, quoted
+from kahanmaps.errors import ExpressionError, InputError, quoted
 from kahanmaps_cli import library as lib
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ else:
 HELP_OPTIONS = ["-h", "--help"]
 _NAME = re.compile(r"(?<![0-9.A-Za-z_])[A-Za-z_]")
 _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
+_WRITE = {"\u2212\u2013": "write the minus sign as -", ";": "the numbers of a point have commas between them"}
 _MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
 
@@ -45,18 +46,19 @@ class Kind(OptionType):
             self.fail(str(error), param, ctx)
 
 
-def _read_number(text: str) -> Any:
-    return lib.parse_number(text)
+def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
+    """A number, or what `read` makes of the text; characters that others write in numbers are told with what to type."""
+    try:
+        return (read or lib.parse_number)(text)
+    except ExpressionError as error:
+        hints = [hint for characters, hint in _WRITE.items() if any(c in text for c in characters)]
+        raise ExpressionError("; ".join([error.message, *hints]), text, error.column) from None
 
 
 def _read_point(text: str, has_names: bool = False) -> Any:
     if has_names and _NAME.search(text):
         return text  # what the names stand for is known when the system is
-    return lib.parse_point(text)
-
-
-def _read_arithmetic(text: str) -> Any:
-    return lib.Arithmetic.parse(text)
+    return _read_number(text, lib.parse_point)
 
 
 def _read_whole(text: str, least: int) -> int:
@@ -118,7 +120,7 @@ def _read_shard(text: str) -> tuple[int, ...]:
 
 ExactNumber = partial(Kind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
 PointText = partial(Kind, "point", _read_point)  # such numbers separated by commas
-Arithmetic = partial(Kind, "kind", _read_arithmetic)  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
+Arithmetic = partial(Kind, "kind", lambda text: lib.Arithmetic.parse(text))  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
 Seconds = partial(Kind, "seconds", _read_seconds)  # a time above 0
 Steps = partial(Kind, "n1,n2,...", _read_steps)  # step numbers separated by commas
 Shard = partial(Kind, "i/n", _read_shard)  # I/N: the I-th of N parts

@@ -339,6 +339,7 @@ class ExperimentReader:
     def _read_files(self, key: str, references: Sequence[str]) -> list[dict[str, Any]]:
         """The recipes of the files that the value of a key names."""
         recipes: dict[str, dict[str, Any]] = {}
+        names: dict[str, str] = {}  # of the files with these documents
         for number, reference in enumerate(references, start=1):
             place = f"{key}[{number}]" if len(references) > 1 else key
             with self._at(place):
@@ -355,8 +356,13 @@ class ExperimentReader:
                             self.mistake(place, f"{error}{suggestion(name, [_FAMILY_WORD])}")
                         continue
                     if recipe["document"] in recipes:
-                        self.mistake(place, f"found {file.name} twice, expected every system once")
-                    recipes[recipe["document"]] = recipe
+                        same = f"{name} says the same as {names[recipe['document']]}"
+                        sentence = f"found {file.name} twice, expected every system once: {same}"
+                        if self._skips and key == "system":
+                            self.skipped.append((name, sentence))
+                            continue
+                        self.mistake(place, sentence)
+                    recipes[recipe["document"]], names[recipe["document"]] = recipe, name
                     if key == "system":
                         self.files.append(file)
                         with self._at(place):

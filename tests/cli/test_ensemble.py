@@ -6,6 +6,7 @@ Starts come from text, .npy files, standard input or a seed; whatever is wrong w
 
 import io
 import json
+import os
 import shlex
 import signal
 import subprocess
@@ -156,6 +157,13 @@ def test_wrong_starts_give_2_and_say_where(kahanmaps, tmp_path, data, words):
     if not data.startswith(b"\x93NUMPY"):
         (tmp_path / "s.npy").write_bytes(data[:100])
         assert "found no .npy file" in kahanmaps(f"{TOP} --steps 1 --starts", tmp_path / "s.npy").err
+
+
+def test_starts_are_not_awaited_from_a_pipe_that_nobody_may_write_to(kahanmaps, tmp_path):
+    os.mkfifo(tmp_path / "s")
+    outcome = kahanmaps(f"{TOP} --steps 1 --starts", tmp_path / "s")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "it is a pipe or a device, expected a file" in outcome.err
 
 
 def test_text_and_numbers_are_bounded(kahanmaps, tmp_path, monkeypatch):

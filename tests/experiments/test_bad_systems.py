@@ -68,6 +68,18 @@ def test_a_system_of_the_wrong_kind_for_the_task_is_left_out_too(spec):
     assert "expected one of kind [family]" in experiment.skipped[0][1]
 
 
+def test_a_file_that_says_the_same_as_another_is_named_with_it_or_left_out(spec, tmp_path):
+    (tmp_path / "members" / "copy").mkdir()
+    (tmp_path / "members" / "copy" / "a.toml").write_text(GOOD)
+    text = spec(ORBITS.replace('"members/*.toml"', '["members/a.toml", "members/copy/*.toml"]'))
+    told = "found a twice, expected every system once: members/copy/a.toml says the same as members/a.toml"
+    with pytest.raises(SpecError, match=f"system.2.: {told}"):
+        read_spec(text)
+    [experiment] = read_spec(text, skip_bad=True).experiments
+    assert [task.system["name"] for task in experiment.tasks()] == ["a"]
+    assert experiment.skipped == (("members/copy/a.toml", told),)
+
+
 def test_at_least_one_system_has_to_be_left(spec):
     text = ORBITS.replace('"members/*.toml"', '["members/b.toml", "members/c.toml"]')
     with pytest.raises(SpecError, match="expected one at least"):

@@ -7,6 +7,8 @@ names of the variables says which columns are meant.
 from __future__ import annotations
 
 import io
+import os
+import stat
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -74,6 +76,11 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.NDArray[Any]:
     if path == "-":
         data = sys.stdin.buffer.read(MAX_NPY_BYTES + 1)
     else:
+        # Nobody may ever write to a pipe, and a device need not end. But /dev/fd/63 is the shell's <(...).
+        mode = os.stat(path).st_mode
+        is_of_shell = stat.S_ISFIFO(mode) and path.startswith(("/dev/fd/", "/dev/stdin"))
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
+            raise InputError(f"cannot read the starts {path}: it is a pipe or a device, expected a file")
         with open(path, "rb") as stream:
             data = stream.read(MAX_NPY_BYTES + 1)
     if data.startswith(_MAGIC):
