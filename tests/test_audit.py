@@ -6,7 +6,7 @@ import pytest
 
 from kahanmaps.paper.registry import claims
 from kahanmaps.paper.verify import verify
-from kahanmaps_cli.runs.verify_table import markdown
+from kahanmaps_cli.commands.verify import markdown
 
 AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding="utf-8")
 

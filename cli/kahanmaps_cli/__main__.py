@@ -18,6 +18,27 @@ def _end(signum: int, frame: object) -> None:
         os._exit(_INTERRUPTED)  # nothing has begun that would have to be ended, or everything has been
 
 
+# Bytes of addresses that each takes while it is loaded and works, measured, and half as much again.
+_ROOM = {"numpy": 300 << 20, "matplotlib": 200 << 20, "numba": 300 << 20, "llvmlite": 300 << 20}
+
+
+class _Room:
+    """A finder of modules that finds none, and raises MemoryError for libraries that would not have room to work in.
+
+    Without it OpenBLAS, below numpy, ends the process by itself, with the status 1 that says `refuted`. Nothing can be
+    done about it then, so room is looked for before, at the first part of a library.
+    """
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        if name in _ROOM:
+            import mmap
+
+            try:
+                mmap.mmap(-1, _ROOM[name]).close()
+            except OSError as error:
+                raise MemoryError(f"{name} would have no room") from error
+
+
 def main() -> int:
     """Run the command line and return its exit status."""
     usual = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
@@ -25,12 +46,14 @@ def main() -> int:
     for number in ours:
         _signal.signal(number, _end)
     import atexit
+    import resource
 
-    from kahanmaps_cli.limited_memory import look_for_room
     from kahanmaps_cli.main import main as run
     from kahanmaps_cli.signals import handle
 
-    look_for_room()
+    if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:  # ulimit -v
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        sys.meta_path.insert(0, _Room())
     for number in ours:  # Python takes handlers away at its end, and the status is known by then
         atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:

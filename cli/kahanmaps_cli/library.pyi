@@ -74,7 +74,6 @@ from kahanmaps.experiments.results.export import write_jsonl as write_jsonl
 from kahanmaps.experiments.results.export import write_parquet as write_parquet
 from kahanmaps.experiments.results.records import KEPT as KEPT
 from kahanmaps.experiments.results.records import VERDICTS as VERDICTS
-from kahanmaps.experiments.results.records import Job as Job
 from kahanmaps.experiments.results.records import Record as Record
 from kahanmaps.experiments.results.records import option_words as option_words
 from kahanmaps.experiments.results.records import system_words as system_words
@@ -96,7 +95,6 @@ from kahanmaps.family.draw import parse_chi as parse_chi
 from kahanmaps.family.draw import random_eigenvalues as random_eigenvalues
 from kahanmaps.family.planar import NormalForm as NormalForm
 from kahanmaps.family.planar import normal_form as normal_form
-from kahanmaps.family.recognise import RecognisedMember as RecognisedMember
 from kahanmaps.family.recognise import reason_against as reason_against
 from kahanmaps.family.recognise import recognised_hamiltonian as recognised_hamiltonian
 from kahanmaps.family.recognise import recognised_member as recognised_member
@@ -133,7 +131,6 @@ from kahanmaps.laboratory.scan.result import Scan as Scan
 from kahanmaps.laboratory.scan.scan import scan as scan
 from kahanmaps.laboratory.scan.sweep import TimeOver as TimeOver
 from kahanmaps.laboratory.singular.outcomes import UNDECIDED as UNDECIDED
-from kahanmaps.laboratory.singular.outcomes import Hypersurface as Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun as SingularityRun
 from kahanmaps.laboratory.singular.singularities import singularities as singularities
 from kahanmaps.laboratory.singular.singularities import steps_by_default as steps_by_default

@@ -173,13 +173,6 @@ def cli(ctx: click.Context, show_version: bool) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     try:
-        return _run(argv)
-    finally:
-        leave_nothing_to_flush()
-
-
-def _run(argv: Sequence[str] | None) -> int:
-    try:
         have_standard_streams()
         if any("\0" in word for word in argv or ()):  # a shell cannot say it, who calls this can
             raise click.UsageError("found a zero byte among the arguments: no file and no name can have it")
@@ -205,17 +198,16 @@ def _run(argv: Sequence[str] | None) -> int:
     except BrokenPipeError:
         return UNDECIDED
     except Exception as error:
-        if _is_interrupt(error):
+        # Python makes RuntimeError of Ctrl-C where a class is being made, in an import.
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__cause__ or cause.__context__
+        if cause is not None:
             say("interrupted")
             return INTERRUPTED
         return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
-
-
-def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: Python makes RuntimeError of it where a class is being made, in an import."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
+    finally:
+        leave_nothing_to_flush()
 
 
 def _report(error: Exception) -> int:
@@ -233,7 +225,10 @@ def _report(error: Exception) -> int:
         return UNDECIDED
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
-        say(bounded(f"Error: {error.strerror or error}{where}{_missing_folder(error)}"))
+        folder = os.path.dirname(error.filename) if isinstance(error.filename, str) else ""
+        is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
+        hint = f" (there is no folder {folder}: make it first, or check the name)" if is_missing else ""
+        say(bounded(f"Error: {error.strerror or error}{where}{hint}"))
         return UNDECIDED if is_of_the_machine(error) else WRONG_USE
     if isinstance(error, ImportError) and not (error.name or "").startswith("kahanmaps"):
         say(bounded(f"Error: {error.name or 'a library'} cannot be loaded: {error}; install it again"))
@@ -243,13 +238,6 @@ def _report(error: Exception) -> int:
     blame = f"Either {read}, which was being read, is damaged, or this" if read else "This"
     say(bounded(f"{blame} is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."))
     return INTERNAL
-
-
-def _missing_folder(error: OSError) -> str:
-    """A hint, where a file cannot be made because its folder is not there."""
-    folder = os.path.dirname(error.filename) if isinstance(error.filename, str) else ""
-    is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
-    return f" (there is no folder {folder}: make it first, or check the name)" if is_missing else ""
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ class Kind(OptionType):
 
 
 def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
-    """A number, or what `read` makes of the text; characters that others write in numbers are told with what to type."""
+    """A number, or what `read` makes of the text; what else is often written in numbers has a hint."""
     try:
         return (read or lib.parse_number)(text)
     except ExpressionError as error:
@@ -120,7 +120,9 @@ def _read_shard(text: str) -> tuple[int, ...]:
 
 ExactNumber = partial(Kind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
 PointText = partial(Kind, "point", _read_point)  # such numbers separated by commas
-Arithmetic = partial(Kind, "kind", lambda text: lib.Arithmetic.parse(text))  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
+Arithmetic = partial(
+    Kind, "kind", lambda text: lib.Arithmetic.parse(text)
+)  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
 Seconds = partial(Kind, "seconds", _read_seconds)  # a time above 0
 Steps = partial(Kind, "n1,n2,...", _read_steps)  # step numbers separated by commas
 Shard = partial(Kind, "i/n", _read_shard)  # I/N: the I-th of N parts

@@ -160,14 +160,6 @@ def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name):
         assert is_read_or_refused(READERS[name], path)
 
 
-def places(value: Any) -> Iterator[tuple[Any, Any]]:
-    """Every place of a value in JSON: what it is in, and its key there; of long lists the first two."""
-    if isinstance(value, dict | list):
-        for key in list(value) if isinstance(value, dict) else range(min(2, len(value))):
-            yield value, key
-            yield from places(value[key])
-
-
 # Readers that leave
 
 

@@ -20,7 +20,6 @@ from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.laboratory.preserve import densities
 from kahanmaps.laboratory.singular.singularities import singularities
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
-from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 
@@ -131,11 +130,6 @@ def test_what_is_missing_has_a_reason(monkeypatch):
 
 
 # Symmetries and commuting systems
-
-
-def test_symmetries_are_those_of_the_library():
-    found, direct = perform("find-symmetry", TOP), linear_symmetries(TOP.system)
-    assert (found["group_order"], found["generators"]) == (direct.order, [one.text for one in direct.generators])
 
 
 def test_a_member_commutes_with_its_associated_maps_and_others_with_nothing():

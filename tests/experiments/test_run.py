@@ -84,14 +84,6 @@ def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
     assert sorted(record.result["seed_squared"] for record in new if record.result) == [36, 49, 64]
 
 
-def test_failed_tasks_are_done_again_when_that_is_asked_for(tmp_path: Path):
-    text = '[experiments.a]\ntask = "fault"\naxes = { order = [8], seed = "0..3" }'
-    assert sum(not record.is_ok for record in run(text, tmp_path / "a.db")) == 2
-    assert list(run(text, tmp_path / "a.db")) == []
-    again = list(run(text, tmp_path / "a.db", retry_failed=True))
-    assert [record.outcome for record in again] == [Outcome.FAILED] * 2
-
-
 @pytest.fixture
 def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Records are handed on as they come."""

@@ -53,20 +53,13 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
+    asked = {"symbols": symbols, "eps": eps, **opt.given(options, "seconds", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
     report = _Report(as_json or markdown)
     with Progress(quiet) as progress:
         report.progress = progress
         try:
-            lib.analyze(
-                file,
-                symbols=symbols,
-                eps=eps,
-                **opt.given(options, "seconds", "seed"),
-                progress=progress,
-                reached=report,
-                processes=2,
-            )
+            lib.analyze(file, **asked, progress=progress, reached=report)
         except KeyboardInterrupt:
             if report.found is None:
                 raise
@@ -76,9 +69,18 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if as_json:
         print_json(found.to_json())
     elif markdown:
-        _print_markdown(found)
+        lines = [f"# {lib.markdown(lib.analysis_title(found))}", "", "```"]
+        lines += [*str(found.file.map).split("\n"), "```", "", f"**{lib.markdown(found.conclusion.sentence)}**", ""]
+        for name, told in found.sections:
+            lines += [f"## {name}", ""]
+            lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
+            lines.append("")
+        echo("\n".join(lines))
     else:
-        report.end()
+        report.tell(found.sections)
+        final = found.conclusion
+        tell("\nverdict", style="bold")
+        tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
     if found.interrupted:
         say("interrupted: the verdict rests on what was found so far")
         return INTERRUPTED
@@ -99,17 +101,10 @@ class _Report:
             return
         if begins:
             tell(lib.analysis_head(found))
-        self._tell(found.final_sections)
+        self.tell(found.final_sections)
 
-    def end(self) -> None:
-        """What is left of it, and the verdict."""
-        assert self.found is not None
-        self._tell(self.found.sections)
-        final = self.found.conclusion
-        tell("\nverdict", style="bold")
-        tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
-
-    def _tell(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
+    def tell(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
+        """Print the sections that have not been printed yet."""
         if self.progress is not None and len(sections) > self._told:
             self.progress.clear()
         for name, lines in sections[self._told :]:
@@ -118,13 +113,3 @@ class _Report:
                 tell(f"{line.status}\t{formula(line.text)}")
         self._told = max(self._told, len(sections))
         sys.stdout.flush()
-
-
-def _print_markdown(found: lib.Analysis) -> None:
-    lines = [f"# {lib.markdown(lib.analysis_title(found))}", "", "```"]
-    lines += [*str(found.file.map).split("\n"), "```", "", f"**{lib.markdown(found.conclusion.sentence)}**", ""]
-    for name, told in found.sections:
-        lines += [f"## {name}", ""]
-        lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
-        lines.append("")
-    echo("\n".join(lines))

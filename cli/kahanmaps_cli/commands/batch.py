@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import codecs
+import json
+import os
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -13,19 +17,28 @@ from typing import Any, TypeVar
 
 import click
 
+from kahanmaps.errors import counted, quoted, suggestion
 from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.params import Shard
-from kahanmaps_cli.runs.batch_run import dry_run, run_batch
-from kahanmaps_cli.runs.batch_show import print_status, print_task, print_tasks, status_data, task_data
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import Progress, as_typed, duration, say
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import echo, on_terminal, print_table
+from kahanmaps_cli.screen.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
+from kahanmaps_cli.signals import interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+_TASKS_SHOWN = 3  # of each experiment in a dry run
+_VALUE_WIDTH = 300  # of what `batch show` prints on a terminal
+_NEEDS = {
+    None: "none",
+    "system": '"family", a name of the catalogue, a file, or a list of these',
+    "member": '"family", or files of kind [family]',
+    "member or other": '"family", files of kind [family], or any other system together with a second one (other)',
+}
 
 _ONLY = click.option(
     "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable."
@@ -122,8 +135,192 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
         raise click.UsageError("give --jobs or --scheduler, not both: on a cluster its workers say how many")
     db = db or Path(str(spec)).with_suffix(".db").name
     if options["dry_run"]:
-        return dry_run(str(spec), db, options)
-    return run_batch(spec, db, options)
+        _dry_run(str(spec), db, options)
+        return 0
+    return _run(spec, db, options)
+
+
+def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
+    """Read the spec, and say what it would do."""
+    spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
+    chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
+    _require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
+    missing = None
+    if os.path.exists(db):  # it is asked, and not changed
+        with lib.Store.open(db, readonly=True) as store:
+            done = {row.task.key for row in store.rows() if row.record is not None}
+        missing = len({task.key for experiment in chosen for task in experiment.tasks()} - done)
+    if options["as_json"]:
+        data = [
+            {
+                "name": experiment.name,
+                "task": experiment.kind.name,
+                "tasks": experiment.size,
+                "axes": {name: len(values) for name, values in experiment.grid.axes.items()},
+                "limits": {"time": experiment.limits.time, "memory": experiment.limits.memory},
+                "first": [
+                    {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
+                    for task in map(experiment.__getitem__, range(min(_TASKS_SHOWN, experiment.size)))
+                ],
+                "skipped": [{"system": system, "reason": reason} for system, reason in experiment.skipped],
+            }
+            for experiment in chosen
+        ]
+        print_json(
+            {
+                **envelope("batch run --dry-run"),
+                "convention": lib.CONVENTION,
+                "spec": path,
+                "tasks": sum(experiment.size for experiment in chosen),
+                "missing": missing,
+                "experiments": data,
+            }
+        )
+        return
+    for experiment in chosen:
+        tell(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
+        for k in range(min(_TASKS_SHOWN, experiment.size)):
+            task = experiment[k]
+            given = {name: value for name, value in task.options.items() if value is not None}
+            if "other" in given:
+                given["other"] = lib.system_words(given["other"])
+            tell(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given)}")
+        if experiment.size > _TASKS_SHOWN:
+            tell(f"\t... and {experiment.size - _TASKS_SHOWN} more")
+        for system, reason in experiment.skipped:
+            tell(f"\tskipped\t{system}\t{reason}")
+    tell(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
+
+
+def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
+    """Do what is missing; the exit status."""
+    limits = {"max_tasks": options["max_tasks"] or lib.MAX_TASKS, "skip_bad": options["skip_bad"]}
+    spec = None if path is None else lib.read_spec(path, **limits)
+    experiments = () if spec is None else spec.experiments
+    if spec is not None:
+        _require_experiments(options["only"], [experiment.name for experiment in experiments])
+    with lib.Store.open(db, create=spec is not None) as store:
+        planned = {} if spec is None else lib.plan(spec, store)
+        names = list(options["only"]) or ([e.name for e in experiments] if spec is not None else None)
+        which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
+        progress = BatchProgress(store.count_pending(**which, retry_failed=options["retry_failed"]), options["quiet"])
+        for experiment in experiments:
+            if experiment.skipped:
+                progress.say(
+                    f"{experiment.name}: {counted(len(experiment.skipped), 'system')} skipped (see batch status)"
+                )
+        for name, plan in planned.items():
+            if not plan.is_resumed:
+                words = [_tasks(plan.total)]
+                words += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
+                words += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
+                progress.say(f"{name}: {', '.join(words)}")
+        todo = f"{_tasks(progress.todo)} to do, results go to {db}"
+        progress.say(todo if progress.todo else f"nothing to do: every task has a result in {db}")
+        was_interrupted = False
+        if progress.todo:
+            jobs = store.pending(**which, retry_failed=options["retry_failed"])
+            cluster = (options["scheduler"], options["worker_python"])
+            processes = options["jobs"] or lib.processors()
+            executor = lib.executor_for(store.document, processes, *cluster, options["group_seconds"], progress.say)
+            with progress, closing(executor):
+                batch, is_told = lib.Batch(jobs, executor), False
+                with interruptible(batch.interrupt):
+                    for records in batch:
+                        if batch.was_interrupted and not is_told:  # not in the handler: a line may be half written
+                            is_told = True
+                            if executor.in_flight:
+                                flying = _tasks(executor.in_flight)
+                                progress.say(f"finishing {flying} in flight (Ctrl-C again ends at once)")
+                        if records:  # before the next job is handed out
+                            store.add(records)
+                        progress.tell(records, executor.in_flight)
+                        for record in records if options["as_jsonl"] else ():
+                            click.echo(json.dumps({"record": "result", **record.to_json()}))
+                was_interrupted = batch.was_interrupted
+        missing = store.count_pending(**which)
+        data = _status(store, names or ())
+    interrupted = was_interrupted and missing > 0
+    failed = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
+    if options["as_json"]:
+        more = {"command": "batch run", "spec": path, "done": dict(progress.outcomes), "missing": missing}
+        print_json({**data, **more, "interrupted": interrupted, "seconds": round(progress.seconds, 3)})
+    elif not options["as_jsonl"]:
+        _print_status(data)
+    if progress.done:
+        progress.say(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
+    if progress.lost:
+        progress.say(
+            f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "
+            f"{lib.TRIES} times ({progress.why_lost})"
+        )
+    words = ["kahanmaps", "batch", "run", *([f"./{path}" if path.startswith("-") else path] if path else [])]
+    words += ["--db", db, *(word for name in options["only"] for word in ("-e", name))]
+    for name in ("scheduler", "worker_python"):
+        if options[name] is not None:
+            words += [f"--{name.replace('_', '-')}", options[name]]
+    if options["shard"]:
+        words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
+    again = as_typed(words)
+    if missing:
+        how = "interrupted: " if interrupted else ""
+        progress.say(f"{how}{_tasks(missing)} without a result yet; to continue: {again}")
+    if failed:
+        why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
+        progress.say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
+    if interrupted:
+        return 130
+    return 3 if failed or missing else 0
+
+
+def _tasks(number: int) -> str:
+    return counted(number, "task")
+
+
+class BatchProgress(Progress):
+    """Progress that is told of records; `todo` of them are expected."""
+
+    def __init__(self, todo: int, quiet: bool) -> None:
+        super().__init__(quiet)
+        self.todo = todo
+        self.outcomes: Counter[str] = Counter()
+        self.why_lost = ""  # the last of them
+        self._begin = time.monotonic()
+
+    @property
+    def done(self) -> int:
+        """How many tasks have come to a result."""
+        return sum(self.outcomes.values()) - self.lost
+
+    @property
+    def lost(self) -> int:
+        """How many were given up without a result."""
+        return self.outcomes["lost"]
+
+    @property
+    def seconds(self) -> float:
+        """Since the beginning."""
+        return time.monotonic() - self._begin
+
+    def tell(self, records: Sequence[lib.Record], in_flight: int) -> None:
+        """Some more records, or none for a while; how many tasks are being done."""
+        for record in records:
+            self.outcomes[str(record.outcome)] += 1
+            if record.outcome == "lost":
+                self.why_lost = record.message
+        rate = self.done / max(self.seconds, 1e-9)
+        bad = self.done - self.outcomes["ok"]
+        pieces = [f"{self.done} of {_tasks(self.todo)}", f"{rate:.3g} a second"]
+        if self.done and self.done < self.todo:
+            pieces.append(f"about {duration((self.todo - self.done) / rate)} left")
+        counts = {"running": in_flight, "failed": bad, "lost": self.lost}
+        self(", ".join([*pieces, *(f"{count} {word}" for word, count in counts.items() if count)]))
+
+    def say(self, text: str) -> None:
+        """A message on a line of its own."""
+        if not self.quiet:
+            self.clear()
+            say(text)
 
 
 @command.command("status")
@@ -140,11 +337,62 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
     May be asked while a batch is running.
     """
     with _open(db) as store:
-        data = status_data(store, only)
+        data = _status(store, only)
     if as_json:
         print_json(data)
     else:
-        print_status(data)
+        _print_status(data)
+
+
+def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
+    """How far the experiments are, as plain data."""
+    experiments = store.status()
+    _require_experiments(only, [experiment.name for experiment in experiments])
+    return {
+        **envelope("batch status"),
+        "experiments": [
+            {
+                "name": experiment.name,
+                "tasks": experiment.tasks,
+                "missing": experiment.missing,
+                "outcomes": {str(outcome): count for outcome, count in experiment.outcomes.items()},
+                "verdicts": dict(experiment.verdicts),
+                "seconds": round(experiment.seconds, 3),
+                "skipped": [{"system": system, "reason": reason} for system, reason in experiment.skipped],
+            }
+            for experiment in experiments
+            if not only or experiment.name in only
+        ],
+        "unplanned": store.unplanned(),
+    }
+
+
+def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
+    """Raises InputError for a name that no experiment has."""
+    for name in only:
+        if name not in known:
+            hint = suggestion(name, known)
+            raise lib.InputError(
+                f"there is no experiment {quoted(name)}, expected one of {', '.join(known) or 'none'}{hint}"
+            )
+
+
+def _print_status(data: Mapping[str, Any]) -> None:
+    """A line for each experiment."""
+    rows = data["experiments"]
+    kinds = ["ok", *(kind for kind in lib.KEPT[1:] if any(row["outcomes"].get(kind) for row in rows))]
+    verdicts = [verdict for verdict in lib.VERDICTS if any(row["verdicts"].get(verdict) for row in rows)]
+    table = [["experiment", "tasks", "missing", *kinds, *verdicts, "time"]]
+    for row in rows:
+        counts = [row["tasks"], row["missing"], *(row["outcomes"].get(kind, 0) for kind in kinds)]
+        counts += [row["verdicts"].get(verdict, 0) for verdict in verdicts]
+        table.append([row["name"], *map(str, counts), duration(row["seconds"])])
+    print_table(table)
+    for row in rows:
+        for skipped in row["skipped"]:
+            echo(f"{row['name']} skips {skipped['system']}: {skipped['reason']}")
+    if data["unplanned"]:
+        click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
 
 
 @command.command("show")
@@ -164,12 +412,48 @@ def show(key: str, db: str, as_json: bool) -> None:
         found = store.find(key)
         if not found:
             raise lib.InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
-        for k, data in enumerate(task_data(store, one) for one in found):
+        for k, one in enumerate(found):
+            data = _task_data(store, one)
             if as_json:
                 print_json(data)
-            else:
-                click.echo("\n" * (k > 0), nl=False)
-                print_task(data)
+                continue
+            click.echo("\n" * (k > 0), nl=False)
+            lines = {
+                "key": data["key"],
+                "task": data["task"],
+                "in": ", ".join(f"{place['experiment']} {place['number']}" for place in data["places"]) or "no plan",
+                "system": data["system"],
+                "options": {name: value for name, value in data["options"].items() if value is not None},
+                "outcome": "none yet",
+            }
+            if "outcome" in data:
+                lines["outcome"] = data["outcome"] + (f": {data['message']}" if data["message"] else "")
+                lines |= {name: data[name] for name in ("verdict", "stderr") if data[name]}
+                lines |= {f"result.{name}": value for name, value in (data["result"] or {}).items()}
+                memory = "" if data["peak_memory"] is None else f", {data['peak_memory'] / 1e6:.0f} MB at most"
+                lines["took"] = f"{data['seconds']:.3g} s{memory}, attempts: {data['attempts']}"
+                versions = ", ".join(f"{name} {number}" for name, number in data["versions"].items())
+                lines["where"] = f"{data['host']}, {data['finished']}, {versions}"
+            for name, value in lines.items():
+                text = value if isinstance(value, str) else json.dumps(value)
+                tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
+
+
+def _task_data(store: lib.Store, found: lib.Found) -> dict[str, Any]:
+    """A task and its record as plain data."""
+    task, record, places, attempts = found
+    return {
+        **envelope("batch show"),
+        "convention": lib.CONVENTION,
+        "key": task.key,
+        "task": task.kind,
+        "system": task.system,
+        "options": dict(task.options),
+        "places": [{"experiment": name, "number": number} for name, number in places],
+        "attempts": attempts,
+        **({} if record is None else {k: v for k, v in record.to_json().items() if k != "key"}),
+        "documents": {key: json.loads(store.document(key)) for key in task.documents},
+    }
 
 
 @command.command("export", short_help="The results as CSV, JSON lines or Parquet.")
@@ -292,7 +576,39 @@ def tasks(name: str | None, as_json: bool) -> None:
       kahanmaps batch tasks
       kahanmaps batch tasks check-commute
     """
-    print_tasks(name, as_json)
+    kinds = list(lib.task_kinds().values()) if name is None else [lib.task_kind(name)]
+    if as_json:
+        data = [
+            {
+                "name": kind.name,
+                "summary": kind.summary,
+                "needs": kind.needs,
+                "options": {
+                    key: {"help": option.help, "required": key in kind.required, "default": kind.defaults.get(key)}
+                    for key, option in kind.options.items()
+                },
+            }
+            for kind in kinds
+        ]
+        print_json({**envelope("batch tasks"), "tasks": data})
+        return
+    width = max(len(kind.name) for kind in kinds)
+    for kind in kinds:
+        tell_entry(f"{kind.name:<{width}}  ", kind.summary)
+    if name is None:
+        tell("'kahanmaps batch tasks NAME' has the options of one of them")
+        return
+    kind = kinds[0]
+    tell(f"system: {_NEEDS[kind.needs]}")
+    for key, option in kind.options.items():
+        default = "required" if key in kind.required else f"default {json.dumps(kind.defaults[key])}"
+        tell_entry(f"  {key:<12}  ", option.help + (f" ({default})" if default != "default null" else ""))
+    if kind.needs is not None:
+        tell('with system = "family" also:')
+        for key, option in lib.FAMILY.items():
+            tell_entry(f"  {key:<12}  ", option.help)
+        if "seed" not in kind.options:
+            tell_entry(f"  {'seed':<12}  ", "seed of everything drawn at random (default 0)")
 
 
 def _open(db: str) -> lib.Store:

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from kahanmaps.checks.table import CHECKS, Check, ClaimOption
+from kahanmaps.checks.table import CHECKS
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.complete import complete_system
@@ -42,10 +42,13 @@ def command(name: str) -> click.Command:
             else:
                 file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
                 settings = opt.settings_from(options, progress, start)
-                options_of_check = {}
-                if check.claim is not None and check.claim.many:
-                    options_of_check["known"] = ("", "known") in claim
-                report = check(file, settings, _claimed(file, check.claim, claim), **options_of_check)
+                option, more = check.claim, dict[str, bool]()
+                if option is not None and option.many:
+                    more["known"] = ("", "known") in claim
+                    claim = {name: option.read(file, text) for name, text in _named(claim, file)} or None
+                elif option is not None:
+                    claim = option.read(file, claim) if claim else None
+                report = check(file, settings, claim, **more)
         return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
     run = opt.check_options(run)
@@ -57,10 +60,18 @@ def command(name: str) -> click.Command:
         run = click.argument("other", required=False, shell_complete=complete_system)(run)
         run = opt.system_argument(run)
     else:
-        run = _option(check.claim)(run) if check.claim is not None else run
+        if check.claim is not None and check.claim.many:
+            run = opt.integral_option(check.claim.help, check.claim.flag, "claim")(run)
+        elif check.claim is not None:
+            form, of_path = check.claim.metavar, click.Path() if check.claim.metavar == "FILE" else None
+            run = click.option(check.claim.flag, "claim", type=of_path, metavar=form, help=check.claim.help)(run)
         run = opt.system_options(run)
     kind = _PairCommand if check.is_of_pair else click.Command
-    made: click.Command = click.command(name, cls=kind, help=_help(check))(run)
+    lines = [line for example in check.examples for line in f"kahanmaps {check.command} {example}".split("\n")]
+    shown = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
+    examples = "\n".join(["\b", *(f"  {line}" for line in shown)])
+    help_text = "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
+    made: click.Command = click.command(name, cls=kind, help=help_text)(run)
     return made
 
 
@@ -79,20 +90,6 @@ class _PairCommand(click.Command):
         return super().parse_args(ctx, args)
 
 
-def _option(claim: ClaimOption) -> Any:
-    if claim.many:
-        return opt.integral_option(claim.help, claim.flag, "claim")
-    kind = click.Path() if claim.metavar == "FILE" else None
-    return click.option(claim.flag, "claim", type=kind, metavar=claim.metavar, help=claim.help)
-
-
-def _help(check: Check) -> str:
-    lines = [line for example in check.examples for line in f"kahanmaps {check.command} {example}".split("\n")]
-    shown = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
-    examples = "\n".join(["\b", *(f"  {line}" for line in shown)])
-    return "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
-
-
 def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tuple[str | None, str | None]:
     """An inline system in the place of the first, and the argument as the second."""
     if opt.is_inline(options) and system is not None and other is None:
@@ -100,15 +97,6 @@ def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tup
     if system == other == "-":
         raise click.UsageError("found - twice, but standard input holds one system only")
     return system, other
-
-
-def _claimed(file: lib.SystemFile, option: ClaimOption | None, claim: Any) -> Any:
-    """What the check takes, from what was given on the line."""
-    if option is None or not claim:
-        return None
-    if option.many:
-        return {name: option.read(file, text) for name, text in _named(claim, file)} or None
-    return option.read(file, claim)
 
 
 def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:

@@ -72,6 +72,13 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
             words += [f"--{key}", options[key]]
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
+    # The command that makes the same file again, without the place where it went.
+    words = ["kahanmaps", "convert", *([system] if system is not None else [])]
+    words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
+    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
+    words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
+    words += ["--to", language, *(word for text in options["parts"] for word in ("--what", text))]
+    words += [word for key in ("symbolic", "name") if options[key] for word in (f"--{key}", options[key])]
     text = lib.convert(
         file,
         language,

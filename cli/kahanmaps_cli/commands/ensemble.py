@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from itertools import islice
 from typing import Any
 
 import click
@@ -103,15 +102,26 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         if file_of_points is not None and interval != whole and ensemble.step == steps:
             file_of_points.append(ensemble.x[None])
     records = 0 if file_of_points is None else file_of_points.rows
+    failed, near = (ensemble.failed_at >= 0).nonzero()[0].tolist(), ensemble.near_singular
+    near_orbits, near_at = near.nonzero()[0].tolist(), ensemble.near_singular_at
+    first = min(near_orbits, key=lambda k: int(near_at[k]), default=None)
+    where = None if first is None else {"orbit": first, "step": int(near_at[first])}
+    # How far each integral moved in the orbit where it moved most, of those that were completed.
+    going = (ensemble.failed_at < 0).nonzero()[0]
+    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(going)} for drift in ensemble.drift]
+    for one, drift in zip(drifts, ensemble.drift if len(going) else (), strict=False):
+        worst = int(going[drift.largest[going].argmax()])
+        one |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
+        one["initial"] = json_number(drift.initial[worst])
     found = {
         "orbits": ensemble.n,
         "steps": steps,
         "status": "interrupted" if ensemble.step < steps else "completed",
         "steps_taken": ensemble.step,
         "counts": {word: int((ensemble.status == word).sum()) for word in ("completed", "overflow", "singular")},
-        "failures": list(islice(_failures(ensemble), FAILURES_SHOWN)),
-        "near_singular": _near_singular(ensemble),
-        "drift": _drifts(ensemble),
+        "failures": [{"orbit": orbit, **ensemble.end(orbit).to_json()} for orbit in failed[:FAILURES_SHOWN]],
+        "near_singular": {"steps": int(near.sum()), "orbits": len(near_orbits), "first": where},
+        "drift": drifts,
     }
     if as_json:
         shape = {"shape": [records, *starts.shape], "every": whole, "axes": ["record", "orbit", "x"]}
@@ -156,31 +166,6 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError("--every K is for -o FILE.npy")
     if output is not None and not output.endswith(".npy"):
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
-
-
-def _failures(ensemble: lib.FloatEnsemble) -> Any:
-    for orbit in (ensemble.failed_at >= 0).nonzero()[0].tolist():
-        yield {"orbit": orbit, **ensemble.end(orbit).to_json()}
-
-
-def _near_singular(ensemble: lib.FloatEnsemble) -> dict[str, Any]:
-    """How many steps were near-singular, in how many orbits, and where first."""
-    near, at = ensemble.near_singular, ensemble.near_singular_at
-    orbits = near.nonzero()[0].tolist()
-    first = min(orbits, key=lambda k: int(at[k]), default=None)
-    where = None if first is None else {"orbit": first, "step": int(at[first])}
-    return {"steps": int(near.sum()), "orbits": len(orbits), "first": where}
-
-
-def _drifts(ensemble: lib.FloatEnsemble) -> list[dict[str, Any]]:
-    """How far each integral moved in the orbit where it moved most, of those that were completed."""
-    going = (ensemble.failed_at < 0).nonzero()[0]
-    found: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(going)} for drift in ensemble.drift]
-    for record, drift in zip(found, ensemble.drift if len(going) else (), strict=False):
-        worst = int(going[drift.largest[going].argmax()])
-        record |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
-        record["initial"] = json_number(drift.initial[worst])
-    return found
 
 
 def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: dict[str, Any]) -> None:

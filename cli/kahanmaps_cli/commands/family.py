@@ -53,7 +53,12 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
         raise click.UsageError(f"found --name {quoted(name)}, expected printable text")
-    member = _with_signs(draw_member(**options), signs)
+    member = draw_member(**options)
+    if signs is not None:
+        pieces = [piece.strip() for piece in signs.split(",")]
+        if any(piece not in ("1", "+1", "-1") for piece in pieces):
+            raise click.UsageError(f"found --signs {quoted(signs)}, expected 1 and -1 separated by commas")
+        member = lib.FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
     file = lib.SystemFile.from_member(member, name or (file_name(Path(output).stem) if output else "member"))
     _write(file, output)
     if not quiet:
@@ -77,7 +82,17 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
     A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
     """
-    file, member, recognised = _member_or_recognised(opt.load_system(system, options))
+    file = opt.load_system(system, options)
+    recognised, member = None, file.member
+    if member is None:
+        hamiltonian = file.hamiltonian or lib.recognised_hamiltonian(file.system)
+        recognised = None if hamiltonian is None else lib.recognised_member(hamiltonian)
+        if recognised is None:
+            raise lib.InputError(
+                f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all "
+                f"the same was looked for and not found: {lib.reason_against(hamiltonian)}"
+            )
+        member = recognised.member
     data: dict[str, Any] = {
         **envelope("family show"),
         "system": file.name,
@@ -98,7 +113,14 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         )
     form = lib.normal_form(member) if normal_form else None
     if form is not None:
-        data["normal_form"] = _normal_form_data(form)
+        data["normal_form"] = {
+            "chi": form.chi_text,
+            "h": form.h_text,
+            "D": form.D_text,
+            "S": lib.plain(form.S),
+            "h_in_powers_of_t": [[str(c[k]) for k in range(form.m)] for c in form.coefficients],
+            "parts": [lib.attributes(part, "root", "weight", h="text", D="D_text") for part in form.parts],
+        }
     if as_json:
         print_json(data)
         return
@@ -274,17 +296,6 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
         say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
 
 
-def _normal_form_data(form: lib.NormalForm) -> dict[str, Any]:
-    return {
-        "chi": form.chi_text,
-        "h": form.h_text,
-        "D": form.D_text,
-        "S": lib.plain(form.S),
-        "h_in_powers_of_t": [[str(c[k]) for k in range(form.m)] for c in form.coefficients],
-        "parts": [lib.attributes(part, "root", "weight", h="text", D="D_text") for part in form.parts],
-    }
-
-
 def _print_normal_form(form: lib.NormalForm, point: str) -> None:
     tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
     tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
@@ -302,34 +313,11 @@ def _print_normal_form(form: lib.NormalForm, point: str) -> None:
     _print_matrix(form.S)
 
 
-def _with_signs(member: lib.FamilyMember, signs: str | None) -> lib.FamilyMember:
-    if signs is None:
-        return member
-    pieces = [piece.strip() for piece in signs.split(",")]
-    if any(piece not in ("1", "+1", "-1") for piece in pieces):
-        raise click.UsageError(f"found --signs {quoted(signs)}, expected 1 and -1 separated by commas")
-    return lib.FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
-
-
 def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
     file = opt.load_system(reference, {"parameters": parameters})
     if file.member is None:
         raise lib.InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member
-
-
-def _member_or_recognised(file: lib.SystemFile) -> tuple[lib.SystemFile, lib.FamilyMember, lib.RecognisedMember | None]:
-    """The member that a system is declared to be, or is found to be."""
-    if file.member is not None:
-        return file, file.member, None
-    hamiltonian = file.hamiltonian or lib.recognised_hamiltonian(file.system)
-    recognised = None if hamiltonian is None else lib.recognised_member(hamiltonian)
-    if recognised is None:
-        raise lib.InputError(
-            f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all the "
-            f"same was looked for and not found: {lib.reason_against(hamiltonian)}"
-        )
-    return file, recognised.member, recognised
 
 
 def _write(file: lib.SystemFile, output: str | None) -> None:

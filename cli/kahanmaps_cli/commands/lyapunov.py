@@ -90,12 +90,14 @@ def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
     tell(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
 
 
-def _numbers(values: Any) -> list[float | None]:
+def _number(value: Any) -> float | None:
     """JSON knows no NaN."""
-    return [float(value) if isfinite(value) else None for value in values]
+    return float(value) if isfinite(value) else None
 
 
 def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.Lyapunov) -> dict[str, Any]:
+    lists = {"per_time": found.mean, "per_step": found.per_step, "spread": found.spread}
+    lists["change_from_half"] = found.change
     return record_of(
         "lyapunov",
         file,
@@ -106,11 +108,8 @@ def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.
         steps_asked=options["steps"],
         seconds=options["seconds"],
         **lib.attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
-        per_time=_numbers(found.mean),
-        per_step=_numbers(found.per_step),
-        spread=_numbers(found.spread),
-        change_from_half=_numbers(found.change),
-        sum=_numbers([found.mean.sum()])[0],
-        log_volume=_numbers([found.log_volume.mean()])[0] if len(found.log_volume) else None,
-        residual=_numbers([found.residual])[0],
+        **{name: [_number(value) for value in values] for name, values in lists.items()},
+        sum=_number(found.mean.sum()),
+        log_volume=_number(found.log_volume.mean()) if len(found.log_volume) else None,
+        residual=_number(found.residual),
     )

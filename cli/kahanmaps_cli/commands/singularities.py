@@ -65,20 +65,30 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     verdict = runs[0].verdict if agree else lib.UNDECIDED
     symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
-        print_json(_record(file, options, runs, symbolic, verdict))
+        print_json(
+            record_of(
+                "singularities",
+                file,
+                "exact; series modulo primes",
+                seed=options["seed"],
+                steps=options["steps"] or lib.steps_by_default(file.map.dim),
+                seconds=options["seconds"],
+                verdict=verdict,
+                symbolic_denominator=symbolic,
+                runs=[_run_record(file, run) for run in runs],
+            )
+        )
     else:
         _print(file, runs, symbolic, runs[0].text if agree else verdict)
     if verdict == lib.UNDECIDED and not quiet:
-        say(f"undecided: {_why(runs, agree)}")
+        if any(run.stopped for run in runs):
+            why = "stopped by the clock: give more --seconds"
+        elif not agree:
+            why = "the two eps tell different things: try others with --eps"
+        else:
+            why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
+        say(f"undecided: {why}")
     return 3 if verdict == lib.UNDECIDED else 0
-
-
-def _why(runs: list[lib.SingularityRun], agree: bool) -> str:
-    if any(run.stopped for run in runs):
-        return "stopped by the clock: give more --seconds"
-    if not agree:
-        return "the two eps tell different things: try others with --eps"
-    return next(h.note for run in runs for h in run.hypersurfaces if h.note)
 
 
 def _print(
@@ -97,45 +107,21 @@ def _print(
     tell(f"\n# {verdict}")
 
 
-def _record(
-    file: lib.SystemFile,
-    options: dict[str, Any],
-    runs: list[lib.SingularityRun],
-    symbolic: list[tuple[str, int]] | None,
-    verdict: str,
-) -> dict[str, Any]:
-    return record_of(
-        "singularities",
-        file,
-        "exact; series modulo primes",
-        seed=options["seed"],
-        steps=options["steps"] or lib.steps_by_default(file.map.dim),
-        seconds=options["seconds"],
-        verdict=verdict,
-        symbolic_denominator=symbolic,
-        runs=[
-            {
-                **lib.attributes(
-                    run, "verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text"
-                ),
-                **lib.attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
-                "eps": str(run.eps),
-                "time_step": lib.eps_record(run.eps, file.map)["time_step"],
-                "maps_a_step": None if run.word is None else run.word.length,
-                "hypersurfaces": [_hypersurface(found) for found in run.hypersurfaces],
-            }
-            for run in runs
-        ],
-    )
-
-
-def _hypersurface(found: lib.Hypersurface) -> dict[str, Any]:
+def _run_record(file: lib.SystemFile, run: lib.SingularityRun) -> dict[str, Any]:
+    of_run = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
+    of_each = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
     steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
     return {
-        **lib.attributes(
-            found, "polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at"
-        ),
-        **lib.attributes(found, "followed", "settled_at", "note", "stage"),
-        **{name: [getattr(step, of) for step in found.steps] for name, of in steps.items()},
-        "primes": [str(prime) for prime in found.primes],
+        **lib.attributes(run, *of_run, singular_everywhere="is_undefined", dominant="is_dominant"),
+        "eps": str(run.eps),
+        "time_step": lib.eps_record(run.eps, file.map)["time_step"],
+        "maps_a_step": None if run.word is None else run.word.length,
+        "hypersurfaces": [
+            {
+                **lib.attributes(found, *of_each, "followed", "settled_at", "note", "stage"),
+                **{name: [getattr(step, of) for step in found.steps] for name, of in steps.items()},
+                "primes": [str(prime) for prime in found.primes],
+            }
+            for found in run.hypersurfaces
+        ],
     }

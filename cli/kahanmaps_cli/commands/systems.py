@@ -57,7 +57,13 @@ def command(
             {
                 **envelope("systems"),
                 **_summary(file),
-                **_equations(file),
+                "variables": list(file.variables),
+                **file.map.written(),
+                "integrals": {name: lib.format_rational_function(f) for name, f in file.integrals.items()},
+                "density": lib.format_rational_function(file.density) if file.density is not None else None,
+                "facts": list(file.catalog.get("facts", [])),
+                "convention": file.catalog.get("convention", ""),
+                "sources": [lib.source(key) for key in file.catalog.get("sources", [])],
                 "known": _known(file),
                 "document": file.document,
             }
@@ -76,53 +82,17 @@ def _summary(file: Any) -> dict[str, Any]:
     }
 
 
-def _equations(file: Any) -> dict[str, Any]:
-    return {
-        "variables": list(file.variables),
-        **file.map.written(),
-        "integrals": {name: lib.format_rational_function(function) for name, function in file.integrals.items()},
-        "density": lib.format_rational_function(file.density) if file.density is not None else None,
-        "facts": list(file.catalog.get("facts", [])),
-        "convention": file.catalog.get("convention", ""),
-        "sources": [lib.source(key) for key in file.catalog.get("sources", [])],
-    }
-
-
 def _known(file: Any) -> dict[str, Any]:
     """The structured facts, null where the file has none."""
     return {key: file.document.get("catalog", {}).get(key) for key in lib.KEYS}
 
 
-def _known_lines(file: Any) -> list[str]:
-    """The structured facts as lines for people."""
-    known = _known(file)
-    lines = []
-    if known["verdict"]:
-        lines.append(f"verdict: {known['verdict']}")
-    growth = f"{known['growth']} growth" if known["growth"] else ""
-    if known["dynamical_degree"]:
-        growth += f"{', ' * bool(growth)}by the largest root of {known['dynamical_degree']}"
-    if known["degrees"]:
-        degrees = ", ".join(str(degree) for degree in known["degrees"])
-        lines.append(f"degrees of the iterates: {degrees}, ...{f' ({growth})' * bool(growth)}")
-    elif growth:
-        lines.append(f"degrees of the iterates: {growth}")
-    if known["codimension"] is not None:
-        lines.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
-    for found in lib.relations(file.catalog, file.variables):
-        count = "no relation" if not found.dimension else f"{found.dimension} relation{'s' * (found.dimension > 1)}"
-        what = f"polynomials of {found.text}" if found.text.startswith("degree") else found.text
-        lines.append(f"{count} along an orbit among: {what}")
-    return lines
-
-
 def _latex(file: Any) -> str:
     """The system or map as displayed formulas."""
+    names = [lib.latex_name(name) for name in file.variables]
     if isinstance(file.map, lib.Kahan):  # with eps in its coefficients, if it is an adjusted one
-        names = [lib.latex_name(name) for name in file.variables]
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
-        names = [lib.latex_name(name) for name in file.variables]
         rows = [
             rf"\tilde{{{x}}} &= {lib.latex_rational_function(f)}" for x, f in zip(names, file.map.image, strict=True)
         ]
@@ -140,7 +110,6 @@ def _latex(file: Any) -> str:
 
 
 def _show(file: Any) -> None:
-    facts = _equations(file)
     tell(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
         tell(f"  {name} = {value}")
@@ -153,14 +122,30 @@ def _show(file: Any) -> None:
         tell(f"{claimed}integral {name} = {formula(lib.format_factored(integral))}")
     if file.density is not None:
         tell(f"{claimed}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
-    known = _known_lines(file)
-    if known:
+    known, lines = _known(file), []
+    if known["verdict"]:
+        lines.append(f"verdict: {known['verdict']}")
+    growth = f"{known['growth']} growth" if known["growth"] else ""
+    if known["dynamical_degree"]:
+        growth += f"{', ' * bool(growth)}by the largest root of {known['dynamical_degree']}"
+    if known["degrees"]:
+        degrees = ", ".join(str(degree) for degree in known["degrees"])
+        lines.append(f"degrees of the iterates: {degrees}, ...{f' ({growth})' * bool(growth)}")
+    elif growth:
+        lines.append(f"degrees of the iterates: {growth}")
+    if known["codimension"] is not None:
+        lines.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
+    for found in lib.relations(file.catalog, file.variables):
+        count = "no relation" if not found.dimension else f"{found.dimension} relation{'s' * (found.dimension > 1)}"
+        what = f"polynomials of {found.text}" if found.text.startswith("degree") else found.text
+        lines.append(f"{count} along an orbit among: {what}")
+    if lines:
         tell("for generic parameters and eps:" if file.parameters else "for generic eps:")
-    for line in known:
+    for line in lines:
         tell(f"  {line}")
-    for fact in facts["facts"]:
+    for fact in file.catalog.get("facts", []):
         tell(f"* {fact}")
-    if facts["convention"]:
-        tell(f"step: {facts['convention']}")
-    for text in facts["sources"]:
-        tell(f"source: {text}")
+    if file.catalog.get("convention"):
+        tell(f"step: {file.catalog['convention']}")
+    for key in file.catalog.get("sources", []):
+        tell(f"source: {lib.source(key)}")

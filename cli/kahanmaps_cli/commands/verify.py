@@ -2,15 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections import Counter
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.display import markup
+from kahanmaps.display.report_text import headline, witness_lines
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.draw import DRAWN, draw_options, drawn_file
-from kahanmaps_cli.runs.verify_table import print_verification
 from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
+from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_HOW = {
+    "symbolic, normal form": "symbolic",
+    "symbolic": "symbolic",
+    "exact": "exact",
+    "exact rational point": "exact",
+    "point over GF(p)": "point mod p",
+    "random points over GF(p)": "points",
+    "random points": "points",
+    "outside the hypotheses": "outside",
+    "special member": "special",
+    "control": "exact",
+}
+_LEGEND = {
+    "symbolic, normal form": "symbolic: an identity of rational functions in indeterminate roots of chi, coefficients "
+    "of H, x and eps, multiplied out for the normal form; the hypotheses of this member are verified exactly",
+    "symbolic": "symbolic: an identity of rational functions of x (and eps), multiplied out for this member",
+    "exact": "exact: no x in it, computed over Q",
+    "exact rational point": "exact: shown at an exact rational point, which is a proof (or a refutation)",
+    "point over GF(p)": "point mod p: shown at a point over GF(p), which is a proof (or a refutation)",
+    "random points over GF(p)": "points: held at random points over GF(p), error below the bound given",
+    "special member": "special: the statement is for generic A and H, and this member is special; it does not count",
+    "outside the hypotheses": "outside: the member does not satisfy the hypotheses of the statement",
+}
 
 
 @click.command("verify")
@@ -99,4 +130,113 @@ def command(system: str | None, **options: Any) -> int:
             else:
                 file = drawn_file(options)
             report = lib.verify(file, settings, what)
-    return print_verification(report, options["as_json"], options["as_markdown"], options["verbose"], options["quiet"])
+    as_json, verbose = options["as_json"], options["verbose"]
+    if report.context.get("beyond") and not as_json:
+        echo(lib.table(report))
+    elif options["as_markdown"]:
+        echo(markdown(report))
+    elif as_json or not on_terminal():
+        return print_report(report, as_json, verbose, options["quiet"])
+    else:
+        _print_terminal(report, verbose)
+    return exit_status(report)
+
+
+def markdown(report: lib.Report) -> str:
+    """The table in Markdown; docs/audit.md is made of it."""
+    lines = [markup.markdown(headline(report))]
+    section = None
+    for finding in report.findings:
+        if finding.place.get("section") != section:
+            section = finding.place.get("section")
+            title = finding.place.get("section_title", "Together")
+            lines += ["", f"### {title if section in (None, 10) else f'{section} {title}'}", ""]
+            lines += ["| statement | formula | how | verdict |", "|---|---|---|---|"]
+        verdict = str(finding.verdict) + (" as printed" if finding.place.get("misprint") else "")
+        cells = (
+            finding.place.get("place", ""),
+            markup.code(finding.formula or finding.claim),
+            _how(finding.evidence),
+            verdict,
+        )
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join([*lines, "", f"Verdict: {report.verdict} ({_count(report)})"])
+
+
+def _print_terminal(report: lib.Report, verbose: bool) -> None:
+    tell(headline(report), style="bold")
+    by_section: dict[tuple[int, str], list[lib.Finding]] = {}
+    others = []
+    for finding in report.findings:
+        if "section" in finding.place:
+            key = (finding.place["section"], finding.place["section_title"])
+            by_section.setdefault(key, []).append(finding)
+        else:
+            others.append(finding)
+    controls = bool(report.context.get("controls"))
+    for (number, title), findings in by_section.items():
+        name = title if number == 10 else f"Section {number}. {title}"
+        console().print(_table(name, findings, verbose, controls))
+    for finding in others:
+        tell(f"{finding.claim}: {finding.evidence.summary}")
+    for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
+        if method in _LEGEND:
+            tell(_LEGEND[method])
+    # On the evidence beside the one that decided.
+    also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
+    bounds = [int(str(one.data["error_bound"])[3:]) for one in also if "error_bound" in one.data]
+    if bounds:
+        held = f"also: {len(bounds)} claims held at random points over GF(p)"
+        tell(f"{held}, each false with probability below 2^-{min(bounds)}")
+    methods = Counter(e.method for f in report.findings for e in f.also if "error_bound" not in e.data)
+    for method, count in methods.items():
+        tell(f"also: {count} claims: {method} (-v)")
+    for finding in report.findings:
+        if str(finding.verdict) == "refuted" and not finding.control:
+            tell(f"refuted: {shorten(finding.claim, 200)}")
+    for note in report.notes:
+        tell(f"note: {note}")
+    tell(f"verdict\t{report.verdict}\t({_count(report)})", 9)
+
+
+def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(
+        title=name, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_lines=verbose, expand=True
+    )
+    table.add_column("statement", overflow="fold", min_width=17, max_width=19)
+    table.add_column("formula", overflow="fold", ratio=1)
+    table.add_column("broken" if controls else "how", overflow="fold", min_width=11, max_width=24 if controls else 14)
+    table.add_column("verdict", no_wrap=True)
+    for finding in findings:
+        misprint = finding.place.get("misprint")
+        lines = [finding.formula or finding.claim, *([f"misprint: {misprint}"] if misprint else [])]
+        if verbose:
+            lines.append(finding.claim.split(": ", 1)[-1])
+            lines += [f"{evidence.method}: {evidence.summary}" for evidence in (finding.evidence, *finding.also)]
+        if finding.witness is not None and (verbose or not finding.control):
+            lines += witness_lines(finding.witness, NUMBER_WIDTH)
+        verdict = f"{finding.verdict}\nas printed" if misprint else str(finding.verdict)
+        is_broken = controls and "broken" in finding.place
+        table.add_row(
+            styled(finding.place["place"]),
+            styled("\n  ".join(lines)),
+            styled(str(finding.place["broken"]) if is_broken else _how(finding.evidence)),
+            styled(verdict, verdict_style(finding)),
+        )
+    return table
+
+
+def _how(evidence: lib.Evidence) -> str:
+    word = _HOW.get(evidence.method, evidence.method)
+    bound: Any = evidence.data.get("error_bound")
+    return f"{word}, {bound}" if bound else word
+
+
+def _count(report: lib.Report) -> str:
+    counted = Counter(str(f.verdict) for f in report.findings if f.applies and not f.control)
+    text = ", ".join(f"{number} {verdict}" for verdict, number in counted.items())
+    misprints = sum(1 for f in report.findings if f.place.get("misprint"))
+    return text + (f"; {misprints} misprints, refuted as printed" if misprints else "")

@@ -1,0 +1,167 @@
+"""kahanmaps degrees, singularities, cycles, lyapunov, heights: what they print as text and JSON, exit statuses."""
+
+import time
+
+import pytest
+from cli_helpers import terminal
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.growth import Growth
+from kahanmaps.invariants.heights import height_growth
+from kahanmaps.laboratory.cycles import cycle_census
+from kahanmaps.laboratory.growth.height_survey import height_survey
+from kahanmaps.version import __version__
+
+# degrees
+
+
+def test_the_degrees_of_the_euler_top(kahanmaps):
+    outcome = kahanmaps("degrees euler_top")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert outcome.out.splitlines() == [
+        "# euler_top, generic eps, 2 random lines modulo primes of 61 bits: measured, not proved",
+        "degrees\t1, 3, 9, 19, 33, 51, 73, 99, 129, 163, 201, 243",
+        "growth\tquadratic growth, dynamical degree 1",
+        "recurrence\ta(n) = 3*a(n-1)-3*a(n-2)+a(n-3) for n >= 3, explained by the singularities; 12 measured terms "
+        "agree",
+        "characteristic polynomial\t(t - 1)^3",
+        "closed form\t2*n^2 + 1",
+        "generating function\t(1 + 3*z^2) / (1 - 3*z + 3*z^2 - z^3)",
+        "singularities\tnothing new after step 3",
+        *(
+            f"contracted\tC{k}: 2*x1^2*eps^2 + x2^2*eps^2 {sign} 4*x1*x3*eps^2 + 2*x3^2*eps^2 {linear} + 1 = 0, "
+            f"degree 2: contracted, a hypersurface again after 3 steps; costs 2 at step 3; meets {met}"
+            for k, sign, linear, met in (
+                (1, "-", "+ 2*x2*eps", "C1 at step 2, C2 at step 2 (order 2)"),
+                (2, "+", "- 2*x2*eps", "C1 at step 2 (order 2), C2 at step 2"),
+            )
+        ),
+        "ended\tthe singularities explain the degrees, and those measured agree",
+    ]
+
+
+def test_generic_eps_is_told_as_such(kahanmaps):
+    found = kahanmaps("degrees weierstrass --terms 3 --json").json
+    assert (found["eps"], found["time_step"]) == ("generic", "generic")
+    assert found["lines"][0]["eps_residue"] != found["lines"][1]["eps_residue"]
+
+
+# singularities
+
+
+def test_two_eps_and_the_symbolic_denominator_by_default(kahanmaps):
+    found = kahanmaps("singularities euler_top --json").json
+    assert (found["command"], found["version"], found["verdict"]) == ("singularities", __version__, "confined")
+    assert len({run["eps"] for run in found["runs"]}) == 2
+    assert len(found["symbolic_denominator"]) == 1
+    for run in found["runs"]:
+        assert run["critical_degree"] == 8
+        for hypersurface in run["hypersurfaces"]:
+            assert len(hypersurface["ranks"]) == 12
+            assert len(set(hypersurface["primes"])) == 2
+    assert found["document"]["system"]
+
+
+def test_long_polynomials_are_shortened_on_a_terminal_only(kahanmaps):
+    assert "chars)" in terminal("singularities", "lorenz", "--eps", "1/7", "--steps", "2").out
+    assert "chars)" not in kahanmaps("singularities lorenz --eps 1/7 --steps 2").out
+
+
+# cycles
+
+
+def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
+    outcome = kahanmaps("cycles weierstrass --prime 31")
+    assert outcome.status == 0
+    census = cycle_census(load("weierstrass").system, "1/10", 31)
+    assert outcome.out.count("# p = 31, eps = ") == 2
+    counts = f"indeterminate\t{census.indeterminate}\npre-indeterminate\t{census.pre_indeterminate}\n"
+    assert f"{counts}preperiodic\t0\nperiodic\t{census.periodic}\n" in outcome.out
+    assert f"cycles\t{census.cycles}, longest {census.longest}\n" in outcome.out
+
+
+def test_samples(kahanmaps):
+    found = kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
+    (run,) = found["runs"]
+    assert (run["complete"], run["looked_at"], run["open"]) == (False, 40, 0)
+    assert run["cycles"] is None
+    assert found == kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
+
+
+def test_no_law_refuses_an_integrable_map_that_exchanges_levels(kahanmaps):
+    first = "(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)"
+    outcome = kahanmaps(f"cycles --vars x,y --image '{first}; (x^2-y)/(x^2*y+1)' --prime 47")
+    assert "longest 114" in outcome.out
+    assert "compatible" not in outcome.out
+
+
+def test_the_time_is_that_of_all_runs_and_what_was_stopped_says_so(kahanmaps):
+    outcome = kahanmaps("cycles paper_m3_irreducible --prime 31 --samples 5 --prime 11 --seconds 0.001")
+    assert outcome.status == 3
+    assert outcome.out.count("time limit") == 4
+    outcome = kahanmaps("cycles paper_m3_irreducible --prime 11 --seconds 0.001 --json")
+    assert [(run["stopped"], run["looked_at"]) for run in outcome.json["runs"]] == [(True, 0)] * 2
+
+
+def test_p_is_a_parameter_and_a_prime_is_told_how_to_be_typed(kahanmaps):
+    outcome = kahanmaps("cycles weierstrass -p 31")
+    assert outcome.status == 2
+    assert "found '31', expected NAME=VALUE (the prime of cycles is --prime 31)" in outcome.err
+
+
+# lyapunov
+
+
+def test_numbers_are_printed_per_time_and_per_step(kahanmaps):
+    outcome = kahanmaps("lyapunov riccati --eps 1/10 --steps 300 --random 4")
+    assert outcome.status == 0
+    rows = outcome.rows
+    assert rows[0] == ["orbits", "4 of 4"]
+    assert rows[1] == ["steps", "300 after 30"]
+    assert float(rows[2][1]) == pytest.approx(-2.2745, abs=1e-3)
+    assert float(rows[2][2]) == pytest.approx(-2.2745 / 5, abs=1e-3)
+
+
+def test_starts_from_a_file(kahanmaps, tmp_path):
+    (tmp_path / "starts.csv").write_text("x,y\n1,0\n1/2,1/3\n")
+    found = kahanmaps("lyapunov harmonic --eps 1/10 --steps 50 --json --starts", tmp_path / "starts.csv").json
+    assert found["orbits"] == 2
+    assert found["per_time"] == pytest.approx([0, 0], abs=1e-12)
+
+
+# heights
+
+
+def test_eps_that_disagree_are_told(monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.DEFAULT_EPS", (1, 2))
+    from kahanmaps.systems.quadratic import QuadraticSystem
+
+    found = height_survey(QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"]), starts=2, steps=40)
+    assert (found.kind, found.kinds) == (Growth.UNDECIDED, (Growth.PERIODIC, Growth.QUADRATIC))
+    assert found.text == "heights of exact orbits are undecided: the eps disagree (2 periodic, 2 quadratic)"
+
+
+def test_no_orbit_is_begun_after_the_time(monkeypatch):
+    def slow(*arguments, **options):
+        time.sleep(0.02)
+        return height_growth(*arguments, **{**options, "deadline": None})
+
+    monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", slow)
+    survey = height_survey(load("weierstrass").system, starts=3, steps=4, seconds=0.01)
+    assert (len(survey.orbits), survey.is_whole) == (1, False)
+
+
+def test_wrong_values_in_the_library():
+    system = load("weierstrass").system
+    for options in ({"starts": 0}, {"starts": []}, {"seconds": 0}):
+        with pytest.raises(InputError):
+            height_survey(system, **options)
+
+
+def test_random_starts_have_prime_numerators_and_lie_on_both_sides_of_0():
+    """A coordinate is then no simple multiple of 1/eps, where many maps have invariant curves."""
+    survey = height_survey(load("euler_top").system, starts=6, steps=2)
+    coordinates = [x for orbit in survey.orbits for x in orbit.start]
+    assert all(abs(x.p).is_prime() and abs(x.p) >= 13 for x in coordinates)
+    assert {x > 0 for x in coordinates} == {True, False}
