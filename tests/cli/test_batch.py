@@ -306,6 +306,7 @@ def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_
 
 
 def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batch, monkeypatch):
+    monkeypatch.setattr("kahanmaps.experiments.running.run.LocalWorkers", partial(LocalWorkers, tries=1))
     spec = FAULT.replace("[8]", "[1]").replace('"0..3"', '"0..2"')  # order 1: killed by SIGKILL, where the seed is odd
     done = batch("run", spec, "--json")
     assert done.status == 3
@@ -323,7 +324,6 @@ def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batc
     assert [line["number"] for line in lines if line["record"] == "result"] == [0, 2]
     (group,) = batch("summary", "--db", "study.db", "--json").json["groups"]
     assert (group["tasks"], group["missing"], sum(group["outcomes"].values())) == (3, 1, 2)
-    monkeypatch.setattr("kahanmaps.experiments.running.run.LocalWorkers", partial(LocalWorkers, tries=1))
     again = batch("run", spec, "--jsonl")
     assert again.status == 3
     (record,) = map(json.loads, again.out.splitlines())
@@ -361,13 +361,15 @@ def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch
         assert batch("run", SPACE, "-q", "-j", "1").status == 0
 
 
-def test_two_batches_do_not_write_to_one_database(batch, start):
-    Path("study.toml").write_text(PAUSE)
-    start("study.toml", "-j", "1")
-    done = batch("run study.toml")
-    assert done.status == 2
-    assert "another batch is writing to study.db" in done.err
-    assert batch("status --db study.db").status == 0  # looking is allowed
+@pytest.mark.usefixtures("space")
+def test_two_batches_do_not_write_to_one_database(batch):
+    from kahanmaps.experiments.results.store import Store
+
+    with Store.open("study.db"):
+        done = batch("run study.toml")
+        assert done.status == 2
+        assert "another batch is writing to study.db" in done.err
+        assert batch("status --db study.db").status == 0  # looking is allowed
 
 
 def test_bad_files_are_skipped_with_a_list(kahanmaps, tmp_path, monkeypatch):

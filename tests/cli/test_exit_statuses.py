@@ -48,12 +48,6 @@ def test_an_orbit_stopped_early_gives_3_and_a_sentence_on_standard_error(kahanma
     assert outcome.out.splitlines()[-1] == f"# {outcome.err.strip()}"
 
 
-# 2
-
-
-# Wrong files
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("form", ["text", "jsonl", "csv", "npz"])
 def test_a_full_disk_is_no_wrong_use_gives_3_and_names_the_file(kahanmaps, form):

@@ -5,7 +5,7 @@ import pytest
 from command_tree import all_commands, all_examples, examples_in, words_of
 from helpers import together
 
-from kahanmaps_cli.main import COMMANDS, SECTIONS, cli
+from kahanmaps_cli.main import SECTIONS, cli
 
 # What runs in a fraction of a second, and needs no file.
 COMMANDS_AND_GROUPS = [words for words, _ in all_commands()]
@@ -55,11 +55,6 @@ def test_the_options_of_an_example_are_understood(example):
 def test_an_example_with_a_wrong_option_would_be_noticed():
     with pytest.raises(click.UsageError):
         parsed(words_of("kahanmaps orbit euler_top --strat 1,2,3  # no such option"))
-
-
-def test_every_command_stands_under_one_heading():
-    names = [name for commands in SECTIONS.values() for name in commands]
-    assert len(names) == len(set(names)) == len(COMMANDS)
 
 
 def test_the_headings_are_in_the_help(kahanmaps):

@@ -12,8 +12,6 @@ from kahanmaps.paper.registry import claims
 from kahanmaps.version import __version__
 
 QUICK = "verify --m 2 --section 6"
-COMMON = {"command", "check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic"}
-COMMON |= {"seed", "error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
 
 
 def keys(report):
@@ -29,7 +27,6 @@ def expected(m, *sections):
 
 def test_a_report_has_the_documented_shape(once):
     report = once(f"{QUICK} --json").json
-    assert set(report) == COMMON | {"chi", "factors", "document"}
     assert list(report)[:4] == ["command", "version", "check", "verdict"]
     assert report["check"] == "verify"
     assert report["version"] == __version__
@@ -90,8 +87,6 @@ def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
     assert outcome.status == 1
     assert outcome.json["holds"] is False
 
-
-# A terminal
 
 # What survives
 

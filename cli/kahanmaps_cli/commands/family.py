@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -12,11 +12,22 @@ from kahanmaps.errors import InputError, counted, quoted
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.runs.draw import draw_member, draw_options
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.screen.progress import say
 from kahanmaps_cli.screen.render import envelope, print_json
 from kahanmaps_cli.screen.terminal import formula, tell
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Which member of the family to draw.
+draw_options: Callable[[F], F] = opt.stack(
+    click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
+    click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
+    click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
+    click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
+    click.option("--size", type=int, metavar="N", help="Bound for the integer coefficients drawn (default 2 or 1)."),
+)
+DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 
 
 @click.group("family", cls=SuggestingGroup)
@@ -64,6 +75,40 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     if not quiet:
         where = f"{output}: " if output else ""
         say(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
+
+
+def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
+    """The member that the options ask for as a system file; without any of them one with m = 3."""
+    drawn = {name: options[name] for name in DRAWN}
+    if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
+        drawn["m"] = 3
+    member = draw_member(**drawn, seed=options["seed"])
+    return lib.SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
+
+
+def draw_member(
+    m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
+) -> lib.FamilyMember:
+    """The member that the options ask for."""
+    if sum((eigenvalues is not None, generic, chi is not None)) > 1:
+        raise click.UsageError("give one of --eigenvalues, --generic and --chi")
+    if size is not None and not 1 <= size <= 10**6:
+        raise click.UsageError(f"found --size {size}, expected 1 to 1000000")
+    if eigenvalues is not None:
+        values = lib.parse_point(eigenvalues)
+        if m is not None and m != len(values):
+            raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
+        return lib.draw_with_eigenvalues(values, seed, size or 2)
+    if chi is not None:
+        polynomial = lib.parse_chi(chi)
+        if m is not None and m != polynomial.degree():
+            raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
+        return lib.draw_with_chi(polynomial, seed, size or 1)
+    if m is None:
+        raise click.UsageError("missing --m M (half the dimension), or --eigenvalues L1,L2,..., or --chi EXPR")
+    if generic:
+        return lib.draw_generic(m, seed, size or 1)
+    return lib.draw_with_eigenvalues(lib.random_eigenvalues(m, seed), seed, size or 2)
 
 
 @command.command("show")

@@ -12,8 +12,8 @@ import click
 
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
-from kahanmaps_cli.runs.draw import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import Progress, say
 

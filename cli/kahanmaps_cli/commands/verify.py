@@ -11,7 +11,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.report_text import headline, witness_lines
 from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.draw import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
