@@ -1,6 +1,7 @@
 """One experiment of a batch, many tasks of one kind, none of which is made before it is asked for; and how it is read.
 
-`ExperimentReader` says what one table [experiments.NAME] of a spec means, or tells every mistake in it.
+`SpecDocument` knows the shape of a spec: which keys there are and what kind of value each has. `ExperimentReader` says
+what one table [experiments.NAME] means, which depends on its task, or tells the document every mistake in it.
 """
 
 from __future__ import annotations
@@ -15,11 +16,10 @@ from typing import Any
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.experiments.grid import Grid, RationalRange, Values, has_repeats, read_values
-from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of
+from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, read_memory, read_time
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
 from kahanmaps.experiments.results.recipes import ENDINGS, family_recipe, find_file, recipe_of
 from kahanmaps.experiments.results.records import Limits, Task, canonical
-from kahanmaps.experiments.shape import SpecDocument, read_memory, read_time
 
 PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system
 DEFAULT_LIMITS = Limits(time=3600.0, memory=4 * 10**9)
@@ -28,6 +28,128 @@ _EPS2 = "eps2"
 _FAMILY_WORD = "family"
 _FILES_AT_MOST = 10_000
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
+
+
+Place = tuple[str | int, ...]
+
+
+def _read_system(value: Any) -> None:
+    names = value if isinstance(value, list) else [value]
+    if not all(isinstance(name, str) and name for name in names):
+        raise ValueError(f'found {show(value)}, expected "family", a name of the catalogue, a path, or a list of these')
+
+
+def _read_digits(value: Any) -> None:
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**63:
+        raise ValueError(f"found {show(value)}, expected a whole number of digits, at least 1")
+
+
+# A shape is a function that raises ValueError; or a type, what is expected in words, and the shape of what is in a list
+# or under every name of a table, or those under its only names.
+_ON_ERROR = (str, "refuse, or skip for systems that cannot be read")
+_LIMITS = (
+    dict,
+    "a table with time, memory, digits",
+    {"time": read_time, "memory": read_memory, "digits": _read_digits},
+)
+_ZIP = 'a list of lists of axes, e.g. [["m", "steps"]]'
+_EXPERIMENT = (
+    dict,
+    "a table",
+    {
+        "task": (str, "the name of a task, e.g. check-commute"),
+        "system": _read_system,
+        "options": (dict, "a table of options with their values"),
+        "axes": (dict, "a table of options with lists or ranges of values"),
+        "zip": (list, _ZIP, (list, _ZIP, (str, _ZIP))),
+        "on_error": _ON_ERROR,
+        "limits": _LIMITS,
+    },
+)
+_EXPERIMENTS = (dict, "at least one table [experiments.NAME]", _EXPERIMENT)
+_SPEC = {"name": (str, "text"), "on_error": _ON_ERROR, "limits": _LIMITS, "experiments": _EXPERIMENTS}
+_REQUIRED = ("experiments", "task")
+_OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
+
+
+def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
+    """What is wrong with the shape: where, the key as people write it, and a sentence.
+
+    >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
+    [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
+    """
+    found = _mistakes(document, (dict, "a table", _SPEC), ())
+    return [(place, key_of(place), sentence) for place, sentence in found]
+
+
+def _mistakes(value: Any, shape: Any, place: Place) -> Iterator[tuple[Place, str]]:
+    """The places in a value that have not their shape, and what is wrong there."""
+    if callable(shape):
+        try:
+            shape(value)
+        except ValueError as error:
+            yield place, str(error)
+        return
+    kind, expected, *inner = shape
+    if not isinstance(value, kind) or (shape is _EXPERIMENTS and not value):
+        yield place, f"found {show(value)}, expected {expected}"
+        return
+    (parts,) = inner or [None]
+    if isinstance(parts, tuple):
+        for name, item in enumerate(value) if kind is list else value.items():
+            yield from _mistakes(item, parts, (*place, name))
+    elif parts is not None:
+        for name, part in parts.items():
+            if name in value:
+                yield from _mistakes(value[name], part, (*place, name))
+            elif name in _REQUIRED:
+                yield (*place, name), f"missing, expected {part[1]}"
+        for name in (name for name in value if name not in parts):
+            here = (*place, name)
+            is_of_system = here in _OF_SYSTEM_FILES
+            hint = " (a system file is for the other commands)" if is_of_system else suggestion(name, list(parts))
+            yield here, f"unknown key, expected one of {', '.join(parts)}{hint}"
+
+
+def key_of(place: Place) -> str:
+    """A place as people write it, lists counted from 1: experiments.a.zip[1]."""
+    return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
+
+
+class SpecDocument:
+    """A whole spec; paths of systems in it are relative to `folder`.
+
+    `mistakes` are pairs of key and sentence, those of the shape first. `documents` are of the systems found on the way.
+    With `skip_bad` systems that cannot be read are left out of all experiments, as with on_error = "skip".
+    """
+
+    def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:
+        self.document = document
+        self.skip_bad = skip_bad
+        self.folder = folder
+        self.mistakes: list[tuple[str, str]] = []
+        self.documents: dict[str, str] = {}
+        self._misshapen: list[Place] = []
+        for path, key, sentence in shape_mistakes(document):
+            self._misshapen.append(path)
+            self.mistake(key, sentence)
+
+    def mistake(self, key: str, sentence: str) -> None:
+        """Tell that something is wrong."""
+        # Keys and words come from the file: nothing in them may reach a terminal as an escape sequence.
+        printable = ["".join(c if c.isprintable() or c == "\n" else "_" for c in text) for text in (key, sentence)]
+        self.mistakes.append((printable[0].replace("\n", "_")[:120], printable[1]))
+
+    def sound(self, *path: str | int) -> Any:
+        """The value at a place, None where it is missing or has not the right shape."""
+        if any(bad == path[: len(bad)] for bad in self._misshapen):
+            return None
+        value: Any = self.document
+        for key in path:
+            if isinstance(value, dict) and key not in value:
+                return None
+            value = value[key]
+        return value
 
 
 @dataclass(frozen=True)

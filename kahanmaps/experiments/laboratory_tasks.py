@@ -23,7 +23,6 @@ from kahanmaps.experiments.registry import Result, Whole, analysis, fields, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
-    from kahanmaps.laboratory.cycles import Census
     from kahanmaps.laboratory.growth.degrees import DegreeGrowth
     from kahanmaps.laboratory.preserve.densities import DensitySearch
     from kahanmaps.laboratory.preserve.integrals import IntegralSearch
@@ -184,7 +183,16 @@ def all_analyses(found: Analysis) -> Result:
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
     final, confined = found.conclusion, {run.verdict for run in found.singularities}
-    unfinished = _unfinished(found)
+    # The parts that were begun and did not come to their end, be it for want of time or of formulas.
+    states = {
+        "degrees": found.degrees is None or found.degrees.recurrence is not None or found.degrees.ended in _ENDINGS,
+        "integrals": found.integrals is None or _state_of_integrals(found.integrals) == "complete",
+        "densities": found.densities is None or _state_of_densities(found.densities) != "open",
+        "symmetries": found.symmetries is None or found.symmetries.complete,
+        "commuting systems": found.commuting is None or found.commuting.complete,
+        "singularities": not any(run.stopped or run.verdict == "undecided" for run in found.singularities),
+    }
+    unfinished = [name for name, is_done in states.items() if not is_done]
     return {
         "status": "partial" if found.skipped or unfinished else "complete",
         "integrability": final.kind,
@@ -267,7 +275,15 @@ def cycles(
         "status": "time" if stopped else "complete" if whole else "sampled",
         "points": str(runs[0].points),  # may be longer than integers of databases
         "longest": max(census.longest for census in runs),
-        "runs": [_census(census, report) for census in runs],
+        "runs": [
+            {
+                "eps": format_number(census.eps),
+                **fields(census, "looked_at", "indeterminate", "pre_indeterminate", "preperiodic", "open", "periodic"),
+                **fields(census, "cycles", "longest"),
+                **({"lengths": [list(pair) for pair in census.lengths.items()]} if report else {}),
+            }
+            for census in runs
+        ],
     }
 
 
@@ -321,19 +337,6 @@ def _state_of_densities(found: DensitySearch) -> str:
     return "none" if found.reason.startswith("no polynomial") else "open"
 
 
-def _unfinished(found: Analysis) -> list[str]:
-    """The parts that were begun and did not come to their end, be it for want of time or of formulas."""
-    states = {
-        "degrees": found.degrees is None or found.degrees.recurrence is not None or found.degrees.ended in _ENDINGS,
-        "integrals": found.integrals is None or _state_of_integrals(found.integrals) == "complete",
-        "densities": found.densities is None or _state_of_densities(found.densities) != "open",
-        "symmetries": found.symmetries is None or found.symmetries.complete,
-        "commuting systems": found.commuting is None or found.commuting.complete,
-        "singularities": not any(run.stopped or run.verdict == "undecided" for run in found.singularities),
-    }
-    return [name for name, is_done in states.items() if not is_done]
-
-
 def _weakest(verdicts: Iterable[Verdict]) -> str | None:
     """The weakest of the verdicts; None where nothing was found: that there is nothing is no claim here."""
     given = list(verdicts)
@@ -365,17 +368,6 @@ def _hypersurfaces(run: SingularityRun) -> list[Result]:
         }
         for h in run.hypersurfaces
     ]
-
-
-def _census(census: Census, lengths: bool) -> Result:
-    result: Result = {
-        "eps": format_number(census.eps),
-        **fields(census, "looked_at", "indeterminate", "pre_indeterminate", "preperiodic", "open", "periodic"),
-        **fields(census, "cycles", "longest"),
-    }
-    if lengths:
-        result["lengths"] = [list(pair) for pair in census.lengths.items()]
-    return result
 
 
 def _number(value: Any) -> float | None:

@@ -7,8 +7,9 @@ task), and makes of it, in the child that does the task, what the library wants.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from flint import fmpq
@@ -20,6 +21,10 @@ from kahanmaps.family.draw import MAX_M, parse_chi
 
 _LARGEST = 2**63 - 1
 _PRIME_BITS = 192
+_TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
+_MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
+_MOST_SECONDS, _MOST_BYTES = 10**9, 10**18  # what system calls take
+_NONE = "none"
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
 
@@ -166,6 +171,42 @@ def number_of(value: Any) -> fmpq:
     if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
         raise InputError(f"found {show(value)}, expected a number")
     return rational(value)
+
+
+def read_time(value: Any) -> float | None:
+    """Seconds, from a number or a text such as "90 s", "5 min", "2 h"; "none" for no limit.
+
+    >>> read_time("1.5 min"), read_time("none")
+    (90.0, None)
+    """
+    expected = "seconds, or a text like 90 s, 5 min, 2 h, none"
+    found = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MOST_SECONDS)
+    return None if found is None else float(found)
+
+
+def read_memory(value: Any) -> int | None:
+    """Bytes, from a number or a text such as "500 MB", "2 GiB"; "none" for no limit.
+
+    >>> read_memory("1.5 GB")
+    1500000000
+    """
+    expected = "bytes, or a text like 500 MB, 2 GB, 1 GiB, none"
+    found = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MOST_BYTES)
+    return None if found is None else int(found)
+
+
+def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fraction, most: int) -> Fraction | None:
+    if value == _NONE:
+        return None
+    text = value if isinstance(value, str) else show(value)
+    found = re.fullmatch(r"\s*([0-9]{1,18}(?:\.[0-9]{1,9})?(?:[eE][+-]?[0-9]{1,2})?)\s*([A-Za-z]*)\s*", text)
+    if found is None or (found[2] and found[2] not in units):
+        raise ValueError(f"found {show(value)}, expected {expected}")
+    amount = Fraction(found[1]) * units.get(found[2], 1)
+    if not least <= amount <= most:
+        unit = "s" if units is _TIME_UNITS else "bytes"
+        raise ValueError(f"found {show(value)}, expected {float(least):g} to {float(most):g} {unit}, or none")
+    return amount
 
 
 OTHER = "other"  # read by the spec, which knows where files are; canonical is a recipe like that of the system

@@ -19,8 +19,7 @@
 
 Reading it finds every mistake at once, each with its key; docs/batch.md has all keys.
 
-What one of the tables means is the matter of experiment.py, which looks at the document and tells its mistakes through
-shape.py.
+What one of the tables means is the matter of experiment.py.
 """
 
 from __future__ import annotations
@@ -32,8 +31,7 @@ from pathlib import Path
 
 from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import SystemFileError, reading
-from kahanmaps.experiments.experiment import Experiment, ExperimentReader
-from kahanmaps.experiments.shape import SpecDocument
+from kahanmaps.experiments.experiment import Experiment, ExperimentReader, SpecDocument
 
 MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000

@@ -13,7 +13,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.written.text import format_point
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings, random_starts
@@ -118,7 +118,7 @@ def orbit(
     seed: int = 0,
 ) -> Result:
     """A summary of an orbit: how it ended, its period, how long its numbers are, its last point."""
-    point = start if start is not None else _drawn(system, seed)
+    point = _drawn(system, seed) if start is None else start
     numbers = Arithmetic.parse(arithmetic)
     if numbers.kind == "float" and at is not None:
         raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
@@ -144,7 +144,7 @@ def orbit(
     last = reached[0]
     end = walk.end
     result: Result = {
-        "start": _text(point),
+        "start": format_point(point),
         "method": walk.method,
         "status": end.status,
         "reached": end.steps,
@@ -152,7 +152,10 @@ def orbit(
     }
     if numbers.kind != "float":
         result["period"] = end.period
-    result |= _last(",".join(last.text))
+    text = ",".join(last.text)
+    if len(text) <= _LONGEST_POINT:
+        result["last"] = text
+    result["last_sha256"] = sha256(text.encode()).hexdigest()  # tells whether two computations agree
     if numbers.kind == "exact":
         result["digits"] = last.digits
     return result
@@ -201,13 +204,13 @@ def heights(
     seed: int = 0,
 ) -> Result:
     """How fast the numbers of an orbit grow: the kind of growth, and its constant."""
-    point = start if start is not None else _drawn(system, seed)
+    point = _drawn(system, seed) if start is None else start
     growth = height_growth(
         system.map.at(eps), point, steps, normal_form=system.normal_form, every=every, max_digits=max_digits
     )
     found = growth.to_json()
     return {
-        "start": _text(point),
+        "start": format_point(point),
         "growth": found.pop("kind"),
         "reached": found.pop("steps"),
         "ending": found.pop("message"),
@@ -221,10 +224,10 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
     normal_form = system.normal_form
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"no period of {system.name} can be computed: {normal_form.reason}")
-    point = start if start is not None else _drawn(system, seed)
+    point = _drawn(system, seed) if start is None else start
     found = period_of(normal_form, eps, point, prime)
     return {
-        "start": _text(point),
+        "start": format_point(point),
         "status": found.status,
         "period": None if found.period is None else str(found.period),
         "meets_pole": found.meets_pole,
@@ -260,13 +263,3 @@ def _float_normal_form(system: SystemFile, method: str | None) -> SystemNormalFo
     if isinstance(normal_form, SystemNormalForm) and normal_form.T is not None:
         return NoNormalForm("in machine numbers only J = [[0, I], [-I, 0]] has one")
     return normal_form
-
-
-def _text(point: Any) -> str:
-    return ",".join(format_number(entry) for entry in point)
-
-
-def _last(text: str) -> Result:
-    """A point as it is if it is short, and its hash, which tells whether two computations agree."""
-    shown = {"last": text} if len(text) <= _LONGEST_POINT else {}
-    return {**shown, "last_sha256": sha256(text.encode()).hexdigest()}
