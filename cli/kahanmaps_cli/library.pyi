@@ -118,7 +118,6 @@ from kahanmaps.laboratory.growth.height_survey import height_survey as height_su
 from kahanmaps.laboratory.known import Statement as Statement
 from kahanmaps.laboratory.laboratory import Laboratory as Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint as NoPoint
-from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch as DarbouxSearch
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials as darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities as find_densities
 from kahanmaps.laboratory.preserve.hirota_kimura import Basis as Basis

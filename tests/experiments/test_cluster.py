@@ -339,20 +339,6 @@ def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own):
     assert time.monotonic() - start < 4
 
 
-def test_closing_twice_is_allowed_and_leaves_the_scheduler_and_its_workers(shared):
-    workers = shared.workers()
-    for job in jobs_of(3, sleep=0.2):
-        workers.submit(job)
-    workers.close()
-    workers.close()
-    assert workers.in_flight == 0
-    again = shared.workers()
-    try:
-        assert len(done(again, jobs_of(2))) == 2
-    finally:
-        again.close()
-
-
 # Batches
 
 HERE = Path(__file__).resolve().parent
@@ -422,21 +408,6 @@ def test_what_is_killed_on_a_cluster_changes_nothing(own, study):
     _, err = batch.communicate(timeout=100)
     assert batch.returncode == 3, err  # some tasks fail, as meant
     list(run("study.toml", "home.db", jobs=2))
-    assert exported("away.db") == exported("home.db")
-
-
-@pytest.mark.slow
-def test_a_scheduler_that_dies_is_a_sentence_and_the_batch_goes_on_elsewhere(own, study):
-    own.worker(2)
-    batch = study(own, 10)
-    own.kill(own.scheduler)
-    _, err = batch.communicate(timeout=60)
-    assert batch.returncode == 3
-    assert "what was recorded is safe" in err
-    assert "Traceback" not in err
-    assert recorded() >= 10
-    for db in ("away.db", "home.db"):
-        list(run("study.toml", db, jobs=2))
     assert exported("away.db") == exported("home.db")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -253,8 +254,18 @@ def associated(
     root t of it only: systems with t as a parameter, "root of g". Conjugates, and products of them, are all others.
     """
     file, member = _member(system, parameters)
-    rows = []
     written: dict[str, lib.SystemFile] = {}
+
+    def with_file(row: dict[str, Any], suffix: str, made: Callable[[str], lib.SystemFile]) -> dict[str, Any]:
+        if write_to is None:
+            return row
+        text = "".join("p" if sign > 0 else "m" for sign in row["signs"])
+        path = Path(write_to) / f"{file_name(file.name)}-{text}{suffix}.toml"
+        written[str(path)] = made(path.stem)
+        will_write(str(path))
+        return {**row, "file": str(path)}
+
+    rows, conjugate = [], []
     for associate in member.associated():
         row: dict[str, Any] = {
             "label": associate.label,
@@ -263,31 +274,19 @@ def associated(
             "B": lib.plain(associate.B),
             "K": lib.format_polynomial(associate.K),
         }
-        if write_to is not None:
-            text = "".join("p" if sign > 0 else "m" for sign in associate.signs)
-            path = Path(write_to) / f"{file_name(file.name)}-{text}.toml"
-            one = lib.FamilyMember(member.A, member.H, associate.signs)
-            written[str(path)] = lib.SystemFile.from_member(one, path.stem)
-            will_write(str(path))
-            row["file"] = str(path)
-        rows.append(row)
-    conjugate = []
+        one = lib.FamilyMember(member.A, member.H, associate.signs)
+        rows.append(with_file(row, "", partial(lib.SystemFile.from_member, one)))
+    roots = list(member.roots.values())
     for other in member.conjugate_associates():
-        text = "".join("p" if sign > 0 else "m" for sign in other.signs)
-        more: dict[str, Any] = {
+        row = {
             "root": str(other.root),
             "symbol": other.name,
             "signs": list(other.signs),
             "B_in_powers_of_A": [lib.format_univariate(c.polynomial, other.name) for c in other.coefficients],
             "K": other.K_text,
         }
-        if write_to is not None:
-            which = list(member.roots.values()).index(other.root) + 1 if len(member.roots) > 1 else ""
-            path = Path(write_to) / f"{file_name(file.name)}-{text}-{other.name}{which}.toml"
-            written[str(path)] = lib.SystemFile.from_conjugate(other, path.stem)
-            will_write(str(path))
-            more["file"] = str(path)
-        conjugate.append(more)
+        which = roots.index(other.root) + 1 if len(roots) > 1 else ""
+        conjugate.append(with_file(row, f"-{other.name}{which}", partial(lib.SystemFile.from_conjugate, other)))
     if write_to is not None:
         Path(write_to).mkdir(parents=True, exist_ok=True)
     for name, associate_file in written.items():

@@ -97,7 +97,12 @@ def command(system: str | None, **options: Any) -> int:
             darboux = lib.darboux_polynomials(
                 file, options["darboux"], flow=options["flow"], **settings, progress=progress
             )
-            return _print_darboux(darboux, options["as_json"])
+            if options["as_json"]:
+                print_json(record("darboux-polynomials", darboux))
+            else:
+                tell(f"Darboux polynomials: {darboux.file.name}{scope(darboux)}")
+                tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(darboux).split("\n")))
+            return 3 if darboux.reason else 0
         settings |= {"max_degree": options["max_degree"], "seconds": options["seconds"] / (1 + options["flow"])}
         search = partial(lib.find_integrals, file, **settings, progress=progress)
         found = search(flow=options["flow"])
@@ -121,15 +126,6 @@ def _count(found: Any) -> str:
     if not found.profile.nullities and not found.codimension:
         return "orbits\tnot measured"
     return f"found\t{found.found} functionally independent; {found.count_text}"
-
-
-def _print_darboux(found: lib.DarbouxSearch, as_json: bool) -> int:
-    if as_json:
-        print_json(record("darboux-polynomials", found))
-    else:
-        tell(f"Darboux polynomials: {found.file.name}{scope(found)}")
-        tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
-    return 3 if found.reason else 0
 
 
 def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:

@@ -64,7 +64,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             if one.values is not None:
                 click.echo(f"# {one.text}\n{found.member(one).to_toml()}")
     elif as_json:
-        print_json(_record(found, options))
+        more = {**lib.eps_record(found.eps, found.file.map), "seconds": options["seconds"], **found.to_json()}
+        print_json(record_of("scan", found.file, "modulo primes", **more))
     else:
         at = "" if "eps" in found.over else lib.eps_told(found.eps, found.file.map)
         tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
@@ -87,8 +88,3 @@ def _write(found: lib.Scan, folder: str, quiet: bool) -> None:
         lib.write_whole(str(path), found.member(one).to_toml().encode())
     if not quiet:
         say(f"{folder}: {len(known)} system files")
-
-
-def _record(found: lib.Scan, options: dict[str, Any]) -> dict[str, Any]:
-    more = {**lib.eps_record(found.eps, found.file.map), "seconds": options["seconds"], **found.to_json()}
-    return record_of("scan", found.file, "modulo primes", **more)
