@@ -81,16 +81,6 @@ TRUE = identity_of(square_left, square_right)
 # True identities
 
 
-@pytest.mark.parametrize("error_bits", [1, 56, 1000])
-def test_a_true_identity_is_supported_with_an_error_below_the_bound_asked_for(error_bits):
-    decision = decide(TRUE, 0, error_bits)
-    assert decision.verdict is SUPPORTED
-    assert decision.witness is None
-    base, exponent = decision.evidence.data["error_bound"].split("^")
-    assert base == "2"
-    assert -int(exponent) >= error_bits or decision.evidence.data["points"] == 1
-
-
 @pytest.mark.parametrize("error_bits", [1, 100, 300])
 def test_as_many_points_are_tried_as_the_bound_needs_and_all_are_told(error_bits):
     identity, fields = counted(TRUE)
@@ -170,20 +160,6 @@ def test_where_no_rational_point_shows_it_the_witness_is_modular():
     assert (decision.witness.left, decision.witness.right) == ((str(x),), (str(p - x),))
 
 
-def shifted(shift: int, subject: tuple[Any, ...]) -> Identity:
-    """x = x + shift, which is false."""
-    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(shift), degree=1, bits=127.0)
-    return replace(identity, subject=subject)
-
-
-def test_a_false_claim_made_of_the_primes_of_another_is_refuted():
-    shift = 1
-    for _ in range(5):  # each time the primes at which the claim before would pass
-        primes = [int(p) for p in decide(replace(TRUE, subject=(shift,)), 0).evidence.data["primes"]]
-        shift = math.prod(primes)
-        assert decide(shifted(shift, (shift,)), 0).verdict is REFUTED
-
-
 # Every eps, or one
 
 
@@ -252,15 +228,3 @@ def test_an_identity_of_too_large_a_degree_is_undecided(degree):
     assert decision.evidence.data["degree_bound"] == degree
     # With as many poles the few points that are left may all be roots.
     assert decide(identity_of(square_left, square_right, degree=1, poles=degree), 0).verdict is UNDECIDED
-
-
-# Chance, and how to repeat it
-
-
-def test_the_same_seed_gives_the_same_decision():
-    false = identity_of(lambda x, e, K: (x + e) * (x + e), lambda x, e, K: x * x + e * e)
-    for identity in (TRUE, false):
-        assert decide(identity, 12) == decide(identity, 12)
-
-
-# Witnesses

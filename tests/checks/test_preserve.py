@@ -55,7 +55,6 @@ PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict
 pytestmark = pytest.mark.usefixtures("at_points_only")
 
 PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
-ODD = hamiltonian_of("x y z", "x^3/3 - x*y*z + z^2/2 + y", [[0, 1, 2], [-1, 0, 1], [-2, -1, 0]])
 GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
 MEMBERS = {
     "m=1": draw_with_eigenvalues([2], seed=3),
@@ -87,12 +86,6 @@ def test_the_determinant_density_is_proved_for_every_constant_skew_j_and_no_poin
     # At one eps, as for H = q p at eps = 1, there may be no map at all.
     assert found.verdict is PROVED or (eps is not None and found.verdict is UNDECIDED)
     assert found.formula == "phi = det(I - eps f'(x))"
-
-
-@pytest.mark.parametrize("hamiltonian", [ODD, GENERIC], ids=["odd", "generic"])
-def test_without_the_theorem_the_determinant_density_is_supported(hamiltonian, monkeypatch):
-    monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
-    assert only(check_measure(file(hamiltonian), QUICK)).verdict is SUPPORTED
 
 
 def check_density(system: QuadraticSystem, phi: str, how: Settings = QUICK) -> Finding:
@@ -226,12 +219,6 @@ def test_where_A_is_derogatory_the_tensor_is_not_proved_but_decided():
     # These H are sums of planar ones: the tensor is Poisson although the theorem does not say so.
     assert not member.is_generic
     assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
-
-
-def test_for_a_jordan_block_the_tensor_is_proved():
-    member = draw_with_chi(fmpq_poly([1, -2, 1]), seed=3)  # (t - 1)^2, not diagonalisable
-    assert not member.is_generic
-    assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [PROVED, PROVED]
 
 
 # Mutations

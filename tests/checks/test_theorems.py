@@ -10,18 +10,15 @@ from fractions import Fraction
 import pytest
 from check_helpers import commute_at, exact, hamiltonian_of, hamiltonians, side_by_side, system_of
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, LOTKA_VOLTERRA, matrices, points, rationals, systems
+from helpers import matrices, points, rationals, systems
 from hypothesis import assume, given
-from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks import theorems
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 MEMBER = draw_with_eigenvalues([1, -2, 3], seed=3)
 X = exact("1/2", "-1/3", 1, 2, "2/5", -1)
@@ -30,17 +27,6 @@ EPS = Fraction(1, 7)
 
 def failing(hypotheses: list[tuple[str, bool]]) -> list[str]:
     return [name for name, holds in hypotheses if not holds]
-
-
-# Evidence
-
-
-def test_evidence_names_the_theorem_and_every_hypothesis():
-    found = theorems.evidence("Theorem 1", [("a", True), ("b", True)])
-    assert found.method == "hypotheses"
-    assert found.summary == "Theorem 1 applies: a; b"
-    assert found.data == {"theorem": "Theorem 1", "hypotheses": ["a", "b"]}
-    assert theorems.evidence("Theorem 1", [("a", True), ("b", False)]) is None
 
 
 # Members and their associated systems
@@ -173,22 +159,6 @@ def test_a_linear_relation_is_found_where_there_is_one(C):
     assert theorems.linear_relation(DECOUPLED, DECOUPLED.transformed(C)) == C
 
 
-def test_where_components_depend_only_plus_and_minus_f_are_recognised():
-    dependent = system_of("x y", "x^2 + y", "2*x^2 + 2*y")
-    for sign in (1, -1):
-        assert theorems.linear_relation(dependent, dependent.scaled(sign)) == QQ.identity(2) * fmpq(sign)
-    assert theorems.linear_relation(dependent, dependent.scaled(2)) is None
-    assert theorems.linear_relation(LOTKA_VOLTERRA, EULER_TOP) is None
-
-
-@given(systems(dims=(1, 2, 3), homogeneous=True), st.integers(0, 60), st.data())
-def test_a_relation_up_to_a_tiny_term_is_none(f, power, data):
-    # A linear term leaves the span of homogeneous components, however small it is.
-    rhs, i = list(f.rhs), data.draw(st.integers(0, f.dim - 1))
-    rhs[i] = rhs[i] + fmpq(1, 10**power) * ring(f.variables).gens()[0]
-    assert theorems.linear_relation(f, QuadraticSystem(rhs)) is None
-
-
 # The splitting lemma
 
 
@@ -236,11 +206,3 @@ BROKEN_SPLITTINGS = {
 def test_each_hypothesis_of_the_lemma_is_needed(f, g):
     assert theorems.commuting_by_splitting(f, g) is None
     assert commute_at(f, g, EPS, X[:3]) is False
-
-
-def test_every_pair_of_a_class_commutes_by_the_lemma_too():
-    # B_s^T is such a C: the lemma is the theorem, seen without J.
-    base = MEMBER.chosen.system
-    for associate in MEMBER.associated():
-        assert theorems.linear_relation(base, associate.system) == associate.B.transpose()
-        assert theorems.commuting_by_splitting(base, associate.system) is not None

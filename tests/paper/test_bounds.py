@@ -81,7 +81,7 @@ BROKEN = [
     for claim in claims()
     if claim.kind is Kind.EQUAL and claim.makes_sense(1) and is_short(claim)
     for control in claim.breaks
-    if control in ("eps", "map", "f''", "B")
+    if control in ("eps", "map", "B")
 ]
 
 

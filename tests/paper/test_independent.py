@@ -129,15 +129,3 @@ def test_the_coefficients_of_b_give_b(case):
         coefficients = [fraction(c) for c in case.o.lagrange(i)]
         powers = [(c, case.p.power(k)) for k, c in enumerate(coefficients)]
         assert combination(powers) == case.p.B(i)
-
-
-@over_cases
-def test_the_coefficients_of_the_powers_give_the_square_of_the_jacobi_matrix(case):
-    terms = [(fraction(case.o.coefficient_of_power(k, case.o.x)), transposed(case.p.power(k))) for k in range(case.p.m)]
-    assert combination(terms) == case.p.square(case.x)
-
-
-@over_cases
-def test_h_i_has_the_gradient_a_to_the_i_nabla_h(case):
-    for i in case.each:
-        assert gradient(lambda x: case.p.K(case.p.power(i), x), case.x) == case.p.nabla(case.x, case.p.power(i))  # noqa: B023

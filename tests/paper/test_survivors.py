@@ -20,7 +20,6 @@ def report():
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.thorough
 @pytest.mark.slow
 def test_every_cell_is_proved_or_refuted_and_the_page_shows_the_table():
     answers = {
@@ -34,7 +33,6 @@ def test_every_cell_is_proved_or_refuted_and_the_page_shows_the_table():
     assert table(report()) in PAGE.read_text(encoding="utf-8")
 
 
-@pytest.mark.thorough
 @pytest.mark.slow
 def test_every_refuted_cell_has_a_counterexample():
     for one in report().findings:
@@ -48,5 +46,6 @@ def test_without_a_term_of_lower_degree_the_counterexample_is_none():
     assert witness.point == ("0", "0")
 
 
+@pytest.mark.slow
 def test_what_holds_has_no_counterexample():
     assert smallest_counterexample(FUNCTIONS["modified H is conserved by f"], "inhomogeneous") is None

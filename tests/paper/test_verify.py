@@ -7,7 +7,6 @@ undecided and say why; nothing is refuted there but misprints.
 
 import random
 from dataclasses import replace
-from functools import cache
 
 import pytest
 from flint import fmpq_mat, fmpq_poly
@@ -64,49 +63,31 @@ STATED = [claim for claim in claims() if not claim.variation]
 WITHOUT_NORMAL_FORM = {claim.key for claim in claims() if not claim.symplectic}
 
 
+def stated(m):
+    return [claim.key for claim in STATED if claim.makes_sense(m)]
+
+
 def misprints(m):
     return {claim.key for claim in claims() if claim.misprint and claim.makes_sense(m)}
-
-
-@cache
-def whole(name):
-    """The report on a member, everything as it is without options."""
-    return verify(file(name))
-
-
-@cache
-def broken(name):
-    """The report on the controls of a member."""
-    return verify(file(name), options=VerifyOptions(controls=True))
 
 
 # Whole members
 
 
 @over_members
-def test_the_findings_are_the_claims_that_make_sense_in_the_order_of_the_paper(name):
-    expected = [claim.key for claim in STATED if claim.makes_sense(member(name).m)]
-    assert [finding.place["key"] for finding in whole(name).findings] == expected
-
-
-@over_members
 def test_every_claim_but_misprints_is_proved_for_a_member_with_distinct_roots(name):
-    report, wrong = whole(name), misprints(member(name).m)
+    # One report, and what it has to be: neighbours would compute it again in another process.
+    report, wrong = verify(file(name)), misprints(member(name).m)
+    found = by_key(report)
+    assert [finding.place["key"] for finding in report.findings] == stated(member(name).m)
     assert keys(report, REFUTED) == wrong
-    assert keys(report, PROVED) | keys(report, SUPPORTED) == set(by_key(report)) - wrong
+    assert keys(report, PROVED) | keys(report, SUPPORTED) == set(found) - wrong
     assert keys(report, SUPPORTED) <= WITHOUT_NORMAL_FORM
     assert report.holds is True
-
-
-@pytest.mark.parametrize("name", quick(["m=2, split", "m=2, complex"], ["m=2, split"]))
-def test_a_refuted_misprint_shows_both_sides_and_counts_as_a_control(name):
-    report = whole(name)
-    for key in misprints(member(name).m):
-        finding = by_key(report)[key]
-        assert finding.control
-        assert finding.place["misprint"]
-        assert finding.witness is not None
-        assert finding.witness.left != finding.witness.right
+    for key in wrong:
+        assert found[key].control
+        assert found[key].place["misprint"]
+        assert found[key].witness.left != found[key].witness.right
 
 
 @pytest.mark.parametrize("asked", [1, 300])
@@ -114,12 +95,6 @@ def test_beside_a_proof_stand_random_points_with_the_error_bound_asked_for(asked
     for finding in verify(file("m=2, irreducible"), Settings(error_bits=asked), SIXTH).findings:
         (points,) = [evidence for evidence in finding.also if evidence.method == "random points over GF(p)"]
         assert bits(points) >= asked
-
-
-def test_the_roots_enter_the_error_bound_where_chi_does_not_split():
-    reports = [verify(file(name), options=SIXTH) for name in ("m=2, split", "m=2, irreducible")]
-    conjugates = [by_key(report)["commutativity"].also[0].data["splitting_field_degree_bound"] for report in reports]
-    assert conjugates == [1, 2]
 
 
 @pytest.mark.parametrize("name", quick(["m=3, irreducible", "m=2, complex"], ["m=2, complex"]))
@@ -139,12 +114,11 @@ def test_complex_balls_overlap_to_within_a_few_bits(name):
         assert int(balls.summary.split("2^-")[1]) > 100
 
 
-@pytest.mark.parametrize("section", quick(range(1, 11), [4, 7, 10]))
-def test_a_section_alone_is_what_it_is_among_all(section):
-    part = verify(file("m=2, split"), options=VerifyOptions(sections=(section,)))
-    among = [finding for finding in whole("m=2, split").findings if finding.place["section"] == section]
-    assert [f.place for f in part.findings] == [f.place for f in among]
-    assert [f.verdict for f in part.findings] == [f.verdict for f in among]
+@pytest.mark.parametrize("section", quick(range(1, 11), [4, 10]))
+def test_a_section_alone_has_its_claims_in_the_order_of_the_paper(section):
+    report = verify(file("m=2, split"), options=VerifyOptions(sections=(section,)))
+    expected = [claim.key for claim in STATED if claim.makes_sense(2) and claim.section == section]
+    assert [finding.place["key"] for finding in report.findings] == expected
 
 
 def test_at_one_eps_everything_holds_as_well():
@@ -156,7 +130,7 @@ def test_at_one_eps_everything_holds_as_well():
         assert by_key(report)[key].witness.eps == "1/10"
 
 
-@pytest.mark.parametrize("order", quick([1, 3, 6], [1, 6]))
+@pytest.mark.parametrize("order", quick([1, 3, 6], [6]))
 def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(7,), order=order))
     assert by_key(report)["series-of-the-integrals"].verdict is PROVED
@@ -168,14 +142,15 @@ def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
 
 @over_members
 def test_every_control_is_refuted_at_a_witness(name):
-    *findings, last = broken(name).findings
-    assert {finding.place["key"] for finding in findings} == {c.key for c in STATED if c.makes_sense(member(name).m)}
+    report = verify(file(name), options=VerifyOptions(controls=True))
+    *findings, last = report.findings
+    assert {finding.place["key"] for finding in findings} == set(stated(member(name).m))
     for finding in findings:
         assert finding.verdict is REFUTED
         assert finding.control
         assert finding.witness is not None
     assert last.verdict is PROVED
-    assert broken(name).verdict is PROVED
+    assert report.verdict is PROVED
 
 
 def test_a_claim_that_no_control_refutes_is_told(monkeypatch):
@@ -199,26 +174,16 @@ REPEATED = {
 over_repeated = pytest.mark.parametrize("name", quick(REPEATED, ["1, 1"]))
 
 
-@cache
-def repeated(name):
-    """The report on a member with repeated roots."""
-    return verify(SystemFile.from_member(REPEATED[name]))
-
-
 @over_repeated
-def test_where_roots_are_repeated_nothing_is_refuted_but_misprints(name):
-    assert keys(repeated(name), REFUTED) <= misprints(REPEATED[name].m)
-    assert repeated(name).verdict is UNDECIDED
-
-
-@over_repeated
-def test_claims_that_need_distinct_roots_are_undecided_with_the_diagnosis(name):
-    found = by_key(repeated(name))
+def test_claims_that_need_distinct_roots_are_undecided_and_nothing_is_refuted_but_misprints(name):
+    report, m = verify(SystemFile.from_member(REPEATED[name])), REPEATED[name].m
+    assert keys(report, REFUTED) <= misprints(m)
+    assert report.verdict is UNDECIDED
     for claim in STATED:
-        if claim.makes_sense(REPEATED[name].m) and claim.distinct_roots:
-            assert found[claim.key].verdict is UNDECIDED
-            assert found[claim.key].evidence.method == "outside the hypotheses"
-            assert "repeated roots" in found[claim.key].evidence.summary
+        if claim.makes_sense(m) and claim.distinct_roots:
+            found = by_key(report)[claim.key]
+            assert (found.verdict, found.evidence.method) == (UNDECIDED, "outside the hypotheses")
+            assert "repeated roots" in found.evidence.summary
 
 
 # Special members
@@ -230,24 +195,17 @@ def of_two_planes(H):
     return FamilyMember(A, parse_polynomial(H, ["x1", "x2", "x3", "x4"]))
 
 
-def special_member():
+def test_identities_are_proved_for_a_special_member_and_what_is_said_in_general_only_is_not_refuted():
     """Distinct roots, but H vanishes on the second block: nothing moves there."""
-    return of_two_planes("x1^3 + x1*x3^2")
-
-
-@cache
-def special():
-    """The report on the special member."""
-    return verify(SystemFile.from_member(special_member()))
-
-
-def test_what_is_said_in_general_only_is_not_refuted_by_a_special_member():
-    report = special()
+    report = verify(SystemFile.from_member(of_two_planes("x1^3 + x1*x3^2")))
     assert keys(report, REFUTED) <= misprints(2)
     assert "hamiltonians-are-independent" in keys(report, UNDECIDED)
     evidence = by_key(report)["hamiltonians-are-independent"].evidence
     assert (evidence.method, evidence.data["points"]) == ("special member", 4)
     assert "H vanishes on the eigenspaces of the roots of t - 2" in evidence.summary
+    identities = {c.key for c in STATED if c.kind is Kind.EQUAL and c.makes_sense(2) and not c.misprint}
+    assert identities - WITHOUT_NORMAL_FORM <= keys(report, PROVED)
+    assert identities <= keys(report, PROVED) | keys(report, SUPPORTED)
 
 
 def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
@@ -288,13 +246,6 @@ def test_what_is_special_about_a_member_is_said(H, reason):
     assert verifier_of(of_two_planes(H)).what_is_special() == reason
 
 
-def test_identities_are_proved_for_a_special_member_as_well():
-    report = special()
-    identities = {c.key for c in STATED if c.kind is Kind.EQUAL and c.makes_sense(2) and not c.misprint}
-    assert identities - WITHOUT_NORMAL_FORM <= keys(report, PROVED)
-    assert identities <= keys(report, PROVED) | keys(report, SUPPORTED)
-
-
 def test_the_zero_hamiltonian_refutes_nothing():
     report = verify(SystemFile.from_member(of_two_planes("x1 - x1")), options=VerifyOptions(sections=(1, 3, 7, 8)))
     assert keys(report, REFUTED) <= misprints(2)
@@ -329,15 +280,9 @@ def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
 # The member in general
 
 
-@cache
-def in_general(m):
-    """The report on the member in general."""
-    return verify(m=m)
-
-
-@pytest.mark.parametrize("m", quick([1, 2, 3], [1, 2]))
+@pytest.mark.parametrize("m", quick([1, 2, 3], [2]))
 def test_every_claim_is_proved_for_the_member_in_general(m):
-    report = in_general(m)
+    report = verify(m=m)
     assert keys(report, REFUTED) == misprints(m)
     assert keys(report, UNDECIDED) == set()
     assert report.verdict in (PROVED, SUPPORTED)
