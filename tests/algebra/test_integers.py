@@ -7,7 +7,7 @@ from flint import fmpz
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.integers import common_part, divide_exactly, radical, taken_apart, without
+from kahanmaps.algebra.integers import common_part, divide_exactly, taken_apart, without
 
 long_integers = st.integers(-(10**40), 10**40)
 
@@ -50,19 +50,3 @@ def test_primes_are_taken_away_with_all_their_powers(value, primes):
     assert taken > 0
     assert fmpz(primes).gcd(left) == 1
     assert (fmpz(primes) ** 30) % taken == 0
-
-
-def test_zero_is_taken_apart_and_has_no_radical():
-    assert taken_apart(fmpz(0), fmpz(6)) == (0, 1)
-    with pytest.raises(ArithmeticError):
-        radical(fmpz(0))
-
-
-@given(st.lists(st.integers(1, 10**6), min_size=1, max_size=3))
-def test_a_radical_has_the_same_primes(numbers):
-    found = radical(*map(fmpz, numbers))
-    product = fmpz(1)
-    for number in numbers:
-        product *= number
-    assert without(product, found) == without(found, product) == 1
-    assert all(found % (prime * prime) for prime in (2, 3, 5, 7))

@@ -15,17 +15,13 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import (
     RationalFunction,
-    common_denominator,
-    degree,
     evaluate,
     gradient,
-    is_homogeneous,
     names_of,
     primitive_part,
     ring,
     substitute,
 )
-from kahanmaps.errors import InputError
 
 XYZ = ring(["x", "y", "z"])
 x, y, z = XYZ.gens()
@@ -51,29 +47,12 @@ def rational_functions():
 # Rings, degrees, derivatives.
 
 
-@pytest.mark.parametrize(("p", "expected"), [(x * 0, -1), (x**0, 0), (x * y - z, 2), (x**2 * y**3 + z**4, 5)], ids=str)
-def test_the_degree_is_the_total_one_and_minus_one_for_zero(p, expected):
-    assert degree(p) == expected
-
-
-HOMOGENEOUS = [(x**2 * y + z**3, 3, True), (x**2 + z**3, 3, False), (x**3, 2, False), (x * 0, 3, True), (x**0, 0, True)]
-
-
-@pytest.mark.parametrize(("p", "of_degree", "expected"), HOMOGENEOUS, ids=str)
-def test_a_polynomial_is_homogeneous_when_all_terms_have_the_degree(p, of_degree, expected):
-    assert is_homogeneous(p, of_degree) is expected
-
-
 @given(p=polynomials(), q=polynomials())
 def test_the_gradient_obeys_leibniz(p, q):
     assert gradient(p * q) == tuple(a * q + p * b for a, b in zip(gradient(p), gradient(q), strict=True))
 
 
 # Integer forms.
-
-
-def test_the_common_denominator_is_the_least():
-    assert common_denominator(x / 4 - y / 6 + 2) == 12
 
 
 @given(p=polynomials())
@@ -115,17 +94,6 @@ def test_variables_can_be_given_values_one_after_the_other(p, point):
 @given(f=rational_functions(), factor=polynomials().filter(lambda p: not p.is_zero()))
 def test_a_common_factor_does_not_change_a_quotient(f, factor):
     assert RationalFunction(f.numerator * factor, f.denominator * factor) == f
-
-
-@given(f=rational_functions(), factor=rationals().filter(bool))
-def test_numbers_above_and_below_are_brought_to_one_normal_form(f, factor):
-    same = RationalFunction(f.numerator * factor, f.denominator * factor)
-    assert (same.numerator, same.denominator) == (f.numerator, f.denominator)
-
-
-def test_the_denominator_zero_is_refused():
-    with pytest.raises(InputError, match="denominator 0"):
-        RationalFunction(x, 0 * x)
 
 
 @over_all_fields

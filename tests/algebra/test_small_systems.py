@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import decoupling, independent, normal_form, solve_system
+from kahanmaps.algebra.small_systems import decoupling, independent, solve_system
 
 RING = ring(["x", "y", "z"])
 x, y, z = RING.gens()
@@ -78,16 +78,6 @@ def test_rational_points_of_irreducible_equations_are_found(equations, expected)
     found = solve(*equations)
     assert (points(found), found.complete) == (expected, True)
     assert not any(component.free for component in found.components)
-
-
-def test_a_remainder_is_found_by_replacing_leading_monomials():
-    """x^2 = 2 y, y^2 = z + 1 and z^2 = 3: the leading monomials are coprime, so this is a Groebner basis."""
-    basis = [x**2 - 2 * y, y**2 - z - 1, z**2 - 3]
-    assert normal_form(x**3 * y**2 * z, basis) == 0 * x + 2 * x * y * z + 6 * x * y
-    assert normal_form(x**4 + 5 * z**3 - x, basis) == 4 * z + 4 + 15 * z - x
-    assert normal_form(x * y * z - 7, basis) == x * y * z - 7
-    assert normal_form(basis[0] * (x - 3 * z) + basis[2] * x**5, basis).is_zero()
-    assert normal_form(3 * x**2, [2 * x**2 - y]) == y * fmpq(3, 2)
 
 
 def test_planes_of_cubics_are_decoupled():

@@ -52,13 +52,6 @@ def chi_without(member: FamilyMember, factor: Factor) -> fmpq_poly:
     return rest
 
 
-@over_members
-def test_the_coefficients_give_the_sign_matrix_and_k(member):
-    for g in member.associated():
-        assert evaluate_at_matrix(fmpq_poly(list(g.coefficients)), member.A) == g.B
-        assert sum((c * H for c, H in zip(g.coefficients, member.chain, strict=True)), 0 * member.H) == g.K
-
-
 # How many there are, and which.
 
 COUNTS = [  # chi, number of irreducible factors r, of rational associated systems 2^(r-1)
@@ -75,31 +68,6 @@ COUNTS = [  # chi, number of irreducible factors r, of rational associated syste
 def test_there_is_one_rational_associated_system_for_every_choice_of_signs_up_to_all(chi, count):
     systems = [g.system for g in draw_with_chi(chi, 1).associated()]
     assert len(set(systems)) == len(systems) == count
-
-
-# f_s and K_s.
-
-
-# Members as values.
-
-
-def test_the_signs_of_a_member_choose_the_associated_system():
-    member = MEMBERS["m = 3, split"]
-    assert FamilyMember(member.A, member.H, (1, -1, -1)).chosen.K == member.associate([1, -1, -1]).K
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        FamilyMember(MEMBERS["m = 2, split"].A, MEMBERS["m = 2, split"].H, (1, -1)),
-        FamilyMember(MEMBERS["m = 2, split"].A, 2 * MEMBERS["m = 2, split"].H),
-        FamilyMember(2 * MEMBERS["m = 2, split"].A, MEMBERS["m = 2, split"].H),
-        MEMBERS["m = 2, split"].H,
-    ],
-    ids=["signs", "H", "A", "kind"],
-)
-def test_members_that_differ_are_different(other):
-    assert MEMBERS["m = 2, split"] != other
 
 
 # over number fields

@@ -61,14 +61,6 @@ def samples(dim: int, count: int = 3) -> list[tuple[fmpq, ...]]:
     return [random_point(dim, seed) for seed in range(count)]
 
 
-def discriminant(a, b, c, d):
-    """The discriminant of a u^3 + b u^2 v + c u v^2 + d v^3; a linear change of variables multiplies it by det^6."""
-    return b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d
-
-
-# The coordinates.
-
-
 # The system.
 
 
@@ -97,33 +89,6 @@ def test_where_the_kahan_map_is_singular_the_planar_step_is_and_tells_the_factor
         form.step(*form.coordinates(x), 1)
     assert (caught.value.point, caught.value.eps) == (form.coordinates(x), 1)
     form.step(*form.coordinates(x), "1/3")
-
-
-# Known answers: h is determined up to SL_2(K), so that its discriminant is determined.
-
-
-def test_the_discriminants_of_a_product():
-    # dx1 dx3 = du dv / chi'(1), chi'(1) = -3: h is -3 (x1^3 + x3^3) in u, v, its discriminant -27 (-3)^4 / (-3)^6
-    form = normal_form(diagonal([1, 4], "x1^3 + x3^3 + 2*x2^3 + x4^3"))
-    assert [part.weight for part in form.parts] == [fmpq(-1, 3), fmpq(1, 3)]
-    discriminants = discriminant(*form.coefficients)
-    assert [discriminants(part.root) for part in form.parts] == [-3, -12]
-
-
-# The parts at rational roots.
-
-
-@over_members
-def test_each_part_moves_by_itself_as_a_planar_kahan_map(member, form):
-    for x in samples(member.dim):
-        X, Y = form.coordinates(x)
-        image = form.step(X, Y, "1/3")
-        for part in form.parts:
-            phi = KahanMap(part.hamiltonian.system, "1/3")
-            assert phi.step((X(part.root), Y(part.root))) == tuple(element(part.root) for element in image)
-
-
-# The choice of S.
 
 
 # What is not a normal form.
@@ -177,6 +142,3 @@ def test_wrong_data_fail_the_verification(name, wrong, sentence):
 def test_repeated_roots_are_refused_by_their_factors(member, factors):
     with pytest.raises(HypothesisError, match=f"chi has the repeated factor.* {factors}"):
         normal_form(member)
-
-
-# Text.

@@ -47,30 +47,6 @@ def test_defects_are_found_exactly_where_the_definition_fails(seed, row, column,
     assert (defects(A) == []) is is_skew_hamiltonian(A)
 
 
-DEFECTS = [
-    (
-        fmpq_mat([[1, 2, 0, 0], [3, 4, 0, 0], [0, 0, 1, 3], [0, 0, 5, 4]]),
-        "entry (4,3) is 5, expected 2: the lower right block must be the transpose of the upper left one",
-    ),
-    (
-        fmpq_mat([[1, 0, 0, 7], [0, 1, 8, 0], [0, 0, 1, 0], [0, 0, 0, 1]]),
-        "entry (2,3) is 8, expected -7: the upper right block must be skew",
-    ),
-    (
-        fmpq_mat([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 9, 0, 1]]),
-        "entry (4,2) is 9, expected 0: the lower left block must be skew",
-    ),
-    (fmpq_mat(2, 3), "A is 2 x 3, expected a square matrix of even size 2m"),
-    (fmpq_mat(3, 3), "A is 3 x 3, expected a square matrix of even size 2m"),
-    (fmpq_mat(0, 0), "A is 0 x 0, expected a square matrix of even size 2m"),
-]
-
-
-@pytest.mark.parametrize(("A", "sentence"), DEFECTS, ids=lambda value: str(value)[:30])
-def test_a_defect_is_named_with_its_entry(A, sentence):
-    assert defects(A) == [sentence]
-
-
 # chi.
 
 
@@ -96,11 +72,6 @@ ORDERS = [  # chi as a product in some order, the order of its factors
 @pytest.mark.parametrize(("polynomial", "expected"), ORDERS, ids=lambda value: str(value))
 def test_factors_come_in_the_order_of_the_signs(polynomial, expected):
     assert [str(factor) for factor in factors_of_chi(draw_with_chi(polynomial, 1).A)] == expected
-
-
-@pytest.mark.parametrize(("values", "expected"), [((1, 2, 3), True), ((1, 2, 1), False), ((0,), True)], ids=str)
-def test_a_matrix_is_generic_when_chi_has_no_repeated_root(values, expected):
-    assert all(factor.multiplicity == 1 for factor in factors_of_chi(diagonal(*values))) is expected
 
 
 # What chi means for A.

@@ -44,13 +44,6 @@ def test_a_declared_member_keeps_its_a():
     assert found.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
 
 
-def test_the_same_member_not_declared_is_found_with_simpler_roots():
-    member = draw_with_eigenvalues(["1/2", -7], 3)
-    found = system_normal_form(member.chosen.system)
-    assert (found.declared, found.T) == (False, None)
-    assert found.text == "a recognised member of the family, chi = (t - 1)*(t - 2)"
-
-
 @over_members
 def test_the_structure_steps_like_the_system(name):
     normal_form, system = structure_and_system(name)

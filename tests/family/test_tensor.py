@@ -104,16 +104,3 @@ def test_a_perturbed_system_is_no_longer_over_the_algebra():
     assert tensor_structure(moved) is None
     with pytest.raises(InputError, match="C does not make this a system"):
         TensorStructure(moved, C, t**2 - 2)
-
-
-@pytest.mark.parametrize(
-    ("system", "chi", "message"),
-    [
-        (PLANAR, fmpq_poly([3]), "expected a polynomial in t"),
-        (PLANAR, t**1000, "expected at most"),
-        (QuadraticSystem((ring(["x", "a"]).gen(1) * ring(["x", "a"]).gen(0),), ("a",)), t**2, "expected none but t"),
-    ],
-)
-def test_wrong_input_is_refused(system, chi, message):
-    with pytest.raises(InputError, match=message):
-        over_algebra(system, chi)

@@ -6,10 +6,8 @@ constant of linear growth from the multiplier of a Moebius map, that of quadrati
 too short or fits no rule is undecided.
 """
 
-import random
 from fractions import Fraction
 from math import gcd, lcm, log2
-from types import SimpleNamespace
 
 import pytest
 from flint import fmpq
@@ -19,7 +17,6 @@ from hypothesis import strategies as st
 from planar_helpers import over_members, side_by_side, structure_and_system
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, decimal_text, height, height_growth
@@ -133,40 +130,6 @@ def test_exponential_growth_ends_at_the_budget_with_the_growth_of_the_degrees_as
     assert abs(found.ratio / factor - 1) < Fraction(1, 1000)
 
 
-@pytest.mark.parametrize("dim", [2, 4])
-def test_generic_quadratic_systems_multiply_heights_by_their_dimension(dim):
-    rng = random.Random(dim)
-    x = [f"x{i}" for i in range(dim)]
-    monomials = ["1", *x, *(f"{a}*{b}" for i, a in enumerate(x) for b in x[i:])]
-    rhs = ["+".join(f"({rng.randint(-3, 3)})*{monomial}" for monomial in monomials) for _ in x]
-    start = [fmpq(rng.randint(-5, 5), rng.randint(1, 5)) for _ in x]
-    found = growth(QuadraticSystem.from_text(x, rhs), start, 30, max_digits=60_000)
-    assert (found.kind, found.end.status) == (E, "budget")
-    assert abs(found.ratio - dim) < Fraction(1, 50)
-
-
-# System, start, eps, steps, kind, reason.
-CONTROLS = {
-    "x' = x^2": (system_of(x="x^2"), ["-1/5"], "1/10", 64, LOG, "1/x moves by -2 eps"),
-    "fall": (system_of(x="v", v="1"), ["1/3", "1/2"], "1/10", 64, LOG, "polynomials in n"),
-    "x' = -x": (system_of(x="-x"), ["1/3"], "1/10", 64, LIN, "x goes to 9x/11"),
-    "x' = 1 + x^2, eps = 1/2": (system_of(x="1 + x^2"), ["1/3"], "1/2", 64, P, "a quarter turn is twice it"),
-    "Henon-Heiles, eps = 1": (load("henon_heiles").system, START[:4], 1, 64, P, "Proved in the catalogue: period 4"),
-    "at rest": (load("lorenz").system, [0, 0, 0], "1/10", 20, P, "a fixed point"),
-    "prey alone": (load("lotka_volterra").system, ["1/2", 0], "1/10", 64, LIN, "x' = x on an invariant line"),
-    "x1 + x2 + x3 = 0": (load("volterra_periodic_3").system, [*START[:2], "-5/6"], "1/10", 64, Q, "elliptic"),
-    "nested powers of n": (
-        system_of(x="y^2", y="z^2", z="z"),
-        [*START[:2], 1],
-        "1/10",
-        128,
-        LIN,
-        "4 log2(11) n: 11^(4n) over 9^(4n)",
-    ),
-    "a product of n factors": (system_of(x="x*y", y="1"), START[:2], "1/10", 64, U, "n log n"),
-}
-
-
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -262,17 +225,3 @@ def test_few_heights_decide_nothing(heights):
     assert found.kind is U
     assert found.constant is None
     assert "expected 9 or more" in found.reason
-
-
-# Output
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [({"steps": -1}, "-1 steps"), ({"every": 0}, "every = 0"), ({"max_digits": 0}, "budget of 0 digits")],
-)
-def test_wrong_input_is_refused(wrong, message):
-    given = SimpleNamespace(**({"start": START[:2], "steps": 5} | wrong))
-    options = {name: value for name, value in vars(given).items() if name not in ("start", "steps")}
-    with pytest.raises(InputError, match=message):
-        growth(load("weierstrass").system, given.start, given.steps, **options)

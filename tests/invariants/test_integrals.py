@@ -6,10 +6,8 @@ f. It is conserved, tends to H with a defect of order eps^2, and is -1/6 of the 
 
 import pytest
 from check_helpers import (
-    claim,
     dot,
     exact,
-    function_value,
     hamiltonian_of,
     hamiltonians,
     kahan_step,
@@ -24,14 +22,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.draw import draw_with_chi
-from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.systems.hamiltonian import standard_structure
 
 nonzero = rationals(6).filter(lambda eps: eps != 0)
 
-HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
 PLANE_CUBIC = hamiltonian_of("q p", "q^3/3 - 2*q*p^2 + p^3")
 
 
@@ -76,21 +73,6 @@ def test_modified_h_is_minus_one_sixth_of_the_papers_integral(drawn, eps):
     assert modified == paper / -6
 
 
-@pytest.mark.parametrize(
-    "hamiltonian",
-    [
-        HENON,
-        hamiltonian_of("q p", "q^3 + p^2"),
-        hamiltonian_of("q p", "q^3", [[0, 2], [-2, 0]]),
-        hamiltonian_of("x y z", "x^3", [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]),
-    ],
-    ids=["quadratic terms", "p^2", "J doubled", "odd dimension"],
-)
-def test_the_papers_integral_is_refused_for_inhomogeneous_h_and_other_j(hamiltonian):
-    with pytest.raises(InputError, match="homogeneous H and the standard J only"):
-        PaperIntegral(hamiltonian)
-
-
 @pytest.mark.parametrize("power", [1, 2])
 def test_an_integral_of_the_commutant_is_what_its_formula_says(power):
     member, eps = draw_with_chi(fmpq_poly([1, 1, 0, 1]), seed=3), fmpq(1, 7)
@@ -102,19 +84,6 @@ def test_an_integral_of_the_commutant_is_what_its_formula_says(power):
         matrix = times(matrix, transposed(rows_of(member.A)))
     expected = dot(exact(*x), [dot(line, image) for line in matrix]) / fraction(eps)
     assert fraction(CommutantIntegral(member.chosen.hamiltonian, member.A, power).value(QQ, eps, x)) == expected
-
-
-# Claimed functions
-
-
-@pytest.mark.parametrize("text", ["(x - 2*eps*y)/(1 - eps^2*x^2)", "3/7"])
-@given(points(2, rationals(9)), nonzero)
-def test_a_claimed_function_has_the_value_that_its_text_says(text, x, eps):
-    function = claim(text, "x y")
-    expected = function_value(function, exact(*x), fraction(eps))
-    found = ClaimedIntegral("I", function).value(QQ, eps, x)
-    assert (found is None) == (expected is None)
-    assert expected is None or fraction(found) == expected
 
 
 # Fields and singular points

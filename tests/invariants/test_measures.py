@@ -6,14 +6,10 @@ det dPhi is computed a second time here, from dual numbers: the Kahan step is ta
 import pytest
 from check_helpers import (
     claim,
-    combined_rows,
     determinant,
     exact,
-    function_value,
     hamiltonians,
     kahan_jacobian,
-    slope,
-    unit,
 )
 from helpers import fraction, points, rationals, systems_with_points
 from hypothesis import assume, given
@@ -21,7 +17,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularStep
-from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, jacobian_determinant_sides
+from kahanmaps.invariants.measures import DeterminantDensity, jacobian_determinant_sides
 from kahanmaps.invariants.phase_functions import where
 from kahanmaps.maps.kahan import KahanMap
 
@@ -41,13 +37,6 @@ def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, e
     assert determinant(jacobian) == fraction(above) / fraction(below)
 
 
-@given(systems_with_points(), nonzero)
-def test_the_density_is_the_determinant_of_i_minus_eps_jacobian(drawn, eps):
-    system, x = drawn
-    matrix = combined_rows(unit(system.dim), -fraction(eps), slope(system, exact(*x)))
-    assert fraction(DeterminantDensity(system).value(QQ, eps, x)) == determinant(matrix)
-
-
 @st.composite
 def hamiltonian_with_point(draw):
     hamiltonian = draw(hamiltonians(dims=(1, 2, 3)))
@@ -63,15 +52,6 @@ def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, ep
     above, below = jacobian_determinant_sides(KahanMap(hamiltonian.system, eps), x, y)
     phi = DeterminantDensity(hamiltonian.system)
     assert phi.value(QQ, eps, y) * below == phi.value(QQ, eps, x) * above
-
-
-@given(points(2, rationals(9)), nonzero)
-def test_a_claimed_density_has_the_value_that_its_text_says(x, eps):
-    function = claim("(x - y)/(x + eps*y)", "x y")
-    expected = function_value(function, exact(*x), fraction(eps))
-    found = ClaimedDensity(function).value(QQ, eps, x)
-    assert (found is None) == (expected is None)
-    assert expected is None or fraction(found) == expected
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 import kahanmaps as km
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.written.text import format_factored, parse_rational_function
-from kahanmaps.invariants.normalize import measured_integrals, normalized
+from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.laboratory import Laboratory
 
 CLAIMED = [
@@ -102,24 +102,3 @@ def test_integrals_are_found_normalized(system):
         assert Laboratory(found.file, flow=True).verdict_on(again.leading)[0].holds
         assert one.verdict.holds
         assert km.check_integrals(found.file, one.text).holds
-
-
-def test_maps_without_a_flow_and_formulas_for_one_eps_keep_their_scale():
-    file = km.load("qrt_symmetric")
-    assert measured_integrals(file) == file.integrals
-    at_one_eps = km.find_integrals("weierstrass", eps="1/5")
-    assert at_one_eps.integrals[0].verdict.holds
-
-
-def test_values_along_orbits_are_those_of_combinations_with_a_limit():
-    file = km.load("euler_top")
-    measured = measured_integrals(file)
-    assert list(measured) == ["(-F1 + 1)/eps^2", "(-F2/2 + 1/2)/eps^2"]
-    names = [*file.variables, "eps"]
-    for text, name in (("F1", "(-F1 + 1)/eps^2"), ("F2", "(-F2/2 + 1/2)/eps^2")):
-        x = [km.QQ.convert(k) for k in (2, 3, 5)]
-        e = km.QQ.convert("1/7")
-        F = file.integrals[text].value(km.QQ, [*x, e])
-        expected = (1 - F) / e**2 if text == "F1" else (1 - F) / (2 * e**2)
-        assert measured[name].value(km.QQ, [*x, e]) == expected
-        assert measured[name].names == tuple(names)

@@ -130,10 +130,3 @@ def test_the_defects_are_those_found_by_differentiation_for_another_j():
     assert jacobi_defects(HamiltonianTensor(hamiltonian), QQ, fmpq(2, 3), x) == defects_by_differentiation(
         hamiltonian, fmpq(2, 3), x
     )
-
-
-@over_members
-def test_for_members_of_the_family_all_defects_vanish(member):
-    found = jacobi_defects(HamiltonianTensor(member.chosen.hamiltonian), QQ, fmpq(1, 7), random_point(member.dim, 5))
-    assert len(found) == member.dim * (member.dim - 1) * (member.dim - 2) // 6
-    assert set(found) == {fmpq(0)}

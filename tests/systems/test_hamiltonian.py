@@ -46,15 +46,6 @@ def test_the_centre_is_the_origin_where_it_can_be(H, centre):
     assert CubicHamiltonian(H, standard_structure(2)).centre == centre
 
 
-# The standard structure.
-
-
-@pytest.mark.parametrize("dim", [0, 1, 3, -2])
-def test_there_is_no_standard_structure_in_odd_or_no_dimension(dim):
-    with pytest.raises(InputError, match=f"even dimension, found {dim}"):
-        standard_structure(dim)
-
-
 # The equations.
 
 
@@ -63,32 +54,6 @@ def test_with_the_standard_structure_the_equations_are_the_canonical_ones(H):
     f = CubicHamiltonian(H, standard_structure(4)).system.rhs
     dq1, dq2, dp1, dp2 = gradient(H)
     assert f == (dp1, dp2, -dq1, -dq2)
-
-
-# Properties and equality.
-
-
-def test_a_structure_is_standard_only_if_it_is_the_one_of_its_dimension():
-    standard, other = standard_structure(2), 2 * standard_structure(2)
-    assert [CubicHamiltonian(q**3, J).is_standard for J in (standard, other)] == [True, False]
-
-
-def test_equal_hamiltonians_hash_alike():
-    one, two = (CubicHamiltonian(q**3 + p, standard_structure(2)) for _ in range(2))
-    assert (one, hash(one)) == (two, hash(two))
-
-
-OTHERS = [
-    CubicHamiltonian(q**3 + 1, standard_structure(2)),
-    CubicHamiltonian(q**3, 2 * standard_structure(2)),
-    CubicHamiltonian(ring(["q", "r"]).gens()[0] ** 3, standard_structure(2)),
-    q**3,
-]
-
-
-@pytest.mark.parametrize("other", OTHERS, ids=["energy", "structure", "names", "kind"])
-def test_hamiltonians_that_differ_are_different(other):
-    assert CubicHamiltonian(q**3, standard_structure(2)) != other
 
 
 # What is refused.
