@@ -8,12 +8,11 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import RR
-from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit
-from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for, orbit
+from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
@@ -60,11 +59,3 @@ def test_where_no_precision_is_enough_that_is_said():
 
     with pytest.raises(NotAccurate, match="give 15 digits"):
         bits_for(orbit_with, 15)
-
-
-@pytest.mark.parametrize(("asked", "digits"), [({}, 15), ({"accuracy": 9}, 9)])
-def test_fifteen_digits_are_asked_for_unless_it_is_said_how_many(asked, digits, monkeypatch):
-    seen = []
-    monkeypatch.setattr("kahanmaps.maps.orbits.orbit.bits_for", lambda _map, digits, _: seen.append(digits) or 64)
-    orbit(load("harmonic").system, [1, 2], "1/10", steps=3, arithmetic="ball:auto", **asked)
-    assert seen == [digits]

@@ -11,7 +11,6 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import over_number_field
 
 I = parse_root("root of t^2 + 1")
-TOP = "orbit euler_top --eps 1/3 --steps 2"
 
 
 def start_of(text, **roots):
@@ -23,15 +22,6 @@ def test_coordinates_are_polynomials_in_the_number():
     assert isinstance(point, AlgebraicPoint)
     assert list(map(str, point.over(point.root.number_field))) == ["1", "3*t + 1/2", "-t", "3*t"]
     assert point.over(GF(5)) in ((1, 4, 3, 1), (1, 2, 2, 4))  # t = 2 or 3, and 1/2 is 3
-
-
-def test_a_point_without_it_is_rational():
-    assert start_of("1,c,-1/2", t="root of t^2 + 1") == (1, 3, fmpq(-1, 2))
-
-
-def test_two_numbers_are_refused():
-    with pytest.raises(InputError, match="found the algebraic numbers s and t in a point, expected one"):
-        start_of("s,t", s="sqrt(2)", t="sqrt(3)")
 
 
 # The image of a point over Q(i) is a computation with pairs of rational numbers: here by hand, for x' = y, y' = -x.

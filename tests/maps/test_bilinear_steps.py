@@ -8,11 +8,10 @@ from math import prod
 
 import pytest
 from flint import fmpq, fmpz
-from orbit_helpers import START, begin, over, single_steps, walked
+from orbit_helpers import begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
-from kahanmaps import GF, Orbit, load
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -90,31 +89,3 @@ def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_s
     assert points == single_steps(map_over, start, last + 3)
     assert orbit.since < last - 1
     assert any(point.numerators[1] for point in points)
-
-
-def test_combinations_that_do_not_exist():
-    assert bilinear._solved([[1], [1]], [[1], [2]], 101) is None
-    assert bilinear._solved([[0], [1]], [[1], [2]], 101) is None
-    assert bilinear._solved([[2], [1]], [[4], [2]], 101) == [[2]]
-
-
-def test_an_image_is_told_from_other_points_and_from_a_choice_of_many():
-    map_over = over("lotka_volterra", 1)
-    steps, point = map_over.integer_steps, IntegerPoint((fmpz(2), fmpz(5)), fmpz(3))
-    image = map_over.integer_step(point)
-    assert steps.is_image(point, image)
-    assert not steps.is_image(point, IntegerPoint((image.numerators[0] + 1, image.numerators[1]), image.denominator))
-    singular = over("riccati", "1/2").integer_steps
-    pole = IntegerPoint((fmpz(1),), fmpz(2))
-    assert singular.determinant(pole) == 0
-    assert not singular.is_image(pole, pole)
-
-
-@pytest.mark.parametrize("name", ["clebsch_first_flow", "discrete_painleve_1"])
-def test_residues_are_those_of_the_map_over_the_field(name):
-    p = 10_007
-    map_over, modulo = over(name), load(name).map.at(fmpq(3, 11), GF(p))
-    start = begin(map_over)
-    expected = [[int(entry) for entry in point.x] for point in Orbit(modulo, START[: map_over.dim], 9)]
-    assert map_over.integer_steps.residues(start, p, 10) == [[*x, 1] for x in expected]
-    assert map_over.integer_steps.residues(start, 2, 3) is None  # 2 divides the denominator

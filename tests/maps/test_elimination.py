@@ -82,13 +82,6 @@ def test_minors_with_common_content_are_solved_correctly(n, W, offered):
 
 
 @pytest.mark.parametrize("n", range(3, 9))
-def test_common_content_is_taken_out_by_the_elimination_itself(n):
-    rng = random.Random(n)
-    matrix, right = of_rank_two_modulo(LONG_PRIME, n, rng)
-    assert elimination._eliminate(matrix, right, LONG_PRIME) == by_flint(matrix, right)
-
-
-@pytest.mark.parametrize("n", range(3, 9))
 def test_a_vanishing_pivot_makes_the_elimination_step_aside(n):
     matrix = fmpz_mat(n, n, [int(i + j == n - 1) for i in range(n) for j in range(n)])  # the reversal
     right = fmpz_mat(n, 1, list(range(n)))

@@ -7,10 +7,10 @@ all coordinates have in common are seen.
 import random
 
 import pytest
-from flint import fmpq, fmpq_mat, fmpz_mat, nmod
+from flint import fmpq, fmpq_mat, nmod
 
 import kahanmaps.maps.orbits.relations.elliptic_search as search
-from kahanmaps.maps.orbits.relations.forms import _of_multiples, common_primes, forms
+from kahanmaps.maps.orbits.relations.forms import _of_multiples, forms
 from kahanmaps.maps.somos import around, first_terms
 
 P = 2**61 - 1
@@ -51,25 +51,6 @@ def test_curves_of_any_degree(degree, size):
     assert search.curve(points[: found.sections.points_used], P, found.sections) == found
 
 
-def test_sections_of_another_degree_are_refused():
-    points = points_on_a_curve(4, 3, 70)
-    found = search.curve(points[:60], P).sections
-    with pytest.raises(ArithmeticError):
-        search.curve(points[:60], P, search.Sections(2, found.coordinates, found.points, found.lag, found.products))
-
-
-def test_coordinates_that_are_no_sections_have_no_coefficients():
-    W, U = modular(40)
-    points = [[pow(3, n * n, P), 1] for n in range(30)]
-    assert search._coefficients(points, [forms(3, W, U, n) for n in range(2, 30)], P) is None
-
-
-@pytest.mark.parametrize("degree", range(2, 9))
-def test_forms_are_independent(degree):
-    W, U = (around(WARD[0], 24), around(WARD[1], 24, WARD[0]))
-    assert fmpq_mat([forms(degree, W, U, n) for n in range(-9, 12)]).rank() == degree
-
-
 @pytest.mark.parametrize("degree", range(2, 8))
 def test_sections_of_multiples_are_a_basis_and_belong_to_their_degree(degree):
     W, U = (around(WARD[0], 20), around(WARD[1], 20, WARD[0]))
@@ -79,14 +60,3 @@ def test_sections_of_multiples_are_a_basis_and_belong_to_their_degree(degree):
     assert len(rows[0]) == 2 * degree + 1
     assert fmpq_mat(rows).rank() == degree + 1
     assert fmpq_mat([row[degree + 1 :] for row in rows]).rank() == degree
-
-
-def test_common_primes_are_those_of_the_index():
-    for degree in range(2, 7):
-        rows = [[int(i == j) for i in range(degree)] for j in range(degree)]
-        assert abs(common_primes(degree, fmpz_mat(rows), *WARD)) == 1
-        rows[0][0] = 7
-        assert abs(common_primes(degree, fmpz_mat(rows), *WARD)) == 7
-    assert common_primes(3, fmpz_mat([[1, 0, 1], [0, 1, 0]]), *WARD) != 0  # two coordinates, three sections
-    with pytest.raises(ArithmeticError):
-        common_primes(3, fmpz_mat([[1, 0, 0], [1, 0, 0]]), *WARD)

@@ -4,12 +4,11 @@ Specified here: every point is the one that single steps give, in lowest terms a
 orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted.
 """
 
-from functools import reduce
 from io import StringIO
 from itertools import pairwise
 
 import pytest
-from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
+from flint import fmpq, fmpq_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from orbit_helpers import START, begin, over, single_steps, walked
@@ -17,7 +16,6 @@ from orbit_helpers import START, begin, over, single_steps, walked
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
-import kahanmaps.maps.somos as somos
 from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
@@ -26,7 +24,6 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
 
 BITS = 10_000
-POLE = IntegerPoint.from_rationals((fmpq(11), fmpq(9), fmpq(-5, 3)))  # of the Euler top: det(I - eps f') = 0
 small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
 
 
@@ -74,10 +71,8 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees)
     assert [search.sections[place].degree for place in search.new] == degrees
 
 
-@pytest.mark.parametrize(
-    "name", ["euler_top", "dressing_chain_3", "planar_cubic_hamiltonian", "qrt_asymmetric", "todd", "mcmillan"]
-)
-@settings(max_examples=6)
+@pytest.mark.parametrize("name", ["euler_top", "planar_cubic_hamiltonian", "todd", "mcmillan"])
+@settings(max_examples=4)
 @given(data=st.data())
 def test_any_start_and_eps(name, data):
     map_over = over(name, data.draw(small.filter(bool), label="eps"))
@@ -100,16 +95,6 @@ def test_compositions_and_inverses_move_points_of_a_curve_as_well():
         points, orbit = walked(changed, expected[0], 30)
         assert points == expected
         assert orbit.relations is not None
-
-
-def test_a_start_that_an_involution_keeps_is_special():
-    map_over = over("euler_top")
-    start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(0), fmpq(2, 7)))  # (x, y, z) -> (x, -y, z) reverses the flow
-    with pytest.raises(ArithmeticError):
-        elliptic._Search(map_over.factors, start, 1).found()
-    points, orbit = walked(map_over, start, 40)
-    assert points == single_steps(map_over, start, 40)
-    assert orbit.relations is not None
 
 
 def found(name, stride=None):
@@ -159,12 +144,6 @@ def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
     assert steps.at(search.first) is not None
 
 
-def test_an_orbit_that_ends_proves_nothing():
-    map_over, search, numbers = found("euler_top")
-    assert not elliptic._is_proved(POLE, search, elliptic._Exact(search, numbers).steps(map_over))
-    assert elliptic._Search(map_over.factors, POLE, 1)._residues(2**61 - 1, 5) is None
-
-
 def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     # Of coordinates (Y x - X y, q y) a prime q divides all where it divides the denominator W of the point (X, Y)/W.
     map_over, search, numbers = found("weierstrass")
@@ -182,28 +161,6 @@ def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     steps = elliptic._Exact(search, changed).steps(map_over)
     assert steps.at(at) != expected[at]
     assert steps.at(at).rationals() == expected[at].rationals()
-
-
-def test_primes_of_the_term_at_0_are_common_ones():
-    # 13 divides U(0), and W(9): then all forms of odd degree at n = 9.
-    map_over = over("weierstrass", 1)
-    start = IntegerPoint.from_rationals((fmpq(1), fmpq(1, 2)))
-    search = elliptic._Search(map_over.factors, start, 1)
-    units = tuple(fmpq(int(i == j)) for i in range(3) for j in range(3))
-    numbers = {(0, 0): search.found()[0, 0]._replace(coefficients=units)}
-    points = [point for n in range(4, 20) if (point := elliptic._Exact(search, numbers).steps(map_over).at(n))]
-    assert len(points) > 9
-    assert all(reduce(fmpz.gcd, point.numerators, point.denominator) == 1 for point in points)
-
-
-def test_after_a_pole_there_is_no_point():
-    map_over = over("euler_top")
-    assert map_over.integer_step(POLE) is None
-    points = single_steps(map_over, begin(map_over), 9)
-    steps = elliptic.elliptic_steps(map_over, points[0], BITS)
-    assert steps.step([], 9) == points[9]
-    steps._residue = POLE.residues(elliptic_steps._PRIME)
-    assert steps.step([], 10) is None
 
 
 def test_a_start_on_a_curve_of_genus_0_or_of_finite_order_has_no_sequences():
@@ -224,43 +181,6 @@ def test_an_orbit_ends_after_a_point_with_too_many_bits():
     assert len(list(rational_orbit.RationalOrbit(map_over**2, begin(map_over), max_bits=400))) < len(within) + 1
 
 
-def test_orbits_tell_from_which_step_on(monkeypatch):
-    asked = []
-    real = rational_orbit.elliptic_steps
-    monkeypatch.setattr(rational_orbit, "elliptic_steps", lambda *given: asked.append(given) or real(*given))
-    orbit = Orbit(over("euler_top"), START[:3], 40)
-    assert orbit.relations is None
-    points = [point.value for point in orbit]
-    since = int(orbit.relations.removeprefix("Somos sequences along the orbit from step ").removesuffix(" on"))
-    assert asked == [(orbit.map, points[0], points[since - 1].bits)]  # once
-    assert points[since - 1].bits >= 20 * 16 > points[since - 2].bits
-
-
-def test_memory_does_not_grow_with_what_is_behind():
-    map_over = over("nahm_tetrahedral")
-    steps = elliptic.elliptic_steps(map_over, begin(map_over), BITS)
-    last = [begin(map_over)]
-    for number in range(1, 121):
-        last.append(steps.step(last[-3:], number) or map_over.integer_step(last[-1]))
-    ((coordinates,),) = steps._places
-    kept = [n for n in coordinates._U._terms if n > 12]
-    assert len(kept) < 75
-    assert len(steps._known) < 9
-    assert last[-1] == single_steps(map_over, begin(map_over), 120)[-1]
-
-
-def test_a_parameter_that_is_carried_along_is_no_coordinate_of_its_own():
-    field = ring(["x", "y", "a", "b", "eps"])
-    x, y, a, b, _ = field.gens()
-    one = field.constant(1)
-    images = [RationalFunction(y, one), RationalFunction(y + a, x), RationalFunction(b, one), RationalFunction(a, one)]
-    map_over = explicit_map(["x", "y", "a", "b"], images).at(1)
-    start = IntegerPoint.from_rationals((fmpq(1, 2), fmpq(-1, 3), fmpq(2, 5), fmpq(2, 5)))
-    points, orbit = walked(map_over, start, 60)
-    assert points == single_steps(map_over, start, 60)
-    assert orbit.relations is not None
-
-
 def test_powers_step_by_the_sequences_of_the_map_itself():
     map_over = over("mcmillan")
     for power in (2, 12):
@@ -271,36 +191,6 @@ def test_powers_step_by_the_sequences_of_the_map_itself():
     both = over("weierstrass") @ over("weierstrass", "1/5")
     assert len(elliptic._unit((both**3).factors)) == 2
     assert elliptic.elliptic_steps(both, begin(both), BITS) is None
-
-
-def test_of_several_factors_all_points_have_to_be_within_the_budget():
-    map_over = over("euler_top")
-    there_and_back = (map_over**-2) @ (map_over**3)
-    for max_bits in (1000, 2500, 4000):
-        expected = [begin(map_over)]
-        while (image := there_and_back.integer_step(expected[-1], max_bits)) is not None:
-            expected.append(image)
-            if image.exceeding(max_bits):
-                break
-        assert list(rational_orbit.RationalOrbit(there_and_back, begin(map_over), max_bits)) == expected
-
-
-def coordinates(degree, rows, primes):
-    W, U = somos.first_terms(fmpq(2), fmpq(3), fmpq(5))
-    base = fmpz(1)
-    for term in (*W, *U):
-        base = base.lcm(term.p).lcm(term.q)
-    numbers = somos.Integers(base)
-    multiples = somos.Terms(W, numbers)
-    return elliptic_steps.Coordinates(degree, fmpz_mat(rows), multiples, somos.Terms(U, numbers, multiples), primes)
-
-
-def test_high_powers_of_common_primes_are_taken_out_and_a_denominator_0_is_told():
-    rows = [[1, 2, 3], [0, 1, 4], [5, 0, 1]]
-    some, more = (coordinates(3, [[k * entry for entry in row] for row in rows], fmpz(7)) for k in (1, 7**9))
-    assert [some.at(n) for n in range(2, 20)] == [more.at(n) for n in range(2, 20)]
-    with pytest.raises(ZeroDivisionError):
-        coordinates(3, [[1, 0, 0], [0, 1, 0], [0, 0, 0]], fmpz(6)).at(5)
 
 
 @pytest.mark.parametrize("name", ["euler_top", "todd", "hky", "mcmillan", "clebsch_first_flow"])
@@ -348,29 +238,16 @@ def test_every_is_a_positive_integer(every):
 
 def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_out(monkeypatch):
     map_over = over("euler_top")
-    points = [point.step for point in Orbit(map_over, START[:3], 400, max_digits=3000, wanted={400}.__contains__)]
-    whole = Orbit(map_over, START[:3], 400, max_digits=3000)
-    orbit = Orbit(map_over, START[:3], 400, max_digits=3000, wanted={400}.__contains__)
+    points = [point.step for point in Orbit(map_over, START[:3], 150, max_digits=1000, wanted={150}.__contains__)]
+    whole = Orbit(map_over, START[:3], 150, max_digits=1000)
+    orbit = Orbit(map_over, START[:3], 150, max_digits=1000, wanted={150}.__contains__)
     assert len(list(whole)) > len(list(orbit)) == len(points)
     assert (orbit.end, orbit.end.status) == (whole.end, "budget")
     # Modulo 7 there seems to be a pole every few steps: then points are made all the same.
     monkeypatch.setattr(elliptic_steps, "_PRIME", 7)
-    expected = single_steps(map_over, begin(map_over), 70)
-    at = [point.value for point in Orbit(map_over, START[:3], 70, wanted={70}.__contains__)]
+    expected = single_steps(map_over, begin(map_over), 50)
+    at = [point.value for point in Orbit(map_over, START[:3], 50, wanted={50}.__contains__)]
     assert at[-1] == expected[-1]
-
-
-def test_where_a_point_is_not_given_single_steps_start_from_the_one_before(monkeypatch):
-    map_over = over("weierstrass")
-    expected = single_steps(map_over, begin(map_over), 80)
-    real = elliptic_steps.EllipticSteps.step
-    monkeypatch.setattr(elliptic_steps.EllipticSteps, "step", lambda self, *given: real(self, *given) and None)
-    points = [*rational_orbit.RationalOrbit(map_over, expected[0], 60_000, wanted={80}.__contains__)]
-    assert points[80] == expected[80]
-    assert None in points
-    monkeypatch.setattr(elliptic_steps.EllipticSteps, "point", lambda *_: None)
-    points = [*rational_orbit.RationalOrbit(map_over, expected[0], 60_000, wanted={80}.__contains__)]
-    assert points[80] == expected[80]
 
 
 def test_numbers_that_are_too_long_are_looked_for_again_along_longer_points(monkeypatch):

@@ -11,24 +11,11 @@ import sys
 import time
 
 import numpy as np
-import pytest
 from helpers import EULER_TOP
 
-from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, stream_orbit
-from kahanmaps.maps.floats.stream import NpyFile
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1", "1/2", "1/3"]
-
-
-def test_orbits_that_have_ended_are_nan_in_the_file(tmp_path):
-    riccati = QuadraticSystem.from_text(["x"], ["x^2"])
-    ensemble = FloatEnsemble(riccati, "1/2", np.array([[1.0], [-1.0]]), kernel="numpy")
-    with NpyFile(tmp_path / "x.npy", (2, 1)) as file:
-        for points in ensemble.records(2, 1):
-            file.append(points)
-    assert np.isnan(np.load(tmp_path / "x.npy")[:, :, 0]).tolist() == [[False, False], [True, False], [True, False]]
 
 
 def test_an_interrupted_orbit_leaves_a_whole_file(tmp_path):
@@ -43,22 +30,6 @@ def test_an_interrupted_orbit_leaves_a_whole_file(tmp_path):
     end = stream_orbit(orbit, tmp_path / "x.npy", progress=progress)
     assert (end.status, end.steps) == ("interrupted", seen[-1])
     assert len(np.load(tmp_path / "x.npy")) == seen[-1] // 100 + 1
-
-
-def test_numbers_that_the_header_does_not_count_yet_are_ignored(tmp_path):
-    with NpyFile(tmp_path / "x.npy", (2,)) as file:
-        file.append(np.ones((3, 2)))
-    with open(tmp_path / "x.npy", "ab") as stream:
-        stream.write(b"half a row")
-    assert np.load(tmp_path / "x.npy").tolist() == [[1.0, 1.0]] * 3
-
-
-def test_more_rows_than_the_header_can_count_are_refused_before_they_are_written(tmp_path):
-    with NpyFile(tmp_path / "x.npy", (2,)) as file:
-        before, file.rows = (tmp_path / "x.npy").read_bytes(), 10**200
-        with pytest.raises(InputError, match=r"more than the header of a \.npy file has room"):
-            file.append(np.zeros((1, 2)))
-    assert (tmp_path / "x.npy").read_bytes() == before
 
 
 ENDLESS = """

@@ -6,10 +6,8 @@ thresholds between the ways are put to 0 and to infinity); long numbers of membe
 substitution on fractions, and the steps stay the same.
 """
 
-from math import prod
-
 import pytest
-from flint import fmpq, fmpq_poly, fmpz, fmpz_mat
+from flint import fmpq, fmpq_poly, fmpz_mat
 from helpers import NAMED_SYSTEMS, rationals, systems_with_points
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -61,21 +59,6 @@ def walk(system: QuadraticSystem, eps: str, steps: int) -> list[IntegerPoint]:
     return found
 
 
-# Points.
-
-
-def composite_integers(primes=(2, 3, 2**61 - 1), exponent: int = 12):
-    """Integers made of few primes, in powers, so that they share much."""
-    powers = [st.integers(0, exponent).map(lambda e, p=p: p**e) for p in primes]
-    return st.tuples(st.sampled_from([1, -1, 5, -7, 0]), *powers).map(lambda factors: fmpz(prod(factors)))
-
-
-@given(numerators=st.lists(composite_integers(), min_size=1, max_size=5), denominator=composite_integers())
-def test_coordinates_in_lowest_terms_are_those_of_the_fractions(numerators, denominator):
-    point = IntegerPoint(tuple(numerators), abs(denominator) or fmpz(1))
-    assert point.lowest_terms() == [(entry.p, entry.q) for entry in point.rationals()]
-
-
 # Steps.
 
 
@@ -98,16 +81,6 @@ def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, thre
     for point in walk(system, eps, steps)[1:]:
         x = rational_step(system, QQ.convert(eps), x)
         assert point.rationals() == x
-
-
-@pytest.mark.parametrize("name", ["m = 3", "m = 3, irreducible"])
-def test_for_the_family_the_elimination_itself_finds_every_step(name, monkeypatch):
-    # It relies on rank 2 modulo the denominator; were that wrong, FLINT's solver would silently do all the work.
-    found: list[IntegerPoint | None] = []
-    eliminate = integer_steps.solve_fraction_free
-    monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", 0)
-    monkeypatch.setattr(integer_steps, "solve_fraction_free", lambda *a: found.append(eliminate(*a)) or found[-1])
-    assert walk(FAMILY[name], "1/10", 12)[1:] == found
 
 
 # Rows of the equation that do not depend on x are taken out.
@@ -141,11 +114,6 @@ def test_a_step_is_that_of_fractions_and_a_pole_is_one(system, eps, x):
         assert image == IntegerPoint.from_rationals(expected)
 
 
-def test_dependent_rows_leave_no_value_anywhere():
-    singular = KahanMap(QuadraticSystem.from_text(NAMES, ["x", "y^2", "x*z", "w"]), 1)
-    assert singular.integer_steps.step(IntegerPoint.from_rationals((fmpq(1),) * 4)) is None
-
-
 # Equations that are solved unknown by unknown, with powers of W that rows share taken out.
 
 
@@ -173,22 +141,3 @@ def equations(uses: list[list[bool]]):
     return forward_substitution(
         [(0,) * n + (1,)], fmpz_mat([[entry] for row in uses for entry in [*map(int, row), 1]]), n
     )
-
-
-def test_rows_and_unknowns_are_put_in_order():
-    rows = equations([[False, True], [True, True]])._rows
-    assert [(row.unknown, row.known) for row in rows] == [(1, ()), (0, (1,))]
-    assert equations([[True, True], [True, True]]) is None
-    assert equations([[True, False], [True, False]]) is None
-
-
-def test_where_a_coordinate_that_divides_a_whole_row_is_0_there_is_no_value():
-    twice = integer_steps.IntegerSteps([(1, 0)], [[((0, fmpq(1)),), ((0, fmpq(-2)),)]])  # x x~ = 2 x
-    assert twice.step(IntegerPoint.from_rationals((fmpq(3, 7),))) == IntegerPoint.from_rationals((fmpq(2),))
-    assert twice.step(IntegerPoint.from_rationals((fmpq(0),))) is None
-
-
-def test_in_dimension_1_a_side_that_is_0_gives_0():
-    nothing = integer_steps.IntegerSteps([(1, 0)], [[((0, fmpq(1)),), ()]])  # x x~ = 0
-    assert nothing.step(IntegerPoint.from_rationals((fmpq(3, 7),))) == IntegerPoint.from_rationals((fmpq(0),))
-    assert nothing.step(IntegerPoint.from_rationals((fmpq(0),))) is None

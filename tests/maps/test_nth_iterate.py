@@ -8,25 +8,19 @@ where no orbit can be walked.
 import random
 
 import pytest
-from flint import arb, fmpq, fmpq_poly, fmpz
+from flint import arb, fmpq, fmpz
 from helpers import encloses, quick, random_point, together
 from planar_helpers import STARTS, before, over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ, RR
-from kahanmaps.algebra.polynomials import ring
-from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
-from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.draw import draw_with_chi
-from kahanmaps.family.system_normal_form import system_normal_form
+from kahanmaps.errors import BadPrime, PrecisionLost, SingularStep
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import iterate, rational_iterate, tau
+from kahanmaps.maps.normal_form import rational_iterate, tau
 from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
-from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import Orbit
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 NUMBERS = (0, 1, 2, 3, 5, 16, 17, 18, 23, 24, 25, 26, 33, 40)
 
@@ -137,18 +131,6 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
         assert coordinates(found.value(start, n)) == points[n]
 
 
-@pytest.mark.parametrize(("first", "second"), [(30, 40), (33, 50)])
-def test_of_a_pole_at_the_iterate_and_one_before_it_the_first_is_said(first, second, monkeypatch):
-    monkeypatch.setattr(rational_iterate, "_WALKED", 12)  # not to the poles
-    names = ("a pole at step 2", "a pole at step 5")
-    (U, V, W), (X, Y, Z) = (before(*STARTS[name], more) for name, more in zip(names, (first, second), strict=True))
-    _, normal_form, _ = side_by_side(*names)
-    start = (fmpq(U, W), fmpq(X, Z), fmpq(V, W), fmpq(Y, Z))
-    for n in (first + 2, second + 4, second + 5, second + 6):
-        with pytest.raises(SingularStep, match=f"no value at step {first + 1}$"):
-            NthIterate(normal_form, "1/2", QQ).value(start, n)
-
-
 # Balls.
 
 
@@ -169,20 +151,7 @@ def test_balls_enclose_the_exact_iterate(name):
         assert all(ball.rad() < arb(2) ** -100 for ball in balls)
 
 
-def test_balls_too_wide_to_decide_say_so():
-    normal_form, system = structure_and_system("m = 2")
-    with pytest.raises(PrecisionLost):
-        NthIterate(normal_form, "1/10", RR(10)).value(random_point(system.dim, 1), 10**12)
-
-
 # What is refused.
-
-
-@pytest.mark.parametrize("field", [QQ, GF(101), RR(64)], ids=repr)
-def test_a_negative_number_of_steps_is_refused(field):
-    normal_form, system = structure_and_system("m = 2")
-    with pytest.raises(InputError, match="found the step -1, expected 0 or more"):
-        NthIterate(normal_form, "1/10", field).value([1] * system.dim, -1)
 
 
 @pytest.mark.parametrize("name", ["m = 2", "m = 2, sqrt 2"])
@@ -212,31 +181,6 @@ def test_a_wrong_doubling_is_noticed(monkeypatch):
 # A rational plane beside one over Q(i).
 
 
-def beside_complex_planes(name: str, steps: int):
-    """A system with the plane of a named start, `steps` steps before it, and a plane over Q(i); the start for 1/2."""
-    x = ring(default_variables(6)).gens()
-    (a, b, c, d), triple = STARTS[name]
-    U, V, W = before((a, b, c, d), triple, steps)
-    H = draw_with_chi(fmpq_poly([1, 0, 1]), 1).H.compose(x[1], x[2], x[4], x[5], ctx=x[0].context())
-    H += a * x[0] ** 3 + b * x[0] ** 2 * x[3] + c * x[0] * x[3] ** 2 + d * x[3] ** 3
-    hamiltonian = CubicHamiltonian(H, standard_structure(6))
-    start = (fmpq(U, W), fmpq(1, 9), fmpq(0), fmpq(V, W), fmpq(0), fmpq(1, 7))
-    return hamiltonian.system, system_normal_form(hamiltonian.system, hamiltonian), start
-
-
-@pytest.mark.parametrize("steps", [2, 10, 17, 24])
-def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
-    system, normal_form, start = beside_complex_planes("a pole at step 2", steps)
-    last = steps + 1
-    points, end = walked(system, "1/2", QQ, start, last + 2)
-    assert (end.status, end.steps) == ("singular", last)
-    found = NthIterate(normal_form, "1/2", QQ)
-    assert coordinates(found.value(start, last)) == points[last]
-    for n in (last + 1, last + 2, last + 3, last + 4):
-        with pytest.raises(SingularStep, match=f"step {last}$"):
-            found.value(start, n)
-
-
 @together("name", STARTS)
 def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
     """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
@@ -252,24 +196,6 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
     }
     expected = next((f"the start is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
     assert special_start(normal_form, fmpq(1, 2), start) == expected
-
-
-@pytest.mark.parametrize(("block", "start", "period"), [((0, 0, 0, 1), (0, 1, 1), 5)])
-def test_around_a_cycle_only_the_rest_of_the_steps_is_walked(block, start, period, monkeypatch):
-    field = GF(5)
-    cubic, point = PlanarBlock(*map(field.convert, block)), tuple(map(field.convert, start))
-    orbit = [point]
-    for _ in range(period):
-        orbit.append(cubic.image(orbit[-1]))
-    assert [same_point(P, point) for P in orbit] == [True, *[False] * (period - 1), True]
-    monkeypatch.setattr(iterate, "_CYCLE", period)
-    for n in range(2 * period):
-        assert same_point(iterate._around_cycle(cubic, point, n), orbit[n % period])
-        assert same_point(iterate._around_cycle(cubic, point, 10**30 + n), orbit[n % period])
-    monkeypatch.setattr(iterate, "_CYCLE", period - 1)
-    assert same_point(iterate._around_cycle(cubic, point, period - 1), orbit[period - 1])
-    with pytest.raises(InputError, match="cannot be reached directly"):
-        iterate._around_cycle(cubic, point, period)
 
 
 def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):

@@ -1,7 +1,6 @@
 """Orbits written from Python are those of the command, and are read back as they were."""
 
 import csv
-import io
 import json
 
 import numpy as np
@@ -55,15 +54,6 @@ def test_a_table_has_the_values_of_integrals_and_none_at_a_pole(arithmetic):
         assert len({row["F1"] for row in rows}) == 1
 
 
-def test_only_wanted_points_are_written():
-    stream = io.StringIO()
-    told = []
-    walk(every=2).write(stream, "jsonl", told=told.append)
-    header, *points, end = map(json.loads, stream.getvalue().splitlines())
-    assert ([point["step"] for point in points], told, end["steps"]) == ([0, 2, 4], [0, 1, 2, 3, 4], 4)
-    assert header["start"] == ["1", "1/2", "-1/3"]
-
-
 @pytest.mark.parametrize(
     ("arithmetic", "options", "form", "why"),
     [
@@ -77,15 +67,6 @@ def test_what_a_format_does_not_hold_is_refused_and_no_file_made(tmp_path, arith
     with pytest.raises(km.InputError, match=why):
         walk(arithmetic, **options).write(tmp_path / "o", form)
     assert not list(tmp_path.iterdir())
-
-
-def test_streams_of_text_take_text():
-    stream = io.StringIO()
-    walk().write(stream)
-    assert stream.getvalue().startswith("# ")
-    for arithmetic, form in (("exact", "npz"), ("float", "npy")):
-        with pytest.raises(km.InputError, match="expected a path"):
-            walk(arithmetic).write(io.StringIO(), form)
 
 
 def test_a_full_disk_is_named(tmp_path):

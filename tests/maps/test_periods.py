@@ -10,21 +10,18 @@ from collections import Counter
 from math import lcm
 
 import pytest
-from flint import fmpq, fmpq_poly, fmpz, fq_default_ctx, nmod
+from flint import fmpq, fmpq_poly, fmpz, fq_default_ctx
 from helpers import together
 from planar_helpers import STARTS, Finite, planar_system, planes_over, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import level_curves
-from kahanmaps.maps.normal_form.division import PeriodicLevels, division_polynomials
-from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
+from kahanmaps.maps.normal_form.division import PeriodicLevels
+from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic
 from kahanmaps.maps.normal_form.periods import (
     Kind,
-    orbit_period,
     period_of,
     period_over_rationals,
     plane_period,
@@ -102,18 +99,6 @@ def test_in_a_large_prime_field_n_T_is_zero_and_no_smaller_multiple_is(prime):
         assert_order_on_the_cubic(block, point, found.period, poles(block, prime))
 
 
-@pytest.mark.parametrize(
-    ("prime", "degree"),
-    [(2**20 + 7, 2), pytest.param(2**20 + 7, 4, marks=pytest.mark.slow)],
-)
-def test_in_an_extension_of_a_large_field_too(prime, degree):
-    field = Finite(prime, degree)
-    for block, point in planes_over(field, random.Random(1), 1):
-        found = plane_period(block, point, field.prime, field.context)
-        assert found.status == "periodic"
-        assert_order_on_the_cubic(block, point, found.period, poles(block, field.prime, field.context))
-
-
 def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happen():
     prime = 10_009
     rng, answers = random.Random(8), Counter()
@@ -137,17 +122,6 @@ def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happe
 # The parts.
 
 
-def test_the_order_of_T_is_found_by_baby_and_giant_steps_as_by_adding():
-    prime = 10_007
-    for gamma in range(2, 14):
-        element = GF(prime).convert(gamma)
-        curve = Jacobian(element)
-        point, n = curve.T, 1
-        while point is not None:
-            point, n = curve.add(point, curve.T), n + 1
-        assert translation_order(element, prime) == n
-
-
 @pytest.mark.parametrize(("prime", "degree"), [(1009, 1), (1000003, 1), (37, 2), (11, 3)])
 def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(prime, degree):
     field, rng = Finite(prime, degree), random.Random(prime)
@@ -162,16 +136,6 @@ def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(p
         curve.a2, curve.a4 = a2, a4
         assert curve.multiple(points, (x, (((x + a2) * x + a4) * x + a6).sqrt())) is None
         assert abs(points - field.q - 1) <= 2 * field.q**0.5
-
-
-@pytest.mark.parametrize("field", [Finite(10_007), Finite(37, 2)], ids=repr)
-def test_with_the_number_of_points_modulo_small_primes_the_order_of_T_is_the_same(field, monkeypatch):
-    rng = random.Random(5)
-    gammas = [gamma for gamma in (field.random(rng) for _ in range(20)) if gamma not in (0, 1)]
-    orders = [translation_order(gamma, field.q, field.context) for gamma in gammas]
-    for radius in (2, 10):
-        monkeypatch.setattr(level_curves, "_RADIUS", radius)
-        assert [translation_order(gamma, field.q, field.context) for gamma in gammas] == orders
 
 
 # Members.
@@ -198,20 +162,6 @@ def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pol
         ends[orbit.end.status] += 1
     assert ends["periodic"] > 0
     assert period_of(normal_form, "1/10", [1, 2, 3, 4]).status == "aperiodic"
-
-
-def test_modulo_2_the_map_is_the_identity_where_there_is_a_normal_form():
-    for seed in range(20):
-        member = draw_with_chi(fmpq_poly([1, 1, 1]), seed=seed)
-        form, start = normal_form(member), [1, 0, 1, 1]
-        try:
-            found = orbit_period(form, "1/3", start, 2)
-        except BadPrime:
-            continue
-        assert (found.period, found.meets_pole) == (1, False)
-        assert [int(e) for e in KahanMap(member.chosen.system, "1/3", GF(2)).step(start)] == start
-        return
-    raise AssertionError("no member has a normal form modulo 2")
 
 
 # Over the rationals.
@@ -274,25 +224,3 @@ RATIONAL = {5: fmpq(32, 27), 6: fmpq(28, 27), 9: fmpq(8, 9), 12: fmpq(80, 81)}
 @together("period", range(1, 31))
 def test_the_rational_levels_are_those_of_periods_5_6_9_and_12(period):
     assert PeriodicLevels(period).gammas == ((RATIONAL[period],) if period in RATIONAL else ())
-
-
-def test_psi_vanishes_modulo_a_prime_where_the_order_divides_the_index_and_only_there():
-    prime = 61
-    table = division_polynomials(20)
-    for value in range(2, prime):
-        gamma = nmod(value, prime)
-        order = translation_order(gamma, prime)
-        for n in range(1, 21):
-            found = sum((int(c) * gamma**k for k, c in enumerate(table[n].coeffs())), nmod(0, prime))
-            assert (found == 0) is (n % order == 0)
-
-
-@pytest.mark.parametrize("period", [0, -1, 61])
-def test_periods_out_of_range_are_refused(period):
-    with pytest.raises(InputError, match="expected 1 to 60"):
-        PeriodicLevels(period)
-
-
-def test_a_plane_without_smooth_levels_is_refused():
-    with pytest.raises(InputError, match="smooth levels"):
-        PeriodicLevels(5).squares(fmpq(0), fmpq(1))

@@ -8,7 +8,7 @@ import random
 from itertools import islice
 
 import pytest
-from flint import fmpq, fmpq_poly, fmpz
+from flint import fmpq, fmpq_poly
 from helpers import random_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -17,7 +17,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.family.draw import draw_with_chi, parse_chi
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import planar_algebra, tau
+from kahanmaps.maps.normal_form import tau
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.steps import NormalSteps
@@ -70,29 +70,6 @@ def test_the_points_are_those_of_steps_in_the_field(name, seed):
     assert all(same_point(P, Q) for P, Q in zip(found, stepped, strict=True))
 
 
-@over_fields
-def test_an_entry_is_as_long_as_the_heights_ask_for(name):
-    block = random_block(name, 2)
-    assert block.level is not None
-    assert not block.is_degenerate
-    P = next(islice(tau.triples(block), 40, None))
-    above, below, _ = block.fraction(P)
-    height = max(e.p.bit_length() + e.q.bit_length() for e in (fmpq(entry, below) for entry in above)) / 2
-    # some per cent, for ideals that no element generates
-    assert max(map(planar_algebra._bits, P)) * block.algebra.degree < 1.2 * height + 100
-
-
-@pytest.mark.parametrize("chi", ["t^2 - 10^400*t + 3", "t^2 - 10^700", "t^7 - t - 1"])
-def test_members_beyond_the_range_of_doubles_and_of_high_degree_move_as_by_generic_steps(chi):
-    normal_form, system = member_of(chi)
-    start = random_point(system.dim, 1, height=3)
-    generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 3, max_digits=None)]
-    planes = [
-        point.value for point in Orbit(KahanMap(system, "1/10"), start, 3, normal_form=normal_form, max_digits=None)
-    ]
-    assert [point.rationals() for point in planes] == [point.rationals() for point in generic]
-
-
 @pytest.mark.parametrize("chi", CHI)
 @few
 @given(seed=st.integers(0, 10**6), eps=st.sampled_from(["1/10", "-7/3", "20957/262577", "1000000000"]))
@@ -106,17 +83,6 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
     assert all(point.height <= point.bits + point._assembly.excess for point in found)
 
 
-def test_a_plane_at_rest_stays():
-    normal_form, system = member_of("(t - 1)*(t^2 - 3)")
-    X, Y = normal_form.form.coordinates(random_point(system.dim, 1))
-    for factor in (fmpq_poly([-1, 1]), fmpq_poly([-3, 0, 1])):
-        chi = normal_form.form.chi
-        start = normal_form.form.point(X * factor % chi, Y * factor % chi)
-        generic = [point.value for point in Orbit(KahanMap(system, "1/10"), start, 8, max_digits=None)]
-        found = islice(NormalSteps(normal_form, fmpq(1, 10)).points(start), 9)
-        assert [IntegerPoint.from_rationals(point.rationals()) for point in found] == generic
-
-
 def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):
     # That the tests can fail: primes above which two prime ideals divide W are in no list of fixed primes.
     normal_form, system = member_of("t^2 - 10")
@@ -126,14 +92,3 @@ def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):
     monkeypatch.setattr(AlgebraBlock, "fraction", lambda self, P: (*fraction(self, P)[:2], fraction(self, P)[1] ** 0))
     points = list(islice(NormalSteps(normal_form, fmpq(1, 10)).points(random_point(system.dim, 4)), 60))
     assert [point.lowest_terms() for point in points] != expected
-
-
-def test_what_denominators_have_in_common_with_a_point_is_taken_out():
-    algebra = algebra_of("three real roots")
-    numbers = planar_algebra.ShortElements(algebra, fmpz(6))
-    zero, one, t = algebra.zero, algebra.one, algebra.generator
-    lifts = numbers.lifts([(one, zero, zero), (zero, one / 2, zero), (zero, zero, one)])
-    terms = [6 * t + 12, 12 * t * t, 18 * one]
-    found = numbers.combined([one / 6, one / 6, one / 3], terms, lifts, one / 5)
-    assert same_point(found, (t + 2, t * t, 6 * one))
-    assert found == (t + 2, t * t, 6 * one)

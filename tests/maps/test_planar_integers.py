@@ -4,37 +4,15 @@ Specified here: the image is the Kahan map of u' = h_v, v' = -h_u for 2 eps (u, 
 level is conserved; over Q start and cubic are primitive.
 """
 
-from math import gcd
-
 from flint import fmpq
 from helpers import points, rationals
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_helpers import by_gcds, integer_block, over_starts, planar_system
+from planar_helpers import planar_system
 
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
-
-
-@given(cubic=points(4, rationals(6)), point=points(2, rationals(10**30)), eps=rationals(10**9).filter(bool))
-def test_the_start_and_the_cubic_are_integers_without_a_common_factor(cubic, point, eps):
-    block = IntegerBlock(cubic, eps, *point)
-    U, V, W = block.start
-    assert (fmpq(U, W), fmpq(V, W)) == tuple(block.scale * entry for entry in point)
-    assert gcd(*map(int, block.start)) == 1
-    h = block.block
-    assert gcd(*map(int, (h.a, h.b, h.c, h.d))) == (0 if block.block.is_zero else 1)
-
-
-@over_starts
-def test_the_level_is_that_of_every_point(cubic, start):
-    block = integer_block(cubic, start)
-    for point in by_gcds(block, 5)[:-1]:
-        above, below = block.block.level(point)
-        assert below == 0 if block.level is None else fmpq(above, below) == block.level
-
 
 # The plane itself, over any numbers.
 
@@ -73,16 +51,3 @@ def test_the_level_is_conserved(cubic, point):
     block = PlanarBlock(*cubic)
     (above, below), (h, denominator) = block.level(point), block.level(block.image(point))
     assert above * denominator == h * below
-
-
-@given(r=st.tuples(small, small), s=st.tuples(small, small), t=st.tuples(small, small))
-def test_the_discriminant_is_the_product_of_the_squared_differences_of_roots(r, s, t):
-    # h = (r1 U + r2 V)(s1 U + s2 V)(t1 U + t2 V)
-    cubic = (
-        r[0] * s[0] * t[0],
-        r[0] * s[0] * t[1] + r[0] * s[1] * t[0] + r[1] * s[0] * t[0],
-        r[0] * s[1] * t[1] + r[1] * s[0] * t[1] + r[1] * s[1] * t[0],
-        r[1] * s[1] * t[1],
-    )
-    differences = [p[0] * q[1] - p[1] * q[0] for p, q in ((r, s), (s, t), (t, r))]
-    assert PlanarBlock(*cubic).discriminant == (differences[0] * differences[1] * differences[2]) ** 2

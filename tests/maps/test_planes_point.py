@@ -17,7 +17,6 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planes_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 from kahanmaps.maps.normal_form.steps import NormalSteps
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 PAIRS = [
     ("one rational root", "three rational roots"),
@@ -60,41 +59,12 @@ def test_coordinates_are_reduced_with_positive_denominators(system, normal_form,
         assert point.lowest_terms() == [(entry.p, entry.q) for entry in x]
 
 
-@pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"])
-def test_the_bits_are_about_those_of_the_longest_integer(name):
-    normal_form, system = structure_and_system(name)
-    *_, (point, x) = walk(system, normal_form, fmpq(1, 10), random_point(system.dim, 3), 20)
-    # some per cent: what the W have in common, and the fixed numbers that x is put together with
-    assert 0.93 < point.bits / IntegerPoint.from_rationals(x).bits < 1.05
-
-
 # Equality.
-
-
-def negated(point: PlanesPoint, *which: int) -> PlanesPoint:
-    triples = [tuple(-e for e in P) if i in which else P for i, P in enumerate(point.triples)]
-    return PlanesPoint(point._assembly, triples)
 
 
 def points(count: int) -> list[PlanesPoint]:
     normal_form, _ = structure_and_system("m = 2")
     return list(islice(NormalSteps(normal_form, fmpq(1, 10)).points([1, "1/3", 0, -2]), count))
-
-
-@pytest.mark.parametrize("which", [(0,), (1,), (0, 1)], ids=str)
-def test_the_signs_of_triples_do_not_matter(which):
-    for point in points(6):
-        other = negated(point, *which)
-        assert other == point
-        assert hash(other) == hash(point)
-        assert other.lowest_terms() == point.lowest_terms()
-
-
-def test_one_sign_in_one_triple_makes_another_point():
-    point = points(3)[2]
-    (U, V, W), last = point.triples
-    assert PlanesPoint(point._assembly, [(-U, V, W), last]) != point
-    assert PlanesPoint(point._assembly, [(U, V, -W), last]) != point
 
 
 # What the reduction rests on.

@@ -82,11 +82,3 @@ def test_the_forms_of_an_explicit_map_are_its_minors_without_common_factor(image
         minors = kernel_minors(equation.rows(equation.monomials(X), over.zero))
         assert any(found) or not last
         assert all(a * d == b * c for (a, b), (c, d) in itertools.pairwise(zip(found, minors, strict=True)))
-
-
-def test_a_map_whose_matrix_is_not_diagonal_has_its_minors():
-    assert KahanMap(dense(2, 2), "2/7", QQ).equation.explicit is None
-    for power, is_short in ((3, True), (16, False)):  # 30 terms or so, and 459
-        text = f"(x + y + 1)^{power}/(x - 2*y - 2)^{power}"
-        image = [parse_rational_function(one, ["x", "y", "eps"]) for one in (text, f"x*{text}")]
-        assert (explicit_map(["x", "y"], image).at(1).equation.explicit is not None) is is_short

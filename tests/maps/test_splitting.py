@@ -8,8 +8,8 @@ import pytest
 from helpers import random_point, step_or_none
 from planar_helpers import over_members, structure_and_system
 
-from kahanmaps.algebra.fields import CC, GF, QQ, RR
-from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.algebra.fields import GF, QQ, RR
+from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
 
@@ -75,22 +75,3 @@ def test_planes_are_the_factors_of_chi_in_the_field(name, field, degrees):
 def test_a_prime_at_which_chi_has_a_repeated_root_is_refused(name, prime):
     with pytest.raises(BadPrime):
         splitting_of(name, GF(prime), 1)
-
-
-@pytest.mark.parametrize(("field", "eps"), [(GF(7), "7/3"), (GF(7), "1/7"), (QQ, 0), (RR(64), 0)], ids=str)
-def test_an_eps_that_is_zero_or_has_no_value_is_refused(field, eps):
-    with pytest.raises(InputError):
-        splitting_of("m = 2", field, eps)
-
-
-def test_complex_balls_are_refused():
-    with pytest.raises(InputError, match="expected QQ, GF"):
-        splitting_of("m = 2", CC(64))
-
-
-@over_fields
-def test_a_plane_at_infinity_is_a_pole(field):
-    splitting, _ = splitting_of("m = 2", field)
-    first, (U, V, W) = splitting.triples(list(map(field.convert, random_point(4, 1))))
-    with pytest.raises(SingularStep, match="at infinity"):
-        splitting.point([first, (U, V, W * 0)])

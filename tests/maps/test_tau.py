@@ -8,8 +8,7 @@ from itertools import islice
 
 import pytest
 from flint import fmpq
-from helpers import quick
-from planar_helpers import STARTS, before, by_gcds, image, integer_block, over_starts, preimage, random_blocks, reduced
+from planar_helpers import STARTS, before, by_gcds, image, integer_block, over_starts, preimage, reduced
 
 from kahanmaps.maps.normal_form import planar_integers, tau
 from kahanmaps.maps.normal_form.planar_block import same_point
@@ -42,12 +41,6 @@ def stepped(block, count):
 def test_the_points_are_those_of_plain_gcds(cubic, start):
     block = integer_block(cubic, start)
     assert walked(block, 25) == by_gcds(block, 25)
-
-
-@pytest.mark.parametrize("seed", quick(range(4), [0]))
-def test_the_points_of_random_planes_are_those_of_plain_gcds(seed):
-    for block in random_blocks(f"tau {seed}", 24):
-        assert walked(block, 9) == by_gcds(block, 9)
 
 
 @pytest.mark.parametrize("steps", [2, 3, 4, 5, 8, 13, 21])
@@ -112,33 +105,6 @@ def test_no_number_is_longer_than_the_result(name, n, monkeypatch):
     # A tenth, for bad primes and the three points around the base.
     assert max(lengths) < 1.1 * max(entry.bit_length() for entry in found)
     assert len(lengths) < 20 * n.bit_length()
-
-
-# Where it does not apply.
-
-
-@over_smooth
-def test_the_bits_of_a_point_are_bounded_before_it_is_made(name):
-    block = integer_block(*STARTS[name])
-    for n in range(8, 60):
-        bound, point = tau.most_bits(block, n), tau.iterate(block, n)
-        longest = max(entry.bit_length() for entry in point)
-        assert longest <= bound <= 1.1 * longest + 900
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "delta = 1",
-        "level 0",
-        "a double root",
-        "no value at the start",
-        "period 5 but for a pole",
-        "a pole at step 3",
-    ],
-)
-def test_where_doubling_does_not_apply_the_answer_is_none(name):
-    assert tau.iterate(integer_block(*STARTS[name]), 100) is None
 
 
 # That the tests can fail.

@@ -10,11 +10,10 @@ from itertools import islice
 
 import flint
 import pytest
-from flint import fmpq, fmpq_poly
+from flint import fmpq
 from helpers import encloses, quick
 from planar_helpers import STARTS, Finite, by_gcds, integer_block, planes_over
 
-from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import CC, RR
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.normal_form import translation
@@ -100,18 +99,6 @@ def test_over_the_rationals_it_is_the_point_that_gcds_give(name):
             assert image == f"the map has no value at step {len(expected) - 1}"
 
 
-@pytest.mark.parametrize("chi", [[-2, 0, 1], [1, 0, 1], [-1, -1, 0, 1]], ids=["sqrt 2", "i", "cubic"])
-def test_over_a_number_field_it_is_the_point_that_steps_lead_to(chi):
-    K = EtaleAlgebra(fmpq_poly(chi))
-    rng = random.Random(str(chi))
-    for _ in range(2):
-        block = PlanarBlock(*(K.random(rng, 3) for _ in range(4)))
-        start = (K.random(rng, 3), K.random(rng, 3), K.one)
-        points = stepped(block, start, 20)
-        for n in (16, 17, 19, 20):
-            assert same_point(found(block, start, n), points[n])
-
-
 @pytest.mark.parametrize(
     ("field", "name"),
     [(RR(200), "three real roots, irrational"), (CC(200), "one real root, irrational"), (RR(200), "one rational root")],
@@ -156,9 +143,6 @@ def test_on_a_smooth_level_it_is_a_multiple_of_the_translation(field, amount):
                 assert same_point(image, cubic.multiple(n, block.image(start)))
                 passed += 1
     assert passed > 0
-
-
-# That the tests can fail.
 
 
 @pytest.mark.parametrize("wrong", ["gamma", "digits"])
