@@ -88,20 +88,6 @@ def test_both_count_the_same_relations_along_orbits(name):
     assert found[1] > 0
 
 
-def test_the_walkers_of_a_line_agree():
-    import bench_degrees
-    import work
-
-    for name, n in (("weierstrass", 6), ("euler_top", 3), ("kirchhoff_generic", 2)):
-        system = load(name).system
-        degrees = bench_degrees.ours(system, n)
-        for label, run in bench_degrees.PEERS:
-            try:
-                assert run(system, n)[1] == degrees, label
-            except work.Absent:
-                continue
-
-
 def test_the_page_is_what_the_record_says():
     import run
 

@@ -2,11 +2,9 @@
 
 import errno
 import pickle
-from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-import kahanmaps as km
 from kahanmaps.errors import (
     BadPrime,
     ExpressionError,
@@ -79,10 +77,3 @@ def test_an_error_is_the_same_after_a_pickle(error):
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is type(error)
     assert (str(again), vars(again)) == (str(error), vars(error))
-
-
-def test_a_pool_of_processes_survives_a_wrong_system():
-    with ProcessPoolExecutor(1) as pool:
-        with pytest.raises(SystemFileError, match="unknown name"):
-            pool.submit(km.System, "x' = a*x").result()
-        assert pool.submit(km.load, "euler_top").result().dim == 3

@@ -12,14 +12,6 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 
 
-def test_there_are_examples():
-    assert SCRIPTS
-
-
-def test_every_output_belongs_to_an_example():
-    assert {path.stem for path in EXAMPLES.glob("*.out")} == {path.stem for path in SCRIPTS}
-
-
 # The cluster and the whole paper have quicker tests of their own.
 LONG = {"08_the_paper", "10_cluster_batch"}
 

@@ -53,20 +53,7 @@ def test_a_short_orbit_loads_no_normal_forms():
     assert heavy <= modules_loaded_by(COMMAND.format(arguments=member))
 
 
-def test_the_list_of_systems_loads_nothing_heavy():
-    assert modules_loaded_by(COMMAND.format(arguments=["systems"])) & HEAVY == set()
-
-
 def test_looking_at_a_database_of_results_loads_no_mathematics(tmp_path):
     Store.open(tmp_path / "results.db", create=True).close()
     arguments = ["batch", "status", "--db", str(tmp_path / "results.db")]
     assert modules_loaded_by(COMMAND.format(arguments=arguments)) & HEAVY == set()
-
-
-def test_a_dry_run_of_a_batch_loads_no_numpy(tmp_path):
-    spec = tmp_path / "spec.toml"
-    spec.write_text('[experiments.a]\ntask = "family-space"\nsystem = "family"\naxes = { m = [2] }\n')
-    arguments = ["batch", "run", str(spec), "--dry-run"]
-    loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
-    assert loaded & {"numpy", "numba", "distributed", "pyarrow", "matplotlib"} == set()
-    assert "flint" in loaded

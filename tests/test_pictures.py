@@ -17,10 +17,6 @@ PICTURES = sorted(path for path in (DOCS / "pictures").iterdir() if path.suffix 
 PAGES = [path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md")]
 
 
-def test_there_are_pictures():
-    assert len(PICTURES) >= 8
-
-
 @pytest.mark.parametrize("picture", PICTURES, ids=lambda path: path.name)
 def test_a_picture_stands_below_the_command_that_makes_it(picture):
     words = shlex.split(command_of(picture))
@@ -33,14 +29,6 @@ def shows(page: str, words: list[str], name: str) -> bool:
     """Whether a page has the command of these words, and later the picture of that name."""
     commands = re.findall(r"^    (kahanmaps plot .*)$", page.partition(f"pictures/{name})")[0], re.MULTILINE)
     return f"pictures/{name})" in page and words in map(shlex.split, commands)
-
-
-def test_a_picture_above_its_command_or_below_another_one_is_noticed():
-    page = "    kahanmaps plot degrees x -o x.svg\n\n![x](pictures/x.svg)\n"
-    words = ["kahanmaps", "plot", "degrees", "x", "-o", "x.svg"]
-    assert shows(page, words, "x.svg")
-    assert not shows("\n\n".join(reversed(page.split("\n\n"))), words, "x.svg")
-    assert not shows(page.replace("degrees", "heights"), words, "x.svg")
 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])

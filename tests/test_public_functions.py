@@ -164,14 +164,6 @@ def test_the_time_step_is_twice_eps(name):
         OF_EPS[name](eps=1, time_step=2)
 
 
-def test_functions_have_the_names_of_the_commands_too():
-    for name in ("degrees", "heights", "cycles", "find_density", "find_commuting", "find_symmetry", "lyapunov"):
-        assert name in km.__all__
-    assert km.cycles is km.cycle_census
-    assert km.degrees.__doc__ == degree_growth.__doc__
-    assert "map" not in km.__all__  # `import *` leaves the builtin alone
-
-
 def test_claims_are_text_or_expressions_by_name_or_without():
     energy = y**2 / 2 + x**2 / 2 - x**3 / 3
     fish = km.System({x: y, y: x**2 - x})
@@ -185,16 +177,6 @@ def test_claims_are_text_or_expressions_by_name_or_without():
     canonical = sympy.Matrix([[0, x * y], [-x * y, 0]])
     for tensor, verdict in ((canonical, "proved"), ([["0", "1"], ["-1", "0"]], "refuted")):
         assert str(km.check_poisson(PREY, tensor).verdict) == verdict
-
-
-def test_starts_are_one_or_many_of_any_kind_of_number():
-    once = km.lyapunov(FISH, [0.5, 0.25], "1/50", 20).mean.tolist()
-    for starts in (["1/2", "1/4"], "1/2,1/4", [[Fraction(1, 2), 0.25]]):
-        assert km.lyapunov(FISH, starts, "1/50", 20).mean.tolist() == once
-    assert len(km.heights(FISH, "1/5", starts=["1/2", 0], steps=20).orbits) == 1
-    for kind in ("float", float):  # floats start float orbits alone
-        walk = km.orbit(FISH, np.array([0.1, 0.25]), "1/5", 3, arithmetic=kind)
-        assert walk.rows() == km.orbit(FISH, ["0.1", "1/4"], "1/5", 3, arithmetic="float").rows()
 
 
 def test_a_map_at_one_eps_has_orbits():

@@ -5,14 +5,13 @@ import json
 import multiprocessing
 import pickle
 import sys
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from fractions import Fraction
 from types import SimpleNamespace
 
-import flint
 import numpy as np
 import pytest
-from flint import arb, fmpq
+from flint import fmpq
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
@@ -91,26 +90,6 @@ def test_functions_and_their_results_go_to_other_processes_and_back():
     assert polynomial == km.parse_polynomial("x + y/2", ("x", "y"))
 
 
-@pytest.mark.parametrize("text", ["0", "2", "-1/3", "nan", "inf"])
-def test_balls_are_pickled_exactly(text):
-    with flint.ctx.workprec(200):
-        ball = arb(fmpq(-1, 3)) if "/" in text else arb(text)
-        pickled = pickle.dumps([ball, flint.acb(ball, 1)])
-    real, number = pickle.loads(pickled)
-    assert repr(real) == repr(number.real) == repr(ball)
-    assert real.is_nan() or (real.mid() == ball.mid() and real.rad() == ball.rad())
-
-
-def test_threads_may_share_a_system():
-    file = km.load("lorenz")
-
-    def walked(k: int) -> object:
-        return km.orbit(file, [1, 1, k], Fraction(1, k + 3), 6)[6].x
-
-    with ThreadPoolExecutor(8) as pool:
-        assert list(pool.map(walked, range(20))) == [walked(k) for k in range(20)]
-
-
 def test_results_are_shown_in_short_and_are_plain_data():
     member = km.draw_with_eigenvalues([1, -2], seed=3)
     results = (
@@ -176,14 +155,6 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
     else:
         with pytest.raises(InputError, match=f"rounds residues modulo {prime}, expected dtype=int or dtype=object"):
             np.asarray(walk, dtype=float)
-
-
-@pytest.mark.parametrize(("arithmetic", "kind"), [("exact", fmpq), ("float", float), ("ball:64", arb)])
-def test_arrays_of_objects_have_the_coordinates_of_the_points(arithmetic, kind):
-    walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=arithmetic)
-    table = np.asarray(walk, dtype=object)
-    assert [tuple(map(repr, row)) for row in table] == [tuple(map(repr, point.x)) for point in walk]
-    assert all(type(x) is kind for x in table.flat)
 
 
 def test_arrays_of_integers_are_exact_or_refused():

@@ -78,9 +78,3 @@ def test_a_session_that_shows_something_else_would_be_noticed(tmp_path):
     ((command, expected),) = sessions(page)
     assert command == "kahanmaps --version"
     assert not doctest.OutputChecker().check_output(expected, "kahanmaps 0.1.0\n", FLAGS)
-
-
-def test_a_file_that_a_page_shows_is_there_for_its_sessions(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text('```toml\n# mine.toml\nvariables = ["x"]\n```\n\n```toml\nwithout = "a name"\n```\n')
-    assert files(page) == {"mine.toml": '# mine.toml\nvariables = ["x"]\n'}

@@ -280,7 +280,9 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("name", quick(HOSTILE, HOSTILE.keys() - {"growing denominators"}))
+@pytest.mark.parametrize(
+    "name", quick(HOSTILE, HOSTILE.keys() - {"growing denominators", "large numbers", "large decimals"})
+)
 def test_a_hostile_text_is_refused(name: str):
     text = HOSTILE[name]
     error = refusal(text)

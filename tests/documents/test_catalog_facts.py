@@ -81,21 +81,6 @@ def test_growth_degrees_and_verdict_go_together(name):
     assert catalog["verdict"] == verdict
 
 
-@pytest.mark.parametrize(
-    ("growth", "degrees"),
-    [
-        ("bounded", [1, 2, 1, 2, 1]),  # an involution
-        ("bounded", [1, 2, 3, 3, 3, 3]),
-        ("linear", [1, *load("lv(4,0)").catalog["degrees"]]),
-        ("linear", [1, 2, 4, 5, 7, 8, 10]),
-        ("quadratic", [1, *load("euler_top").catalog["degrees"]]),
-        ("exponential", [1, 3, 6, 12, 24, 48]),
-    ],
-)
-def test_degrees_look_like_one_growth_only(growth, degrees):
-    assert [name for name, (looks_like_it, _) in GROWTH.items() if looks_like_it(degrees)] == [growth]
-
-
 LATEST_BEGINNING = 2
 
 

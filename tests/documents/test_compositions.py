@@ -53,13 +53,6 @@ def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):
     assert isinstance(other, SystemFile)
 
 
-def test_a_table_has_its_own_parameters_and_otherwise_those_around_it(tmp_path):
-    table = '{{ map = {{ variables = ["x", "y"], map = {{ image = ["b*y", "x"] }}{} }} }}'
-    first, second = table.format(""), table.format(", parameters = { b = 3 }")
-    file = read_system(written(tmp_path, f"{first}, {second}", "parameters.b = 5"))
-    assert file.map.at(EPS).step((fmpq(1), fmpq(2))) == (3, 10)
-
-
 @pytest.mark.parametrize(
     ("of", "sentence"),
     [
@@ -85,13 +78,6 @@ def test_a_wrong_composition_says_what_is_wrong(tmp_path, of, sentence):
     with pytest.raises(SystemFileError) as caught:
         read_system(written(tmp_path, of))
     assert sentence in str(caught.value)
-
-
-def test_steps_that_undo_each_other_are_left_out(tmp_path):
-    of = '{ system = "lyness", power = 32 }, { system = "lyness", power = 31, inverse = true }'
-    assert read_system(written(tmp_path, of)).map.at(1).step(START) == load("lyness").map.at(1).step(START)
-    of = '{ system = "lyness", power = 2 }, { system = "lyness", power = -2 }'
-    assert read_system(written(tmp_path, of)).map.at(1).step(START) == START
 
 
 # Parts that share the symbol b, and such as have a b of their own.

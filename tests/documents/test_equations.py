@@ -36,12 +36,6 @@ def test_equations_are_read_as_the_system_that_they_mean(rhs):
     assert km.parse_system(file.to_toml(), "again").system == PLAIN
 
 
-def test_the_variables_have_the_order_of_the_list_where_there_is_one():
-    file = km.parse_system('variables = ["y", "x"]\n[system]\nrhs = "x\' = x*y; y\' = -x"', "order")
-    assert file.variables == ("y", "x")
-    assert [str(polynomial) for polynomial in file.system.rhs] == ["-x", "y*x"]
-
-
 @pytest.mark.parametrize(
     "rhs", ['"x*y; -x"', '["x*y; -x"]', '"x*y, -x"', '["x*y, -x"]', '["[x*y, -x]"]', '["{x*y, -x};"]']
 )
@@ -64,12 +58,6 @@ def test_an_equation_of_second_order_has_a_velocity_and_a_note_says_its_name(tex
     file = km.System(text)
     assert str(file.system) == "x' = vx\nvx' = x^2 - x - 2*vx"
     assert file.notes == ("x'' is read with a velocity, the variable vx: x' = vx",)
-
-
-def test_velocities_come_after_all_positions_under_names_that_are_free():
-    file = km.System("x'' = -vx*x; y'' = -y; z' = x", vx=2)
-    assert file.variables == ("x", "y", "z", "vx_", "vy")
-    assert [str(f) for f in file.system.rhs] == ["vx_", "vy", "x", "-2*x", "-y"]
 
 
 def test_an_index_becomes_part_of_a_name_that_no_other_has():

@@ -88,17 +88,6 @@ def test_integrals_of_the_families_are_proved_and_no_constants(equations, values
         assert str(laboratory.verdict_on(wrong)[0]) == "refuted"
 
 
-@pytest.mark.parametrize(("a", "d"), [(0, 0), (0, 1), (1, 0), (-1, 0), (1, 1), (-1, 2), (4, 4)])
-def test_the_two_integrals_of_rotations_are_independent_for_all_a_and_d(a, d):
-    # Gradients at a rational point, eps = 1/3, with respect to m, p, q: by hand from the two quotients.
-    m, p, q, e = 2, 3, 5, 1 / 3
-    first = [-(p * p + q * q) * 2 * e**2 * m / (1 + e**2 * m**2), 2 * p, 2 * q]
-    N, D = m * m + a * p * p + 2 * d * p - d * d * e**2 * q * q, 1 + a * e**2 * q * q
-    second = [2 * m * D, (2 * a * p + 2 * d) * D, -2 * d * d * e**2 * q * D - N * 2 * a * e**2 * q]
-    minors = [first[i] * second[j] - first[j] * second[i] for i, j in ((0, 1), (0, 2), (1, 2))]
-    assert max(map(abs, minors)) > 1
-
-
 def test_three_integrals_of_the_coupled_nahm_systems_also_where_degrees_are_linear():
     for values in ({"a": -1, "b": -1}, {"a": 2, "b": "1/2"}):
         found = km.find_integrals(km.System(NAHM, **values))

@@ -4,9 +4,8 @@ import pytest
 from flint import fmpq
 
 import kahanmaps as km
-from kahanmaps.algebra.written.text import format_rational_function
 from kahanmaps.checks.claims import Verdict
-from kahanmaps.documents.iterates import parse_with_iterates, with_iterates
+from kahanmaps.documents.iterates import parse_with_iterates
 from kahanmaps.errors import InputError
 
 ROTATION = "x' = y; y' = -x"
@@ -14,13 +13,6 @@ ROTATION = "x' = y; y' = -x"
 
 def read(text):
     return parse_with_iterates(text, ("x", "y"), ("a", "eps"), {"c": fmpq(3)})
-
-
-def test_a_name_with_two_marks_is_the_second_iterate():
-    function = read("c*x~~*y + eps*a")
-    assert function.names == with_iterates(("x", "y"), 2, ("a", "eps"))
-    assert function.names[2:6] == ("x~", "y~", "x~~", "y~~")
-    assert format_rational_function(function) == "3*y*x~~ + a*eps"
 
 
 @pytest.mark.parametrize(
@@ -94,6 +86,7 @@ def test_a_file_may_claim_them_and_is_written_with_them():
     assert [str(one.verdict) for one in km.check_integrals(refuted).findings] == ["proved", "refuted"]
 
 
+@pytest.mark.slow
 def test_what_the_search_prints_is_a_claim_that_holds():
     found = km.find_integrals(km.load("lagrange_top"), seconds=300)
     assert len(found.in_iterates) == 1

@@ -9,16 +9,13 @@ from flint import fmpq
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
-from kahanmaps.checks.decide import decide
-from kahanmaps.checks.preserve import check_measure, check_poisson, density_identity
+from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
-from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.laboratory.singular.singularities import singularities, symbolic_denominator
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]
@@ -84,13 +81,3 @@ def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
             ask()
     with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
         check_poisson(file)
-
-
-def test_an_image_of_lower_dimension_is_told_where_no_measure_makes_sense():
-    image = [parse_rational_function(text, ["x", "y", "eps"]) for text in ("x*y", "x^2*y^2 + 1")]
-    map_ = explicit_map(["x", "y"], image)
-    one = parse_rational_function("1", ["x", "y", "eps"])
-    finding = decide(density_identity(map_, ClaimedDensity(one), None), 0)
-    assert str(finding.verdict) == "undecided"
-    assert "no inverse" in finding.evidence.summary
-    assert "the map is not dominant" in patterns(map_, None).running

@@ -11,7 +11,7 @@ from helpers import quick
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.modular_matrices import null_space
-from kahanmaps.algebra.polynomials import evaluate, gradient, monomials
+from kahanmaps.algebra.polynomials import evaluate, monomials
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.documents.catalog import load
@@ -77,26 +77,6 @@ def test_without_skewness_the_lemma_says_nothing_and_the_measure_is_not_invarian
 
 
 # n = 2k + 1
-
-
-@pytest.mark.parametrize("k", [1, 2, 3])
-def test_a_cubic_and_a_constant_matrix_make_lv_of_2k_plus_1(k):
-    n = 2 * k + 1
-    system = load(f"lv({n},{k})").system
-    x = system.rhs[0].context().gens()
-    eats = [[(j - i) % n in range(1, k + 1) for j in range(n)] for i in range(n)]
-    H = sum(
-        (
-            x[i] * x[j] * x[m]
-            for i in range(n)
-            for j in range(i, n)
-            for m in range(i, n)
-            if eats[i][j] and eats[j][m] and eats[m][i]
-        ),
-        system.rhs[0].context().constant(0),
-    )
-    slopes = gradient(H)
-    assert all(f == slopes[(r - k) % n] - slopes[(r + k) % n] for r, f in enumerate(system.rhs))
 
 
 def invariant_polynomials(n):

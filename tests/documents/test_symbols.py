@@ -7,9 +7,7 @@ from flint import fmpq
 from search_helpers import PRIME, system
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 
@@ -32,25 +30,6 @@ def test_symbols_at_the_numbers_of_the_file_give_its_system(name):
     symbols = tuple(file.parameters)
     over = with_symbols(load(name), symbols).over(FIELD, [FIELD.convert(file.parameters[s]) for s in symbols])
     same_maps(over, file.system.over(FIELD))
-
-
-def test_a_poisson_matrix_may_contain_symbols():
-    text = (
-        'variables = ["x", "y"]\n[parameters]\na = "2"\n[hamiltonian]\nH = "a*x^3 + y^2"\nJ = [["0", "a"], ["-a", "0"]]'
-    )
-    file = parse_system(text)
-    found = with_symbols(file, ["a"])
-    assert [str(one) for one in found.rhs] == ["2*y*a", "-3*x^2*a^2"]
-    same_maps(found.over(FIELD, [FIELD.convert(2)]), file.system.over(FIELD))
-
-
-def test_the_jacobian_in_polynomials_is_that_over_a_field():
-    found = with_symbols(load("dressing_chain_3"), ["b1", "b2"])
-    rng = random.Random(1)
-    x, b = [FIELD.random(rng) for _ in range(3)], [FIELD.random(rng) for _ in range(2)]
-    rows = found.jacobian([*found.variables, "b1", "b2", "eps"])
-    numbers = [[evaluate(entry, FIELD, [*x, *b, FIELD.one]) for entry in row] for row in rows]
-    assert numbers == found.over(FIELD, b).jacobian(x).tolist()
 
 
 @pytest.mark.parametrize(

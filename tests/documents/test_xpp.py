@@ -34,11 +34,6 @@ def test_what_is_left_out_is_said():
     )
 
 
-@pytest.mark.parametrize("where", ["standard input", "lines.txt"])
-def test_lines_of_equations_are_read_wherever_they_are_no_toml(where):
-    assert km.parse_system("# two lines\nx' = x*y\ny' = -x\n", where).system == km.System("x' = x*y; y' = -x").system
-
-
 @pytest.mark.parametrize(
     ("lines", "rhs"),
     [
@@ -52,12 +47,6 @@ def test_lines_of_equations_are_read_wherever_they_are_no_toml(where):
 )
 def test_values_and_definitions_stand_in_the_places_of_their_names(lines, rhs):
     assert [str(f) for f in km.parse_system(lines, "a.ode").system.rhs] == rhs
-
-
-def test_a_fraction_is_read_as_it_stands_and_a_note_says_that_xpp_does_not():
-    file = km.parse_system("par b=8/3\nx'=b*x", "a.ode")
-    assert file.parameters["b"] == fmpq(8, 3)
-    assert file.notes == ("b = 8/3 is read as it stands, unlike in XPP",)
 
 
 @pytest.mark.parametrize(

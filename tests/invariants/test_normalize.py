@@ -84,7 +84,6 @@ SYSTEMS = [
     "nahm_octahedral",
     "zhukovski_volterra_1",
     "volterra_periodic_4",
-    "henon_heiles",
     # The image of weierstrass under x -> 1000 x, y -> y/7, and a planar cubic without symmetry.
     "x' = 7000*y; y' = 6*x^2/7000000 - 2/7",
     "x' = x^2 - y; y' = 1 - 2*x*y",
