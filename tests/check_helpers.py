@@ -22,8 +22,6 @@ from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_func
 from kahanmaps.checks.claims import Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.cubics import cubic_space
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -312,15 +310,6 @@ def hamiltonian_of(variables: str, H: str, J: Sequence[Sequence[Any]] | None = N
     names = variables.split()
     matrix = standard_structure(len(names)) if J is None else fmpq_mat([[fmpq(a) for a in row] for row in J])
     return CubicHamiltonian(parse_polynomial(H, names), matrix)
-
-
-def member_of(A: fmpq_mat, combination: Sequence[int], signs: tuple[int, ...] = ()) -> FamilyMember:
-    """The member with this A and the given combination of basis cubics (continued with 1, -1, 1, ...)."""
-    basis = cubic_space(A).basis
-    H = basis[0].context().constant(0)
-    for k, cubic in enumerate(basis):
-        H = H + (combination[k] if k < len(combination) else (-1) ** k) * cubic
-    return FamilyMember(A, H, signs)
 
 
 @st.composite

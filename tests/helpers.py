@@ -24,8 +24,6 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-# FLINT has one type of residue below 2^63 and another above.
-LARGEST_WORD_PRIME = 2**63 - 25
 SMALLEST_LARGE_PRIME = 2**63 + 29
 
 EXACT_FIELDS: list[Field] = [QQ, GF(2), GF(7), GF(2**61 - 1), GF(SMALLEST_LARGE_PRIME)]

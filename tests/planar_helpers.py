@@ -1,7 +1,7 @@
 """Planes of the normal form for several test files: starts of every kind, and orbits by nothing but Python and gcds."""
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from math import gcd
 from typing import Any
@@ -116,40 +116,6 @@ def before(cubic: Sequence[int], start: Sequence[int], steps: int) -> Integers:
     for _ in range(steps):
         start = reduced(preimage(cubic, start))
     return reduced(start)
-
-
-def random_cubic(rng: random.Random, kind: int) -> list[fmpq]:
-    """Four coefficients: of any kind, with rational roots, double and triple ones, with fractions, zero."""
-    size = rng.choice([1, 2, 3, 5, 20])
-    r, s, x, y, z = (rng.randint(-size, size) for _ in range(5))
-    found: list[Any] = {
-        4: [r * x, r * y + s * x, r * z + s * y, s * z],
-        5: [r * x * x, 2 * r * x * y + s * x * x, r * y * y + 2 * s * x * y, s * y * y],
-        6: [r * x**3, 3 * r * x * x * y, 3 * r * x * y * y, r * y**3],
-        7: [0, rng.choice([1, -1, 2]), r, 0],
-        8: [fmpq(entry, rng.randint(1, size)) for entry in (r, s, x, y)],
-        9: [rng.randint(-(10**6), 10**6) for _ in range(4)],
-        10: [0, 0, 0, 0],
-    }.get(kind, [r, s, x, y])
-    return [fmpq(entry) for entry in found]
-
-
-def random_blocks(seed: Any, count: int) -> Iterator[IntegerBlock]:
-    """Cubics of every kind with starts of few and of a hundred digits; every kind is among any 11 of them."""
-    rng = random.Random(seed)
-    for number in range(count):
-        cubic = random_cubic(rng, number % 11)
-        u, v = (fmpq(rng.randint(-4, 4), rng.randint(1, 4)) for _ in range(2))
-        match rng.randrange(8):
-            case 5:
-                u, v = (fmpq(rng.randint(-(10**100), 10**100), rng.randint(1, 10**100)) for _ in range(2))
-            case 6:
-                W = rng.randint(1, 30)
-                u, v = fmpq(rng.randint(-9, 9), W), fmpq(rng.randint(-9, 9), W)
-            case 7:
-                u = fmpq(0)
-        eps = rng.choice([fmpq(1, 2), fmpq(1, 10), fmpq(-3, 7), fmpq(1, 10**40 + 7), fmpq(2**40)])
-        yield IntegerBlock(cubic, eps, u, v)
 
 
 class Finite:

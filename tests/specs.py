@@ -11,7 +11,6 @@ from kahanmaps.experiments.spec import SpecError, parse_spec
 LORENZ = '[experiments.a]\ntask = "orbit"\nsystem = "lorenz"\n'
 FAMILY = '[experiments.a]\ntask = "orbit"\nsystem = "family"\n'
 COMMUTE = '[experiments.a]\ntask = "check-commute"\n'
-UNIVERSAL = '[experiments.a]\ntask = "verify-universal"\n'
 SPACE = '[experiments.a]\ntask = "family-space"\n'
 ROTOR = 'variables = ["x", "y"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*y", "-x*y"]\n'
 

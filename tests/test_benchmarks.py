@@ -69,25 +69,6 @@ def test_a_contestant_with_another_result_stops_the_run():
         bench_exact.contest(work.work(2), STEPS, [(name, run), ("the wrong one", wrong)])
 
 
-def test_the_jump_the_steps_and_nmod_mat_agree():
-    import bench_iterate
-    import work
-
-    # Long enough to be reached by doublings.
-    assert bench_iterate.iterate(work.work(), 30)[1] == bench_iterate.step(work.work(), 30)[1]
-    assert bench_iterate.iterate_modulo(work.work(), 50)[1] == bench_iterate.step_modulo(work.work(), 50)[1]
-    assert bench_iterate.in_balls(work.work(), n=100, bits=200, check=8)
-
-
-@pytest.mark.parametrize("name", ["three_wave", "euler_top"])
-def test_both_count_the_same_relations_along_orbits(name):
-    import bench_analysis
-
-    found = bench_analysis.ours(load(name), 2)
-    assert bench_analysis.by_hand(load(name), 2) == found
-    assert found[1] > 0
-
-
 def test_the_page_is_what_the_record_says():
     import run
 

@@ -17,7 +17,7 @@ sys.path.insert(0, str(DOCS / "_ext"))
 
 from check_pages import mistakes  # noqa: E402
 from helpers import together  # noqa: E402
-from kahanmaps_docs import docstrings, expanded, reference  # noqa: E402
+from kahanmaps_docs import expanded, reference  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
 from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
 
@@ -121,35 +121,6 @@ def test_every_system_of_the_catalogue_has_its_section_with_its_sources(built_fr
 @together("path", markdown_files())
 def test_local_links_lead_to_a_file_and_to_a_heading_in_it(path):
     assert broken_links(path) == []
-
-
-@pytest.mark.parametrize(
-    ("written", "shown"),
-    [
-        (["The product a*b, and |x|."], [r"The product a\*b, and \|x\|."]),
-        (["As `find_integrals` and `x*y` do."], ["As :py:obj:`~kahanmaps.find_integrals` and ``x*y`` do."]),
-        (["Source: ward-1948."], ["Source: :ref:`ward-1948 <source-ward-1948>`."]),
-        (["Thus:", "", "    y = x*x", "", "so."], ["Thus:", "", "::", "", "    y = x*x", "", "so."]),
-        (["Args:", "    f_: a*b."], ["Args:", r"    f\_: a\*b."]),
-        (["Returns:", "    A pair: x, y.", "    z."], ["Returns:", "    : A pair: x, y.", "    z."]),
-        ([">>> 2*3", "6"], [">>> 2*3", "6"]),
-    ],
-)
-def test_docstrings_become_restructured_text(written, shown):
-    assert docstrings.as_rst(written)[:-1] == shown
-
-
-def test_a_built_page_that_leads_nowhere_or_needs_the_network_is_noticed(tmp_path):
-    (tmp_path / "b.html").write_text('<p id="here"></p>')
-    (tmp_path / "a.html").write_text(
-        '<a href="b.html#here"></a><a href="b.html#there"></a><a href="c.html"></a><a href="https://e.org"></a>'
-        '<script src="https://e.org/math.js"></script>'
-    )
-    assert mistakes(tmp_path) == [
-        "a.html: b.html#there is no place on that page",
-        "a.html: c.html is not there",
-        "a.html: https://e.org/math.js has to be fetched",
-    ]
 
 
 @pytest.mark.slow

@@ -44,14 +44,6 @@ def test_a_file_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, na
     assert (tmp_path / "loop").is_symlink()
 
 
-def test_a_symbolic_link_is_written_through(tmp_path):
-    (tmp_path / "there").mkdir()
-    link = tmp_path / "link.svg"
-    link.symlink_to("there/x.svg")
-    write_whole(link, b"x")
-    assert (link.is_symlink(), (tmp_path / "there" / "x.svg").read_bytes()) == (True, b"x")
-
-
 def test_a_new_file_has_the_permissions_of_the_user_and_a_replaced_one_keeps_its_own(tmp_path):
     before = os.umask(0o027)
     try:

@@ -1,7 +1,6 @@
 """The structured facts of the catalogue agree with each other and with the facts in words."""
 
 import re
-from itertools import pairwise
 
 import pytest
 from flint import fmpq_poly
@@ -39,46 +38,6 @@ def test_the_degrees_are_the_values_of_the_closed_form(name):
 
 
 # Growth and verdict
-
-
-def is_bounded(terms):
-    """Whether the later half stays below the largest of the first half, as it does where terms repeat."""
-    half = len(terms) // 2
-    return max(terms[half:]) <= max(terms[:half])
-
-
-def differences(terms):
-    return [late - early for early, late in pairwise(terms)]
-
-
-def is_linear(degrees):
-    return not is_bounded(degrees) and is_bounded(differences(degrees))
-
-
-def is_quadratic(degrees):
-    second = differences(differences(degrees[1:]))
-    return not is_bounded(differences(degrees)) and max(second) <= 10 and second[-1] <= 2 * max(second[:2])
-
-
-def is_exponential(degrees):
-    return all(step > 0 for step in differences(differences(differences(degrees[1:]))))
-
-
-# growth -> whether degrees d_0 = 1, d_1, ... look like it, and the verdict
-GROWTH = {
-    "bounded": (is_bounded, "linearisable"),
-    "linear": (is_linear, "integrable"),
-    "quadratic": (is_quadratic, "integrable"),
-    "exponential": (is_exponential, "not integrable"),
-}
-
-
-@over_the_catalogue
-def test_growth_degrees_and_verdict_go_together(name):
-    catalog = load(name).catalog
-    looks_like_it, verdict = GROWTH[catalog["growth"]]
-    assert looks_like_it([1, *catalog["degrees"]])
-    assert catalog["verdict"] == verdict
 
 
 LATEST_BEGINNING = 2

@@ -8,16 +8,13 @@ from check_helpers import (
     claim,
     determinant,
     exact,
-    hamiltonians,
     kahan_jacobian,
 )
-from helpers import fraction, points, rationals, systems_with_points
+from helpers import fraction, rationals, systems_with_points
 from hypothesis import assume, given
-from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularStep
-from kahanmaps.invariants.measures import DeterminantDensity, jacobian_determinant_sides
+from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.invariants.phase_functions import where
 from kahanmaps.maps.kahan import KahanMap
 
@@ -35,23 +32,6 @@ def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, e
     jacobian = kahan_jacobian(system, fraction(eps), exact(*x))
     assert jacobian is not None
     assert determinant(jacobian) == fraction(above) / fraction(below)
-
-
-@st.composite
-def hamiltonian_with_point(draw):
-    hamiltonian = draw(hamiltonians(dims=(1, 2, 3)))
-    return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
-
-
-@given(hamiltonian_with_point(), nonzero, st.data())
-def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, eps, data):
-    # det(I - eps f') is even in eps: the law, with dPhi multiplied out, holds for any two points x and y in place of
-    # x and x~. The map enters through the formula for dPhi alone.
-    hamiltonian, x = drawn
-    y = data.draw(points(hamiltonian.dim, rationals(9)))
-    above, below = jacobian_determinant_sides(KahanMap(hamiltonian.system, eps), x, y)
-    phi = DeterminantDensity(hamiltonian.system)
-    assert phi.value(QQ, eps, y) * below == phi.value(QQ, eps, x) * above
 
 
 @pytest.mark.parametrize(

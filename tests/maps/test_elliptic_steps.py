@@ -18,7 +18,6 @@ import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps import Orbit, load, orbit
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.errors import InputError
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
@@ -206,18 +205,6 @@ def test_points_that_are_not_wanted_are_left_out(name):
     assert (None in points) == (name != "clebsch_first_flow")
 
 
-def test_where_every_kth_point_is_wanted_others_are_left_out():
-    given = load("euler_top").map, START[:3], "3/11"
-    whole, found = orbit(*given, steps=85), orbit(*given, steps=85, every=40)
-    told: list[int] = []
-    found.write(StringIO(), "text", told=told.append)
-    assert len(told) < 40
-    points, expected = list(found), list(whole)
-    assert [point.step for point in points] == [0, 40, 80]
-    assert points == [expected[point.step] for point in points] == [found[k] for k in range(3)]
-    assert found.end == whole.end
-
-
 @pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:200"])
 @pytest.mark.parametrize("asked", [{"steps": 7, "every": 3}, {"at": [3, 6]}, {"at": []}])
 def test_points_of_an_orbit_are_those_asked_for_in_every_arithmetic(arithmetic, asked):
@@ -228,12 +215,6 @@ def test_points_of_an_orbit_are_those_asked_for_in_every_arithmetic(arithmetic, 
     stream = StringIO()
     found.write(stream, "csv")
     assert [line.split(",")[0] for line in stream.getvalue().splitlines()[1:]] == list(map(str, steps))
-
-
-@pytest.mark.parametrize("every", [0, -2, 2.5, "3", True])
-def test_every_is_a_positive_integer(every):
-    with pytest.raises(InputError, match="every"):
-        orbit(load("euler_top").map, START[:3], "3/11", steps=7, every=every)
 
 
 def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_out(monkeypatch):

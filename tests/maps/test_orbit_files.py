@@ -54,21 +54,6 @@ def test_a_table_has_the_values_of_integrals_and_none_at_a_pole(arithmetic):
         assert len({row["F1"] for row in rows}) == 1
 
 
-@pytest.mark.parametrize(
-    ("arithmetic", "options", "form", "why"),
-    [
-        ("exact", {}, "npy", "for float orbits"),
-        ("float", {"steps": None, "at": [1, 3]}, "npy", "steps= and every="),
-        ("float", {}, "npy", "integrals"),
-        ("exact", {}, "parquet", "expected text, json"),
-    ],
-)
-def test_what_a_format_does_not_hold_is_refused_and_no_file_made(tmp_path, arithmetic, options, form, why):
-    with pytest.raises(km.InputError, match=why):
-        walk(arithmetic, **options).write(tmp_path / "o", form)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_full_disk_is_named(tmp_path):
     for form in ("csv", "jsonl", "npz", "npy"):
         found = km.orbit(TOP, [1, 2, 3], "1/10", 50_000 if form == "npy" else 3, arithmetic="float")

@@ -10,12 +10,10 @@ from itertools import product
 import pytest
 from flint import fmpq
 from helpers import random_point
-from planar_helpers import over_members, planar_system, side_by_side, structure_and_system
+from planar_helpers import over_members, planar_system, structure_and_system
 
-from kahanmaps.algebra.fields import GF
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form.iterate import NthIterate
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 
 # Roots: three rational, one rational (in other coordinates), none rational, double, triple.
@@ -86,13 +84,3 @@ def test_members_end_alike_by_steps_and_by_jumps(name):
     normal_form, system = structure_and_system(name)
     for seed, eps in enumerate(EPS[:2]):
         event(system, normal_form, eps, random_point(system.dim, seed, height=2), 30, 40)
-
-
-@pytest.mark.parametrize("names", [("level 0", "a triple root"), ("a double root", "a triple root, level 0")])
-def test_numbers_that_stay_short_are_delivered_however_far_the_step_is(names):
-    system, normal_form, start = side_by_side(*names)
-    n, field = 10**26, GF(2**61 - 1)
-    value = NthIterate(normal_form, "1/2", KahanMap(system, "1/2").field).value(start, n, 10**5)
-    expected = NthIterate(normal_form, "1/2", field).value(start, n)
-    assert tuple(map(field.convert, value.rationals())) == tuple(expected)
-    assert value.height < 2000

@@ -81,16 +81,6 @@ def test_there_is_no_polarisation_modulo_two():
         EULER_TOP.over(K).polarised([K.one] * 3, [K.one] * 3)
 
 
-# Other fields.
-
-
-@pytest.mark.parametrize("rhs", ["x*y/7", "x/7", "1/7"])
-def test_a_prime_in_a_denominator_of_the_system_is_refused(rhs):
-    with pytest.raises(BadPrime) as refusal:
-        plane("y", rhs).over(GF(7))
-    assert refusal.value.prime == 7
-
-
 # What is refused.
 
 
