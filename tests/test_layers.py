@@ -159,26 +159,20 @@ MAPS = "kahanmaps/maps/kahan.py"
 
 WRONG = [
     ("kahanmaps/algebra/fields.py", "from kahanmaps.maps.kahan import step", "imports maps, a floor above"),
-    ("kahanmaps/algebra/fields.py", "import kahanmaps.documents.files as f", "imports documents, a floor above"),
     ("kahanmaps/errors.py", "from .algebra import fields", "imports algebra, a floor above"),
-    (MAPS, "from ..checks.claims import Claim", "imports checks, a floor above"),
     (MAPS, "def f():\n    from kahanmaps.plots import draw", "imports plots, a floor above"),
     (MAPS, "if TYPE_CHECKING:\n    from kahanmaps.checks import Claim", "imports checks, a floor above"),
     (MAPS, "from kahanmaps import QuadraticSystem", "above all floors"),
     ("kahanmaps/helpers.py", "from kahanmaps import errors", "has no floor"),
     (MAPS, "def f():\n    import click", "the library imports click"),
-    ("kahanmaps/__init__.py", "from rich.console import Console", "the library imports rich"),
     (MAPS, "import numpy as np", "imports numpy while it is loaded"),
-    ("cli/kahanmaps_cli/screen/render.py", "from numpy import array", "imports numpy while it is loaded"),
     ("kahanmaps/maps/floats/fast.py", "try:\n    import numba\nexcept ImportError:\n    pass", "imports numba while"),
     (
         "kahanmaps/maps/floats/ensemble.py",
         "from kahanmaps.maps.floats.machine_code import MachineCode",
         "machine_code.MachineCode while",
     ),
-    ("kahanmaps/maps/floats/steps.py", "import numba", "imports numba while"),
     ("kahanmaps/maps/floats/machine_code.py", "import matplotlib", "imports matplotlib while"),
-    ("kahanmaps/plots/figures.py", "from matplotlib.figure import Figure", "imports matplotlib while"),
     ("kahanmaps/experiments/running/run.py", "class A:\n    import distributed", "imports distributed while"),
     ("kahanmaps/maps/floats/fast.py", "if TYPE_CHECKING:\n    pass\nelse:\n    import numba", "imports numba while"),
 ]
@@ -194,11 +188,8 @@ def test_a_file_that_breaks_the_rule_is_reported_with_its_line(path, source, sen
 
 RIGHT = [
     (MAPS, "from kahanmaps.algebra import fields"),
-    (MAPS, "from .orbits import Orbit"),
     (MAPS, "def f():\n    import numpy"),
-    ("kahanmaps/documents/catalog/__init__.py", "from ...family import cubics"),
     ("kahanmaps/experiments/results/store.py", "from kahanmaps import __version__"),
-    ("kahanmaps/maps/floats/fast.py", "import numpy as np"),
     ("kahanmaps/maps/floats/machine_code.py", "import llvmlite\nimport numpy as np"),
     ("kahanmaps/maps/floats/ensemble.py", "def f():\n    from kahanmaps.maps.floats.machine_code import MachineCode"),
     ("kahanmaps/plots/figures.py", "import numpy as np\ndef f():\n    from matplotlib.figure import Figure"),

@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from flint import fmpq
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
@@ -155,21 +154,6 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
     else:
         with pytest.raises(InputError, match=f"rounds residues modulo {prime}, expected dtype=int or dtype=object"):
             np.asarray(walk, dtype=float)
-
-
-def test_arrays_of_integers_are_exact_or_refused():
-    grows = km.orbit("x' = x; y' = 0", [1, 5], 1 / fmpq(3), 70)  # x~ = 2 x
-    assert np.asarray(grows, dtype=object)[70, 0] == 2**70
-    for steps, kind in ((62, np.int64), (63, np.uint64), (6, np.int8)):
-        assert np.asarray(km.orbit("x' = x; y' = 0", [1, 5], "1/3", steps), dtype=kind)[-1].tolist() == [2**steps, 5]
-        with pytest.raises(InputError, match=f"found the coordinate {2 ** (steps + 1)}, expected integers"):
-            np.asarray(km.orbit("x' = x; y' = 0", [1, 5], "1/3", steps + 1), dtype=kind)
-    with pytest.raises(InputError, match=r"found the coordinate 65/37, expected .*take .*dtype=object"):
-        np.asarray(km.orbit("euler_top", [1, 2, 3], "1/10", 1), dtype=int)
-    with pytest.raises(InputError, match="found the dtype bool, expected one of floats or integers, or object"):
-        np.asarray(grows, dtype=bool)
-    with pytest.raises(ValueError, match="expected copy=None"):
-        np.array(grows, copy=False)
 
 
 def test_a_table_of_pandas_is_made_of_the_rows(monkeypatch, tmp_path):

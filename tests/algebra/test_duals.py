@@ -87,16 +87,6 @@ def test_numbers_on_either_side_are_constants(result, value, slope):
     assert (result.value, result.slope) == (value, slope)
 
 
-@over_all_bases
-@some
-@given(data=st.data(), n=st.integers(1, 3))
-def test_the_determinant_is_the_one_expanded_entry_by_entry(base, data, n):
-    field = DualField(base)
-    with field.working():
-        matrix = data.draw(dual_matrices(field, n, n))
-        assert field.equal(matrix.det(), expanded(matrix.tolist()))
-
-
 # Matrices.
 
 

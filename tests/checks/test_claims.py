@@ -51,14 +51,6 @@ def test_verdicts_combine_to_the_weakest(verdicts, expected):
     assert combined(verdicts) is expected
 
 
-# Controls
-
-
-@pytest.mark.parametrize("control", list(Verdict))
-def test_a_control_does_not_count_in_the_verdict_of_a_report(control):
-    assert Report("commute", (finding(P), finding(control, control=True))).verdict is P
-
-
 # JSON
 
 

@@ -160,18 +160,3 @@ def keys_in_the_package():
 
 def test_every_source_that_is_cited_exists():
     assert keys_in_the_package() - set(SOURCES) == set()
-
-
-# load
-
-
-MINE = 'variables = ["x"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*x"]\n'
-
-
-@pytest.mark.parametrize("reference", ["mine.toml", "./mine.toml", "mine", "./euler_top", Path("euler_top")], ids=repr)
-def test_a_path_is_what_ends_in_toml_has_a_separator_or_is_an_existing_file(reference, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name in ("mine.toml", "mine", "euler_top"):
-        (tmp_path / name).write_text(MINE, encoding="utf-8")
-    assert load(reference, {"a": 3}).system.dim == 1
-    assert load(reference, {"a": 3}).parameters == {"a": 3}

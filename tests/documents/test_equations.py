@@ -36,13 +36,6 @@ def test_equations_are_read_as_the_system_that_they_mean(rhs):
     assert km.parse_system(file.to_toml(), "again").system == PLAIN
 
 
-@pytest.mark.parametrize(
-    "rhs", ['"x*y; -x"', '["x*y; -x"]', '"x*y, -x"', '["x*y, -x"]', '["[x*y, -x]"]', '["{x*y, -x};"]']
-)
-def test_one_text_may_hold_right_hand_sides_alone(rhs):
-    assert km.parse_system(f'variables = ["x", "y"]\n[system]\nrhs = {rhs}', "alone").system == PLAIN
-
-
 def test_parameters_stand_in_equations():
     text = "[system]\nrhs = \"x' = a*x*y; y' = -x\"\n[parameters]\na = 2"
     file = km.parse_system(text, "parameters")

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import random_point
 from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import invertible, moved
@@ -23,14 +22,12 @@ from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables, third_derivatives
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.planar import normal_form
 from kahanmaps.family.recognise import (
     reason_against,
     recognised_member,
     structure_space,
 )
 from kahanmaps.family.skew_hamiltonian import chi, evaluate_at_matrix, random_symplectic
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 t = fmpq_poly([0, 1])
@@ -88,16 +85,6 @@ def test_the_splitting_is_found_again(member):
     assert (found.dimension, found.member.H) == (member.m, member.H)
     assert involutions(found.member) == involutions(member)
     assert sorted(f.degree for f in found.member.factors) == sorted(f.degree for f in member.factors)
-
-
-@over_generic
-def test_the_normal_form_of_what_is_found_steps_like_the_system(member):
-    found = found_in(forgotten(member))
-    form = normal_form(found.member)
-    phi = KahanMap(forgotten(member).system, "1/10")
-    for seed in range(2):
-        x = random_point(member.dim, seed)
-        assert form.point(*form.step(*form.coordinates(x), "1/10")) == phi.step(x)
 
 
 @given(st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]), st.integers(0, 10**6))

@@ -196,23 +196,6 @@ def test_maps_at_different_eps_compose_to_one_without_an_eps():
     assert height_growth(both, [2, 3], 2).heights[1] == height(both.step([2, 3]))
 
 
-def test_words_in_one_map_know_the_time_of_their_step_and_others_have_none():
-    phi, other = (KahanMap(LOTKA_VOLTERRA, eps) for eps in ("1/10", "1/7"))
-    psi = KahanMap(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"]), "1/10")
-    words = [phi, phi**3, phi**-2, (phi**3).inverse, phi @ phi @ phi, phi @ other, phi @ phi**-1, phi**0, phi**0 @ phi]
-    times = [fmpq(*pair) for pair in ((1, 5), (3, 5), (-2, 5), (-3, 5), (3, 5), (17, 35), (0, 1), (0, 1), (1, 5))]
-    assert [word.flow[1] for word in words] == times
-    for word in (phi @ psi, psi @ phi**2, phi @ psi @ phi**-1, MAPS["word"].at(1) ** 2):
-        assert word.flow is None
-        assert "time step" not in repr(word)
-    assert "eps=1/10, time step 3/5, over QQ" in repr(phi**3)
-    assert "time step 3/5" in orbit_html(Orbit(phi**3, [2, 3], 2))
-    assert (KahanMap(LOTKA_VOLTERRA, "1/10", GF(101)) ** 3).flow[1] == GF(101).convert(fmpq(3, 5))
-    adjusted = QuadraticSystem((parse_polynomial("x + eps*x^2", ["x", "eps"]),), ("eps",))
-    one, two = KahanMap(adjusted, "1/10"), KahanMap(adjusted, "1/5")
-    assert ((one**2).flow[1], one.inverse.flow[1], (one @ two).flow) == (fmpq(2, 5), fmpq(-1, 5), None)
-
-
 def test_what_cannot_be_composed_is_refused():
     with pytest.raises(InputError, match="found no map to compose"):
         composed_map((MAPS["kahan"], 0))

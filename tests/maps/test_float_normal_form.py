@@ -1,7 +1,5 @@
 """The normal form in floating point: its blocks, found in balls and rounded once, and their integrals."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 from flint import acb, arb, fmpq, fmpq_poly
@@ -9,7 +7,7 @@ from flint import acb, arb, fmpq, fmpq_poly
 from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
-from kahanmaps.maps.floats.blocks import _factors, _sine, _Unclear, planar_blocks
+from kahanmaps.maps.floats.blocks import _sine, _Unclear, planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -98,21 +96,3 @@ def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
     for _ in orbit:
         pass
     assert orbit.drift[1].largest == of_flow.largest[0]
-
-
-LINEAR_FORMS = [(1, 0), (0, 1), (1, -1), (1, 1), (3, 2)]
-
-
-@pytest.mark.parametrize("lines", list(combinations(LINEAR_FORMS, 3)) + list(combinations(LINEAR_FORMS, 2)), ids=str)
-def test_a_form_has_the_factors_it_is_the_product_of(lines):
-    """Among them those that vanish at three of the four places where it is looked at first."""
-    form = [1]
-    for f, g in lines:
-        form = [f * a + g * b for a, b in zip([*form, 0], [0, *form], strict=True)]
-    found = [(complex(a), complex(b)) for a, b in _factors([acb(c) for c in form])]
-    assert len(found) == len(lines)
-    for f, g in lines:
-        (close,) = [
-            line for line in found if abs(line[0] * g - line[1] * f) < 1e-6
-        ]  # roots are asked for to half of 53 bits
-        assert abs(close[0]) + abs(close[1]) > 0.1

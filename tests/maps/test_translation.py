@@ -10,18 +10,14 @@ from itertools import islice
 
 import flint
 import pytest
-from flint import fmpq
-from helpers import encloses, quick
-from planar_helpers import STARTS, Finite, by_gcds, integer_block, planes_over
+from helpers import quick
+from planar_helpers import Finite, planes_over
 
-from kahanmaps.algebra.fields import CC, RR
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.normal_form import translation
 from kahanmaps.maps.normal_form.level_curves import LevelCubic
-from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
+from kahanmaps.maps.normal_form.planar_block import same_point
 from kahanmaps.maps.normal_form.translation import NoTranslation, iterate
-
-ZERO_COUNT = 16  # that many steps are taken before doubling
 
 
 def is_zero(element) -> bool:
@@ -75,48 +71,6 @@ def test_over_a_finite_field_it_is_the_point_that_steps_lead_to(field, amount):
                 assert same_point(image, points[n])
                 compared += 1
     assert compared > amount
-
-
-RATIONAL = [
-    name for name, case in STARTS.items() if name not in ("h = 0", "the origin") and not name.startswith("no value")
-]
-
-
-def rational(name):
-    cubic, (U, V, W) = STARTS[name]
-    return PlanarBlock(*map(fmpq, cubic)), (fmpq(U, W), fmpq(V, W), fmpq(1))
-
-
-@pytest.mark.parametrize("name", RATIONAL)
-def test_over_the_rationals_it_is_the_point_that_gcds_give(name):
-    block, start = rational(name)
-    expected = by_gcds(integer_block(*STARTS[name]), 40)
-    for n in (0, 1, 5, 16, 17, 20, 25, 27, 28, 29, 33, 40):
-        image = found(block, start, n)
-        if n < len(expected):
-            assert same_point(image, expected[n])
-        elif len(expected) <= (ZERO_COUNT if n <= ZERO_COUNT else 4):
-            assert image == f"the map has no value at step {len(expected) - 1}"
-
-
-@pytest.mark.parametrize(
-    ("field", "name"),
-    [(RR(200), "three real roots, irrational"), (CC(200), "one real root, irrational"), (RR(200), "one rational root")],
-)
-def test_balls_enclose_the_exact_point_and_stay_narrow(name, field):
-    block, start = rational(name)
-    expected = by_gcds(integer_block(*STARTS[name]), 80)
-    with field.working():
-        balls = PlanarBlock(*map(field.convert, (block.a, block.b, block.c, block.d)))
-        first = tuple(map(field.convert, start))
-        for n in (1, 10, 17, 30, 31, 32, 64, 79, 80):
-            U, V, W = iterate(balls, first, n, field.is_zero)
-            u, v, w = expected[n]
-            for ball, number in ((U / W, fmpq(u, w)), (V / W, fmpq(v, w))):
-                real = ball.real if isinstance(ball, flint.acb) else ball
-                assert encloses(real, number)
-                # without the doublings some ten bits a step are lost
-                assert real.rel_accuracy_bits() > 100
 
 
 # Poles and large n.
