@@ -8,9 +8,9 @@ from .algebra.fields import GF as GF
 from .algebra.fields import QQ as QQ
 from .algebra.fields import RR as RR
 from .algebra.interpolation import reconstruct as reconstruct
-from .algebra.written.text import parse_point as parse_point
-from .algebra.written.text import parse_polynomial as parse_polynomial
-from .algebra.written.text import parse_rational_function as parse_rational_function
+from .algebra.parsing import parse_point as parse_point
+from .algebra.parsing import parse_polynomial as parse_polynomial
+from .algebra.parsing import parse_rational_function as parse_rational_function
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report
 from .checks.claims import Verdict as Verdict

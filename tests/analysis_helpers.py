@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from flint import fmpz_poly
 from search_helpers import at_residues, ranks
 
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap

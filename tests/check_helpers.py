@@ -17,8 +17,8 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from helpers import fraction, rationals
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system

@@ -13,8 +13,8 @@ from flint import fmpq
 
 from kahanmaps import QuadraticSystem, check_commute, check_integrals, find_integrals, parse_rational_function
 from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity

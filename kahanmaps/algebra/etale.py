@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly, fmpz
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix, trace
-from kahanmaps.algebra.written.text import format_univariate
+from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
 # Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm, and those from which

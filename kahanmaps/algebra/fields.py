@@ -21,7 +21,8 @@ from typing import Any, Self
 import flint
 from flint import acb, acb_mat, arb, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mod, fmpz_mod_ctx, fmpz_mod_mat, nmod, nmod_mat
 
-from kahanmaps.algebra.written.text import format_number, parse_number
+from kahanmaps.algebra.parsing import parse_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 
 # FLINT proves primality of 512 bits in about 0.1 s; the cost grows steeply beyond.

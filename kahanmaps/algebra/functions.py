@@ -20,7 +20,7 @@ from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.text import format_rational_function
+from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words

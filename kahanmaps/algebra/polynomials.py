@@ -12,8 +12,8 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
+from kahanmaps.algebra import pickles  # noqa: F401  # results with polynomials come back from other processes
 from kahanmaps.algebra.integers import content, over_one
-from kahanmaps.algebra.written import pickles  # noqa: F401  # results with polynomials come back from other processes
 from kahanmaps.errors import InputError, quoted
 
 

@@ -19,8 +19,9 @@ from kahanmaps.algebra.bounds import Bound, BoundField, Size, log2
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, ComplexBallField, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.parsing import parse_number, parse_polynomial, point_entries
 from kahanmaps.algebra.polynomials import evaluate, ring
-from kahanmaps.algebra.written.text import format_univariate, parse_number, parse_polynomial, point_entries
+from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import BadPrime, InputError, UnknownName, quoted
 
 MAX_DEGREE = 12

@@ -8,7 +8,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import Field, rational
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
 from kahanmaps.checks.decide import Identity, Sides, decide

@@ -14,7 +14,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.documents.expressions import formula_text

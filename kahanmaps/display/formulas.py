@@ -12,7 +12,7 @@ from dataclasses import replace
 from flint import fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.reading import PLAIN, above_and_below, first_terms
+from kahanmaps.algebra.printing import PLAIN, above_and_below, first_terms
 from kahanmaps.display.latex import LATEX, latex_cut, latex_matrix, latex_name
 from kahanmaps.display.markup import escape
 
@@ -27,7 +27,7 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
     `left` is the name of what it is: "I1" makes I_1 = ...; "x1'" is the derivative. Where more than about
     `characters` characters would be shown, the rest is left out, and the number of terms is told.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(formula(parse_polynomial("x^2", ["x"]), "H"))
     <span class="formula">\(H = x^2\)</span>
     """

@@ -15,7 +15,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import format_number, format_polynomial
+from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.display import markup
 from kahanmaps.display.formulas import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html

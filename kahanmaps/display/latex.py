@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.reading import Notation, first_terms
+from kahanmaps.algebra.printing import Notation, first_terms
 from kahanmaps.displayed import latex_form
 from kahanmaps.errors import InputError, counted
 
@@ -73,7 +73,7 @@ def latex_number(value: fmpq) -> str:
 def latex_polynomial(polynomial: fmpq_mpoly) -> str:
     r"""A polynomial over Q as LaTeX, exact: its terms in the order of its ring, as in plain text.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_polynomial(parse_polynomial("x1^3/3 - eps^12*x1 + 1/2", ["x1", "eps"])))
     -\varepsilon^{12} x_1 + \frac{1}{3} x_1^3 + \frac{1}{2}
     """
@@ -85,7 +85,7 @@ def latex_rational_function(function: RationalFunction) -> str:
     r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction, in factors where they
     are shorter.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
     -\frac{x + 2}{2 \varepsilon^2 x - 2}
     >>> print(latex_rational_function(parse_rational_function("-2*(x + 1)^2*y/3", ["x", "y"])))
@@ -97,7 +97,7 @@ def latex_rational_function(function: RationalFunction) -> str:
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
     r"""A polynomial as LaTeX; only its beginning and the number of its terms where it takes more characters, about.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
     x^9 + 9 x^8 + \cdots\ \text{(10 terms)}
     """

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.written.reading import first_terms
+from kahanmaps.algebra.printing import first_terms
 from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_polynomial
 from kahanmaps.display.systems import CHARACTERS, system_latex

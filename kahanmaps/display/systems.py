@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.formulas import equations, formula, matrix
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_matrix, latex_name

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.parsing import check_names, parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring, substitute
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.algebra.roots import Root, parse_root
-from kahanmaps.algebra.written.numerals import check_names
-from kahanmaps.algebra.written.text import format_number, parse_polynomial, parse_rational_function
 from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.expressions import number
 from kahanmaps.documents.iterates import iterates_in

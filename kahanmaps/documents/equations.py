@@ -5,7 +5,7 @@ stands a derivative, and on the right a formula, in which x(t) is x:
 
     x'    dx/dt    x_dot    xdot    dxdt    x'[t]    dx(t)/dt    d^2x/dt^2    diff(x(t), t)    D[x[t], t]    x[0]'
 
-The text is cut into tokens once and never evaluated; formulas are read by `kahanmaps.algebra.written.expressions`.
+The text is cut into tokens once and never evaluated; formulas are read by `kahanmaps.algebra.parsing`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.written.text import format_number, format_polynomial
+from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member

@@ -12,9 +12,8 @@ from math import prod
 
 from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.parsing import is_name, parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.numerals import is_name
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.errors import InputError, quoted
 
 MAX_ITERATES = 16

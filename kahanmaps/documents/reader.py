@@ -10,9 +10,10 @@ from typing import Any, TypeVar
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
+from kahanmaps.algebra.parsing import parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.written.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.iterates import parse_with_iterates
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.errors import InputError, UnknownName, counted, quoted, show

@@ -24,8 +24,8 @@ from typing import Any, NamedTuple
 
 from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import InputError, quoted, show
 
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted

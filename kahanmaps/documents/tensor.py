@@ -7,7 +7,7 @@ from typing import Any
 from flint import fmpq_poly
 
 from kahanmaps.algebra.functions import BudgetExceeded
-from kahanmaps.algebra.written.text import format_polynomial, format_rational_function, format_univariate
+from kahanmaps.algebra.printing import format_polynomial, format_rational_function, format_univariate
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kahanmaps.algebra.written.numerals import LIMITS
+from kahanmaps.algebra.parsing import LIMITS
 from kahanmaps.documents.equations import derivative_at, is_name, tokens_of
 from kahanmaps.errors import InputError, SystemFileError, quoted
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_number
+from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.errors import InputError, show
 from kahanmaps.experiments.options import Option
 

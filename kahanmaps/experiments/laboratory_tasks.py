@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq_poly
 
-from kahanmaps.algebra.written.text import format_number, format_univariate
+from kahanmaps.algebra.printing import format_number, format_univariate
 from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile

@@ -15,7 +15,8 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, RR, rational
-from kahanmaps.algebra.written.text import format_number, format_point, format_univariate, parse_number, parse_point
+from kahanmaps.algebra.parsing import parse_number, parse_point
+from kahanmaps.algebra.printing import format_number, format_point, format_univariate
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.draw import MAX_M, parse_chi
 

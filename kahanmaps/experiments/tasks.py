@@ -13,7 +13,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.written.text import format_point
+from kahanmaps.algebra.printing import format_point
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings, random_starts

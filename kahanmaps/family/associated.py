@@ -16,8 +16,8 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.algebra.printing import format_polynomial, format_univariate
 from kahanmaps.algebra.roots import MAX_DEGREE, Root
-from kahanmaps.algebra.written.text import format_polynomial, format_univariate
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
@@ -93,7 +93,7 @@ class FamilyMember(Displayed):
 
     Raises HypothesisError where A is not skew-Hamiltonian or H not in its space.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2])
     >>> H = parse_polynomial("x1^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
     >>> [g.label for g in FamilyMember(A, H).associated()]
@@ -183,7 +183,7 @@ class FamilyMember(Displayed):
         conjugates of B differ in the root, and the product of two of them has the other sign at both: with the rational
         ones they generate all B_s where no root is repeated.
 
-        >>> from kahanmaps.algebra.written.text import parse_polynomial
+        >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
         >>> H = parse_polynomial("2*x1^3 + 3*x1*x2^2 + x3^3 + 6*x3*x4^2", ["x1", "x2", "x3", "x4"])
         >>> [(str(one.root), one.K_text) for one in FamilyMember(A, H).conjugate_associates()]

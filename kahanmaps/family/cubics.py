@@ -14,7 +14,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import gradient, is_homogeneous, linear_combinations, monomials, names_of, ring
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.errors import HypothesisError
 from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
 

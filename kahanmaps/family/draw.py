@@ -15,8 +15,8 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.fields import integer, rational
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables

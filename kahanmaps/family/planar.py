@@ -25,9 +25,9 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
+from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import names_of, ring
-from kahanmaps.algebra.written.numerals import wrong_kind
-from kahanmaps.algebra.written.text import format_number, format_polynomial
+from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
@@ -82,7 +82,7 @@ class NormalForm(Displayed):
 
     Made by `normal_form`. That it is the system, exactly, is verified at construction.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [0, 1, 0, 0,  2, 0, 0, 0,  0, 0, 0, 2,  0, 0, 1, 0])
     >>> H = parse_polynomial("x1^3 + 6*x1*x2^2", ["x1", "x2", "x3", "x4"])
     >>> form = normal_form(FamilyMember(A, H))

@@ -99,7 +99,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     Raises InputError where H is not a homogeneous cubic, J not an invertible skew matrix of its size, or the dimension
     larger than 32.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> names = ["x1", "x2", "x3", "x4"]
     >>> len(structure_space(parse_polynomial("x1^3 + x3^3 + x2^2*x4", names)))
     2
@@ -139,7 +139,7 @@ def recognised_member(hamiltonian: CubicHamiltonian) -> RecognisedMember | None:
 
     Raises InputError beyond dimension 32.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
     >>> found = recognised_member(CubicHamiltonian(H, standard_structure(4)))
     >>> found.text

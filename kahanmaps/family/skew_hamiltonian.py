@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from kahanmaps.algebra.written.text import format_number
-from kahanmaps.algebra.written.text import format_univariate as format_univariate
+from kahanmaps.algebra.printing import format_number
+from kahanmaps.algebra.printing import format_univariate as format_univariate
 from kahanmaps.errors import HypothesisError
 from kahanmaps.systems.hamiltonian import standard_structure
 

@@ -20,7 +20,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import DEFAULT_BUDGET, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
-from kahanmaps.algebra.written.text import format_univariate
+from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 from kahanmaps.family.skew_hamiltonian import evaluate_at_matrix
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system

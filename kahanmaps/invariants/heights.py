@@ -46,7 +46,7 @@ from typing import Any
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.written.numerals import wrong_kind
+from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth

@@ -152,7 +152,7 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
     Returns:
         This in words; empty where I has values at all of them, or at none.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> for text in ("x/((10*eps - 1)*y)", "x/y"):
     ...     print([integral_condition(parse_rational_function(text, ["x", "y", "eps"]), 2, None)])
     ['where 10*eps - 1 is not 0']

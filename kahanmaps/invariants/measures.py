@@ -16,8 +16,8 @@ from flint import fmpq
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.written.text import format_rational_function
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
 from kahanmaps.maps.implicit import MapOver
@@ -71,7 +71,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     Raises:
         InputError: where phi is identically 0 or 0/0, for that eps and root if they are given.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "x/(a*y)", "a*x + y"):
     ...     phi = parse_rational_function(text, ["x", "y", "a", "b", "eps"])
     ...     print([density_condition(phi, 2, None)])

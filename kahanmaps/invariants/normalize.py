@@ -14,7 +14,7 @@ from functools import reduce
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
-from kahanmaps.algebra.written.text import format_rational_function
+from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.files import SystemFile
 
 
@@ -54,7 +54,7 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         The integral, exact; I itself where it is a constant. The limit is in lowest terms, with coprime integers as
         coefficients above and below, the leading ones positive. Normalized integrals are returned unchanged.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> found = normalized(parse_rational_function("(1 - eps^2*x^2)/(1 + 2*eps^2*y^2)", ["x", "y", "eps"]), 2)
     >>> [format_rational_function(one) for one in (found.function, found.leading)], found.combination("F")
     (['(x^2 + 2*y^2)/(2*y^2*eps^2 + 1)', 'x^2 + 2*y^2'], '(-F + 1)/eps^2')

@@ -11,8 +11,8 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, names_of, primitive_part, substitute
+from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap, MapOver

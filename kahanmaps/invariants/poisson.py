@@ -21,8 +21,9 @@ from flint import fmpq
 
 from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
-from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
+from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import InputError, SystemFileError, quoted
 from kahanmaps.invariants.phase_functions import at_eps, where

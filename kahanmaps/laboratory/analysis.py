@@ -18,8 +18,7 @@ from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import attributes, format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError

@@ -20,7 +20,7 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, integer, rational
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.written.plain import all_fields
+from kahanmaps.algebra.printing import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import resolve_eps

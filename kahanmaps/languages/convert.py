@@ -16,9 +16,9 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
+from kahanmaps.algebra.parsing import is_name
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.written.numerals import is_name
-from kahanmaps.algebra.written.reading import Notation, terms_of
+from kahanmaps.algebra.printing import Notation, terms_of
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas

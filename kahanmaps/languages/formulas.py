@@ -14,8 +14,9 @@ from functools import cached_property
 from flint import fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
@@ -138,7 +139,7 @@ class Formulas:
 
         Raises InputError where they are too large, which is found out on the way: in a second, unless numbers are long.
 
-        >>> from kahanmaps.algebra.written.text import format_rational_function
+        >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load
         >>> [format_rational_function(component) for component in Formulas(load("harmonic")).closed_form()]
         ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']

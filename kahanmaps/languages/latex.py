@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from flint import fmpq_mat
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.reading import above_and_below
+from kahanmaps.algebra.printing import above_and_below
 from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.convention import eps_share

@@ -17,7 +17,7 @@ class AlgebraicMap(BirationalMap):
     `at_number` gives the map with a rational number for the symbol: for floats, where the root is rounded first.
 
     >>> from kahanmaps.algebra.roots import parse_root
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> from kahanmaps.maps.kahan import Kahan
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> riccati = QuadraticSystem((parse_polynomial("a*x^2", ["x", "a"]),), ("a",))

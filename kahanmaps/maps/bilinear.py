@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of, ring
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import ImplicitMap
 
@@ -32,7 +32,7 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
     Raises:
         InputError: for another number of equations than of variables, and for one that is not linear in each point.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> equation = parse_polynomial("X - x - 2*eps*x*X", ["x", "X", "eps"])
     >>> riccati = bilinear_map(["x"], [equation]).at("1/2")
     >>> riccati.step(["1/5"]), riccati.inverse_step(["1/4"])

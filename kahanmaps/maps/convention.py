@@ -12,7 +12,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap
 

@@ -32,7 +32,7 @@ def explicit_map(
     Raises:
         InputError: for another number of functions than of variables, or other names in them.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> lyness = [parse_rational_function(text, ["x", "y", "eps"]) for text in ("y", "(y + 2)/x")]
     >>> explicit_map(["x", "y"], lyness).at(1).step([1, 3])
     (3, 5)

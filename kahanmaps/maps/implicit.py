@@ -31,8 +31,8 @@ from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, integer, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
+from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.equation import Equation, equation_of

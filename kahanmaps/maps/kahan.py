@@ -23,7 +23,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step

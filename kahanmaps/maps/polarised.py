@@ -39,7 +39,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     Raises:
         InputError: where a degree exceeds d, or d is out of range.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> cubic = polarised_map([parse_polynomial("x^3", ["x", "eps"])])
     >>> cubic.variables, cubic.at("1/4").step(["1/2", "1/3"])
     (('x', 'x_1'), (1/3, 3/5))

@@ -32,7 +32,7 @@ from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.functions import BudgetExceeded
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.checks.decide import Decision, Trial, decide
 from kahanmaps.checks.judge import Contradiction

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.display.latex import latex_name
 from kahanmaps.errors import InputError
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, Style

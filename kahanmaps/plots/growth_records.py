@@ -11,7 +11,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from kahanmaps.algebra.written.text import parse_number
+from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.errors import InputError, printable
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth

@@ -9,9 +9,8 @@ import numpy as np
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.parsing import is_name, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.written.numerals import is_name
-from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.display.latex import latex_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray, to_float

@@ -13,7 +13,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.written.text import format_number, format_rational_function
+from kahanmaps.algebra.printing import format_number, format_rational_function
 from kahanmaps.display import markup
 from kahanmaps.display.formulas import formula
 from kahanmaps.errors import InputError

@@ -18,7 +18,7 @@ from importlib import resources
 from typing import Any
 from xml.etree import ElementTree
 
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.formulas import formula
 from kahanmaps.display.systems import equations_html

@@ -11,12 +11,8 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kahanmaps.algebra.written.text import (
-    format_number,
-    format_polynomial,
-    parse_polynomial,
-    parse_rational_function,
-)
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.checks.claims import Report, combined
 from kahanmaps.display import checks, markup
 from kahanmaps.display.formulas import formula, typeset

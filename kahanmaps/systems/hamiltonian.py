@@ -37,7 +37,7 @@ def standard_structure(dim: int) -> fmpq_mat:
 class CubicHamiltonian(DisplayedAsFormula):
     """A polynomial H of degree at most 3 and a constant skew matrix J; the system is f = J grad H.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> H = parse_polynomial("q^3/3 + p^2/2", ["q", "p"])
     >>> print(CubicHamiltonian(H, standard_structure(2)).system)
     q' = p

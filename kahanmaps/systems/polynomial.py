@@ -9,15 +9,16 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import names_of
-from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 
 
 @dataclass(frozen=True, eq=False)
 class PolynomialField:
     """x' = f(x): `rhs` are polynomials over Q in the variables, as many as these, then in `symbols`.
 
-    >>> from kahanmaps.algebra.written.text import parse_polynomial
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x^3*y", "x")))
     >>> field.degree, field.divergence
     (4, 3*x^2*y)
@@ -50,7 +51,7 @@ class PolynomialField:
     def derivative(self, function: fmpq_mpoly) -> fmpq_mpoly:
         """f . grad P, how P changes along solutions; P is in the variables and symbols and, if need be, in eps.
 
-        >>> from kahanmaps.algebra.written.text import parse_polynomial
+        >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x*y", "x")))
         >>> [field.derivative(x) for x in field.rhs[0].context().gens()]
         [x*y, x]

@@ -16,9 +16,9 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field, rational
+from kahanmaps.algebra.parsing import check_names, parse_polynomial
 from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinations, names_of, ring
-from kahanmaps.algebra.written.numerals import check_names
-from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.systems.polynomial import PolynomialField

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.interpolation import Reconstruction, rational_reconstruction, reconstruct
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, monomials, ring
 from kahanmaps.algebra.residues import from_residues
-from kahanmaps.algebra.written.text import parse_rational_function
 
 SPARE = 12  # values that confirm, or cover a round number
 

@@ -13,19 +13,16 @@ from helpers import quick, table
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.numerals import Limits
-from kahanmaps.algebra.written.text import (
-    format_factored,
-    format_number,
-    format_point,
-    format_rational_function,
+from kahanmaps.algebra.parsing import (
+    Limits,
     parse_constant,
     parse_number,
     parse_point,
     parse_polynomial,
     parse_rational_function,
 )
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.printing import format_factored, format_number, format_point, format_rational_function
 from kahanmaps.errors import ExpressionError
 
 NAMES = ["x", "y", "z"]

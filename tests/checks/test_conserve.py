@@ -25,8 +25,8 @@ from helpers import EULER_TOP, LOTKA_VOLTERRA
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.conserve import check_integrals, known_integrals

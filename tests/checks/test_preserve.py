@@ -37,7 +37,7 @@ from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks import preserve, theorems
 from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.judge import Contradiction

@@ -14,7 +14,7 @@ from helpers import matrices, points, rationals, systems
 from hypothesis import assume, given
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.checks import theorems
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues

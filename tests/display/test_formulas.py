@@ -9,8 +9,8 @@ from helpers import rationals, some
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.display.formulas import equations, formula, matrix, typeset
 from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.reports.page import mathml

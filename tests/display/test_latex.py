@@ -8,8 +8,8 @@ from helpers import rationals
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
 from kahanmaps.display.latex import (
     latex_cut,
     latex_name,

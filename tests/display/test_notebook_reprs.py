@@ -7,8 +7,8 @@ from flint import fmpq_mat
 from small_databases import ok, planned
 
 import kahanmaps as km
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 
 EVIL = '<script>alert("x")</script>\x1b[31m'

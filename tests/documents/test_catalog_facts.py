@@ -5,7 +5,7 @@ import re
 import pytest
 from flint import fmpq_poly
 
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 
 over_the_catalogue = pytest.mark.parametrize("name", names())

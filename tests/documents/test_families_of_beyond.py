@@ -7,7 +7,7 @@ import pytest
 from flint import fmpq
 
 import kahanmaps as km
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.laboratory.growth.curves import Line, reduced
 from kahanmaps.laboratory.laboratory import Laboratory
 

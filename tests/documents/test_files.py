@@ -13,7 +13,7 @@ from helpers import table, together
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.associated import FamilyMember

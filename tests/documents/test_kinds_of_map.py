@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson

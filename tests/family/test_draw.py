@@ -8,7 +8,7 @@ import pytest
 from flint import fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.polynomials import gradient
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.family.cubics import belongs
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi, defects

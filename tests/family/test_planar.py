@@ -11,8 +11,8 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import random_point
 
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, SingularStep
 from kahanmaps.family.associated import FamilyMember

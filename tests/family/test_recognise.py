@@ -16,8 +16,8 @@ from planar_helpers import invertible, moved
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables, third_derivatives

@@ -10,7 +10,7 @@ from helpers import EULER_TOP, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, random_poin
 from planar_helpers import invertible, moved, over_members, structure_and_system
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form

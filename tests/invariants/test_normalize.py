@@ -5,8 +5,9 @@ import random
 import pytest
 
 import kahanmaps as km
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
-from kahanmaps.algebra.written.text import format_factored, parse_rational_function
+from kahanmaps.algebra.printing import format_factored
 from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.laboratory import Laboratory
 

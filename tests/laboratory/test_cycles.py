@@ -6,7 +6,7 @@ import math
 import pytest
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.cycles import cycle_census

@@ -8,7 +8,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system

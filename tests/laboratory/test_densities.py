@@ -11,7 +11,7 @@ from flint import fmpq, fmpq_mat
 from helpers import DIMENSION, quick
 from search_helpers import random_system, system, value_of
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names

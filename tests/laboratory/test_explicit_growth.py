@@ -3,7 +3,7 @@
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import written

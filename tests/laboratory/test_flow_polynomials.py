@@ -5,8 +5,9 @@ import random
 import pytest
 from flint import fmpq
 
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
-from kahanmaps.algebra.written.text import format_polynomial, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor

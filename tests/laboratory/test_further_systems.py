@@ -27,7 +27,7 @@ from check_helpers import (
 from helpers import fraction, together
 from search_helpers import ranks
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.laboratory.analysis import analyze

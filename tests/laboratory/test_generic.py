@@ -3,7 +3,7 @@
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.growth.degrees import degree_growth

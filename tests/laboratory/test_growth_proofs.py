@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from flint import fmpq, fmpz_mat, fmpz_poly
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import degrees, proofs
 from kahanmaps.laboratory.growth.degrees import degree_growth

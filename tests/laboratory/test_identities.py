@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import Decision

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from search_helpers import integrals_of, random_system, ranks, system, values_on_orbits
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.laboratory.laboratory import Laboratory

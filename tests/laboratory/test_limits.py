@@ -7,8 +7,9 @@ import pytest
 from search_helpers import integrals_of
 
 from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.written.text import format_rational_function, parse_rational_function
+from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory

@@ -10,7 +10,7 @@ import pytest
 from flint import fmpq, fmpq_poly
 from planar_helpers import invertible, moved
 
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.cubics import belongs, default_variables

@@ -7,8 +7,8 @@ import pytest
 from flint import fmpq
 from search_helpers import analysis_of
 
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.conclusion import contradictions
 from kahanmaps.laboratory.preserve.poisson import pencil as module

@@ -9,8 +9,8 @@ from helpers import random_point
 from search_helpers import random_system, system
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system

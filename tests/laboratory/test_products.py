@@ -8,7 +8,7 @@ from flint import fmpq, fmpz_mat, nmod_poly
 from search_helpers import random_system, system, value_of
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system

@@ -3,7 +3,7 @@
 import pytest
 from search_helpers import ranks
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory

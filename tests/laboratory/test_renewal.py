@@ -10,7 +10,7 @@ from helpers import DIMENSION, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed

@@ -3,7 +3,7 @@
 import pytest
 from flint import nmod
 
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory

@@ -9,8 +9,8 @@ from hypothesis import given
 
 from kahanmaps import KahanMap
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import parse_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load

@@ -7,8 +7,8 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.singular import outcomes

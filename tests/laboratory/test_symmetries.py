@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps import KahanMap
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.small_systems import Component
-from kahanmaps.algebra.written.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux

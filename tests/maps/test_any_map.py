@@ -15,7 +15,7 @@ from hypothesis import assume, given
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import det
-from kahanmaps.algebra.written.text import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.display.maps import orbit_html
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import InputError, SingularStep

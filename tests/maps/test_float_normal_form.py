@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flint import acb, arb, fmpq, fmpq_poly
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.floats.blocks import _sine, _Unclear, planar_blocks

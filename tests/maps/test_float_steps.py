@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, NAMED_SYSTEMS, quick
 
 from kahanmaps.algebra.fields import RR
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kahanmaps.maps.inverse as module
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import SystemFileError
 from kahanmaps.maps.explicit import explicit_map

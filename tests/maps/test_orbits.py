@@ -24,7 +24,7 @@ from hypothesis import assume, given
 from planar_helpers import over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ, RR
-from kahanmaps.algebra.written.text import parse_number
+from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -13,7 +13,7 @@ from helpers import fraction
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map

@@ -13,7 +13,7 @@ from flint import fmpq_mat, fmpq_poly
 from helpers import quick
 from paper.members import LARGE_SPECTRA, SPECTRA, file, member, verifier_of
 
-from kahanmaps.algebra.written.text import parse_polynomial
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile

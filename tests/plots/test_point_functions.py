@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.written.text import parse_rational_function
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.errors import ExpressionError, InputError
 from kahanmaps.plots.point_functions import point_function
 

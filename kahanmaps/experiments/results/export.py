@@ -29,7 +29,7 @@ from importlib import import_module
 from math import inf
 from typing import IO, Any
 
-from kahanmaps.algebra.written.cells import NUMBER, csv_line, guarded
+from kahanmaps.algebra.printing import NUMBER, csv_line, guarded
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.records import Row, encodable
 from kahanmaps.version import __version__

@@ -17,7 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile

@@ -9,7 +9,7 @@ from enum import Flag, auto
 from math import inf
 from typing import Any
 
-from kahanmaps.algebra.written.plain import plain
+from kahanmaps.algebra.printing import plain
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import Statement

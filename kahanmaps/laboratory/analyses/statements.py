@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kahanmaps.algebra.written.text import format_number, format_polynomial
+from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.system_normal_form import SystemNormalForm

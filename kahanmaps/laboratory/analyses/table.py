@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.printing import attributes
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.family.tensor import TensorStructure, tensor_structure

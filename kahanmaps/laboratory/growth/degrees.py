@@ -29,8 +29,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import integer, rational
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import attributes, format_number
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.invariants.growth import Growth

@@ -34,7 +34,7 @@ from flint import arb, fmpq, fmpq_mpoly, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import degree_in
-from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.printing import attributes
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of

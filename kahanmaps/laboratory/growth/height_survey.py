@@ -17,8 +17,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_point
+from kahanmaps.algebra.printing import attributes, format_point
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm

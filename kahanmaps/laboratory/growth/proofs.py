@@ -18,7 +18,7 @@ from flint import fmpq, fmpz_mat, fmpz_poly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import degree_in
-from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.printing import attributes
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, growth_rate, polynomial_growth
@@ -58,7 +58,7 @@ def exponent_matrix(map_: BirationalMap, eps: fmpq | None) -> fmpz_mat | None:
 
     A composition of monomial maps is one: its matrix is the product of theirs.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.maps.explicit import explicit_map
     >>> image = [parse_rational_function(text, ["x", "y", "eps"]) for text in ("3*y", "eps*y^2/x")]
     >>> exponent_matrix(explicit_map(["x", "y"], image), None).tolist()

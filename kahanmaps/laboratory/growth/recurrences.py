@@ -19,8 +19,7 @@ import flint
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
 
 from kahanmaps.algebra.fields import integer
-from kahanmaps.algebra.written.plain import attributes, plain
-from kahanmaps.algebra.written.text import format_univariate
+from kahanmaps.algebra.printing import attributes, format_univariate, plain
 from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted

@@ -17,8 +17,7 @@ from typing import Any
 from flint import fmpq, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_factored
+from kahanmaps.algebra.printing import attributes, format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex

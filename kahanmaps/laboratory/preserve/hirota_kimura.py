@@ -23,7 +23,7 @@ from flint import fmpq_mpoly, nmod_mat
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, rank, split_columns
 from kahanmaps.algebra.polynomials import evaluate, names_of
-from kahanmaps.algebra.written.plain import attributes
+from kahanmaps.algebra.printing import attributes
 from kahanmaps.laboratory.modular_points import (
     Exponent,
     ModularMap,

@@ -59,7 +59,7 @@ def verdict_on(
 
     Source: celledoni-2019.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
     >>> for text in ("x^2 + y^2", "x^2 - y^2"):

@@ -19,8 +19,7 @@ from flint import fmpq, fmpz
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, degree, ring
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_factored, format_polynomial, format_rational_function
+from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file

@@ -25,8 +25,7 @@ from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_number, format_polynomial, format_rational_function
+from kahanmaps.algebra.printing import attributes, format_number, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION

@@ -37,7 +37,7 @@ from kahanmaps.algebra.polynomials import (
     primitive_part,
     ring,
 )
-from kahanmaps.algebra.written.text import format_product
+from kahanmaps.algebra.printing import format_product
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -423,7 +423,7 @@ def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[
 def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list[int]]:
     """A basis over Z of all k for which the product of the powers f_i^k_i is 1; none of the functions is 0.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> functions = [parse_rational_function(text, ["a"]) for text in ("-4*a^2", "2*a", "3", "-1")]
     >>> multiplicative_relations(functions)
     [[1, -2, 0, 1], [0, 0, 0, 2]]

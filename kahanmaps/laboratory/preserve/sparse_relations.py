@@ -14,8 +14,8 @@ from operator import ge
 
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.algebra.residues import chinese, simple_fraction
-from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 

@@ -10,8 +10,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_number, format_polynomial
+from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of

@@ -13,7 +13,7 @@ from itertools import permutations, product
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import primitive_part, ring
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.laboratory.scan.lift import residues
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep

@@ -23,8 +23,8 @@ from flint import fmpq, nmod_poly
 from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.algebra.polynomials import evaluate, gradient
+from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import NO_ORDERS, NOTHING, AlongCurves, Course, Orders, Range, Tracked
 from kahanmaps.laboratory.singular.jets import (

@@ -22,9 +22,8 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.written.plain import all_fields, attributes
-from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.defaults import SECONDS

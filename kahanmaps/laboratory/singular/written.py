@@ -22,7 +22,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import degree_in, ring
-from kahanmaps.algebra.written.text import format_polynomial
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Hypersurface, Tracking, Written, outcome_of

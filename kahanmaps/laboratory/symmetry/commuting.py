@@ -24,9 +24,8 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import Component, decoupling, normal_form, solve_system, without_contained
-from kahanmaps.algebra.written.plain import attributes, plain
-from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings

@@ -20,9 +20,8 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import coefficients_in, linear_combinations, ring
+from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import Component, solve_system
-from kahanmaps.algebra.written.plain import attributes, plain
-from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.defaults import SECONDS

@@ -19,9 +19,8 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
+from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_number, format_polynomial
 from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols

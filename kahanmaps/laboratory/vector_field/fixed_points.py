@@ -18,9 +18,8 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
+from kahanmaps.algebra.printing import attributes, format_polynomial, format_product
 from kahanmaps.algebra.small_systems import Component, groebner, normal_form, quotient_monomials, solve_system
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_polynomial, format_product
 from kahanmaps.errors import counted
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system

@@ -12,8 +12,8 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import parse_point
 from kahanmaps.errors import InputError
 
 FloatArray = NDArray[np.float64]

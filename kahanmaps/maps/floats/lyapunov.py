@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from kahanmaps.algebra.fields import integer, rational
-from kahanmaps.algebra.written.plain import all_fields
+from kahanmaps.algebra.printing import all_fields
 from kahanmaps.errors import InputError
 from kahanmaps.maps import convention
 from kahanmaps.maps.convention import resolve_eps

@@ -13,7 +13,7 @@ from functools import cached_property
 
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from kahanmaps.algebra.written.text import format_univariate
+from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
 MAX_PERIOD = 60  # psi_N has degree about N^2/12

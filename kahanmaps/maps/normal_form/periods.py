@@ -24,7 +24,7 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
 
 from kahanmaps.algebra.fields import GF, QQ, integer
-from kahanmaps.algebra.written.plain import all_fields
+from kahanmaps.algebra.printing import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm

@@ -15,8 +15,8 @@ from flint import acb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mod_ctx, fmpz_mod_p
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
-from kahanmaps.algebra.written.numerals import wrong_kind
-from kahanmaps.algebra.written.text import format_univariate
+from kahanmaps.algebra.parsing import wrong_kind
+from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple

@@ -14,8 +14,8 @@ from flint import arb, fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
-from kahanmaps.algebra.written.plain import json_float
-from kahanmaps.algebra.written.text import parse_point
+from kahanmaps.algebra.parsing import parse_point
+from kahanmaps.algebra.printing import json_float
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import BadPrime, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form

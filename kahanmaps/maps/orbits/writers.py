@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from kahanmaps.algebra.written.cells import csv_line, guarded
+from kahanmaps.algebra.printing import csv_line, guarded
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import eps_words
 from kahanmaps.maps.orbits.iteration import OrbitEnd

@@ -21,7 +21,7 @@ from flint import acb, acb_mat, arb, fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import RR, rational
-from kahanmaps.algebra.written.text import format_number
+from kahanmaps.algebra.printing import format_number
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm

@@ -8,8 +8,9 @@ import numpy as np
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.text import format_polynomial, parse_rational_function
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian

@@ -28,7 +28,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
-from kahanmaps.algebra.written.text import format_polynomial, format_product
+from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios

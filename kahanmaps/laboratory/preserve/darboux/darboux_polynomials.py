@@ -17,8 +17,7 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_polynomial, format_rational_function
+from kahanmaps.algebra.printing import attributes, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex

@@ -153,7 +153,7 @@ def is_kept_by_flow(
     With a factor c, a function of the symbols, whether f . grad I = c I: exp(-c t) I is an integral depending on time.
     Multiplied out, for every value of the symbols; the function is in (variables, symbols, eps). Exact.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
     >>> [is_kept_by_flow(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]

@@ -21,10 +21,9 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, primitive_part, ring
-from kahanmaps.algebra.written.numerals import wrong_kind
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_factored, format_polynomial
+from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.laboratory import Laboratory

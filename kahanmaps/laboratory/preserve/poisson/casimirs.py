@@ -17,8 +17,8 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, ring
+from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.algebra.residues import rational_vector
-from kahanmaps.algebra.written.text import format_rational_function
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, slopes

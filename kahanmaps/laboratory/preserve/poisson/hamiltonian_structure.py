@@ -22,9 +22,8 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import linear_combinations, ring
+from kahanmaps.algebra.printing import all_fields, format_polynomial, plain
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.written.plain import all_fields, plain
-from kahanmaps.algebra.written.text import format_polynomial
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by

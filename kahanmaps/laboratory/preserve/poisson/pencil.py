@@ -28,8 +28,8 @@ from flint import Ordering, fmpq, fq_default_ctx, fq_default_poly_ctx, nmod_mat,
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
+from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.written.plain import attributes
 from kahanmaps.errors import BadPrime
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.singular.jets import modulo
@@ -124,7 +124,7 @@ def pencil_of(
 
     Source: docs/mathematics.md.
 
-    >>> from kahanmaps.algebra.written.text import parse_rational_function
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> found = pencil_of("I", parse_rational_function("y^2 - x^3 - x", ["x", "y", "eps"]), None)
     >>> found.text
     'the generic curve I = c is of degree 3 and genus 1; base points: 9 of multiplicity 1 (8 infinitely near)'

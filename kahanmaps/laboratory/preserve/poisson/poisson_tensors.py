@@ -25,8 +25,7 @@ from flint import fmpq_mpoly, nmod
 from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
-from kahanmaps.algebra.written.plain import attributes
-from kahanmaps.algebra.written.text import format_factored, format_rational_function
+from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION

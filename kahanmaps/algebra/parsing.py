@@ -1,26 +1,275 @@
-"""Expressions in text to polynomials: how they are read, what is wrong in them, and arithmetic that refuses in time.
+"""Numbers, points, polynomials and rational functions from text.
 
-Values are built from the bottom up while the text is read; no tree is kept and nothing is run as code. (Python's own
-`ast` gives up at sums of some thousand terms, and at integers of 4300 digits.) A value is a number, or a quotient of
-two polynomials. FLINT ends the process when memory runs out and does not see Ctrl-C, so the size of every result is
-bounded, and if need be refused, before FLINT is called; `Limits.words` bounds what all of them take together.
+    number      -3, 1/2, 0.1 (which is 1/10), .5, 1e-3
+    point       1/2,-1/3,0
+    expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
 
-Use `kahanmaps.algebra.written.text`.
+Text is exact: a decimal means the rational number that it spells. Values are built from the bottom up while the text is
+read; no tree is kept and nothing is run as code. (Python's own `ast` gives up at sums of some thousand terms, and at
+integers of 4300 digits.) FLINT ends the process when memory runs out and does not see Ctrl-C, so the size of every
+result is bounded by `Limits`, and if need be refused, before FLINT is called.
 """
 
 from __future__ import annotations
 
-import difflib
 import re
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar, cast
 
 from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
-from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.written.numerals import BLANKS, Limits, is_name, number_in
-from kahanmaps.errors import ExpressionError, UnknownName, quoted
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.errors import ExpressionError, InexactNumber, InputError, UnknownName, quoted
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How large a text, and what it stands for, may be. Meant to be out of the way of honest use.
+
+    The limits hold for results and for every value on the way to them. Digits are bounded before anything is computed,
+    on the high side.
+    """
+
+    number_digits: int = 1_000_000  # of one number read by parse_number or parse_point
+    power_of_ten: int = 10_000  # the e in 1e-3, in size
+    characters: int = 200_000  # of an expression
+    depth: int = 100  # of brackets
+    degree: int = 64  # total degree of a numerator or denominator
+    exponent: int = 1_000  # in size
+    digits: int = 100_000  # of a coefficient written over the common denominator of its polynomial
+    terms: int = 20_000  # of a polynomial
+    words: int = 5_000_000  # of 64 bits, of all values on the way; pairs of terms that are multiplied count too
+
+
+LIMITS = Limits()
+NO_CONSTANTS: Mapping[str, fmpq] = MappingProxyType({})
+
+BLANKS = " \t\r\n"
+_NUMBER = re.compile(r"([+-]?)(?:([0-9]+)/([0-9]+)|([0-9]+)?(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]+))?)")
+_START_OF_NUMBER = re.compile(
+    r"[+-]?(?:[0-9]+(?:/[0-9]*|\.?[0-9]*(?:[eE][+-]?[0-9]*)?)|\.(?:[0-9]+(?:[eE][+-]?[0-9]*)?)?)?"
+)
+_NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
+_EXPECTED = "expected an integer, p/q or a decimal such as 0.1"
+
+
+def is_name(text: str) -> bool:
+    """Whether `text` can name a variable: ASCII letters, digits and _, no digit first (FLINT accepts ASCII only).
+
+    >>> is_name("x1"), is_name("1x"), is_name("ε")
+    (True, False, False)
+    """
+    return isinstance(text, str) and _NAME.fullmatch(text) is not None
+
+
+def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
+    """Raise `InputError` unless `names` are distinct and all of them can name a variable, with `iterates` also x~.
+
+    >>> check_names(["x", "y", "x"])
+    Traceback (most recent call last):
+    kahanmaps.errors.InputError: found the name 'x' twice, expected distinct names
+    """
+    if isinstance(names, str):
+        raise InputError(f"found the text {quoted(names)}, expected a list of names such as ['x', 'y']")
+    seen = set()
+    for name in names:
+        if not is_name(name.rstrip("~") if iterates and isinstance(name, str) else name):
+            found = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
+            raise InputError(f"found {found}, expected a name: ASCII letters, digits and _, not starting with a digit")
+        if name in seen:
+            raise InputError(f"found the name {quoted(name)} twice, expected distinct names")
+        seen.add(name)
+
+
+def number_in(text: str, start: int, end: int, digits: int, limits: Limits) -> fmpq:
+    """The number in `text[start:end]`; mistakes are reported with their column in the whole text."""
+    while start < end and text[start] in BLANKS:
+        start += 1
+    while start < end and text[end - 1] in BLANKS:
+        end -= 1
+    if start == end:
+        raise ExpressionError(f"found nothing, {_EXPECTED}", text, start)
+    if end - start > digits + 20:
+        found = f"found a number of {end - start} characters"
+        raise ExpressionError(f"{found}, expected at most {digits} digits", text, start)
+    match = _NUMBER.fullmatch(text, start, end)
+    if match is None or not (match[2] or match[4] or match[5]):
+        prefix = _START_OF_NUMBER.match(text, start, end)
+        column = start if prefix is None else prefix.end()
+        raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
+    sign, above, below, whole, fraction, power = match.groups()
+    if max(len(above or ""), len(below or ""), len(whole or "") + len(fraction or "")) > digits:
+        raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
+    if below is not None:
+        divisor = fmpz(below)
+        if divisor == 0:
+            raise ExpressionError("found the denominator 0, expected a nonzero integer", text, match.start(3))
+        value = fmpq(fmpz(above), divisor)
+    else:
+        value = fmpq(fmpz((whole or "") + (fraction or "")))
+        shift = -len(fraction or "")
+        if power is not None:
+            # The length first: Python's int() stops at 4300 digits.
+            size = power.lstrip("+-").lstrip("0")
+            if len(size) > 9 or int(size or "0") > limits.power_of_ten:
+                found = f"found the power of ten {quoted(power)}"
+                raise ExpressionError(f"{found}, expected at most {limits.power_of_ten} in size", text, match.start(6))
+            shift += int(power)
+        if shift:
+            ten = fmpz(10) ** abs(shift)
+            value = value * ten if shift > 0 else value / ten
+    return -value if sign == "-" else value
+
+
+def require_text(text: object, what: str, hint: str) -> None:
+    """Raise `InputError` (for a float `InexactNumber`) unless `text` is a str."""
+    if not isinstance(text, str):
+        raise wrong_kind(text, f"{what} as text", hint)
+
+
+def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
+    """The error to raise for a value of another type: what it is, what was `expected`, and what to do."""
+    if isinstance(value, float):
+        return InexactNumber(f"found the machine number {value!s}, expected {expected}: {hint}")
+    return InputError(f"found a value of type {type(value).__name__}, expected {expected}: {hint}")
+
+
+def parse_number(text: str, *, limits: Limits = LIMITS) -> fmpq:
+    """The rational number that `text` spells: an integer, p/q or a finite decimal, with blanks around it.
+
+    Raises `ExpressionError` for anything else, and for numbers beyond the limits.
+
+    >>> parse_number("0.1"), parse_number(" -6/4 "), parse_number("1e-3")
+    (1/10, -3/2, 1/1000)
+    >>> parse_number("1_000")
+    Traceback (most recent call last):
+    kahanmaps.errors.ExpressionError: found '1_000', expected an integer, p/q or a decimal such as 0.1
+      1_000
+       ^
+    """
+    require_text(text, "a number", "write an integer, p/q or a decimal as text, e.g. '1/10'")
+    return number_in(text, 0, len(text), limits.number_digits, limits)
+
+
+def parse_point(text: str, dimension: int | None = None, *, limits: Limits = LIMITS) -> tuple[fmpq, ...]:
+    """The numbers in a list, with commas between them or blanks, perhaps in brackets; `dimension` of them, if given.
+
+    Raises `ExpressionError`, which names the entry (counted from 1) and its column in the whole text.
+
+    >>> parse_point("1/2, -1/3, 0"), parse_point("[1 2]")
+    ((1/2, -1/3, 0), (1, 2))
+    >>> parse_point("1,2", 3)
+    Traceback (most recent call last):
+    kahanmaps.errors.ExpressionError: found 2 numbers, expected 3, separated by commas
+    """
+    require_text(text, "a point", "write its numbers as text, separated by commas, e.g. '1/2,-1/3,0'")
+    entries = point_entries(text)
+    if not entries:
+        if dimension == 0:
+            return ()
+        raise ExpressionError("found nothing, expected a point: numbers separated by commas, e.g. 1/2,-1/3,0", text)
+    if dimension is not None and len(entries) != dimension:
+        found = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
+        raise ExpressionError(f"found {found}, expected {dimension}, separated by commas", text)
+    point = []
+    for entry, (start, end) in enumerate(entries, 1):
+        try:
+            point.append(number_in(text, start, end, limits.number_digits, limits))
+        except ExpressionError as error:
+            raise ExpressionError(f"entry {entry}: {error.message}", text, error.column) from None
+    return tuple(point)
+
+
+def point_entries(text: str) -> list[tuple[int, int]]:
+    """Where the entries of a point begin and end in its text: between commas, or blanks where there are no commas.
+
+    >>> point_entries("(1,2)"), point_entries("1 2"), point_entries("")
+    ([(1, 2), (3, 4)], [(0, 1), (2, 3)], [])
+    """
+    start, end = 0, len(text)
+    while start < end and text[start] in BLANKS:
+        start += 1
+    while start < end and text[end - 1] in BLANKS:
+        end -= 1
+    if text[start : start + 1] + text[end - 1 : end] in ("[]", "()", "{}"):
+        start, end = start + 1, end - 1
+    inside = text[start:end]
+    if not inside.strip(BLANKS):
+        return []
+    between = "," if "," in inside else r"[ \t\r\n]+"
+    if between != ",":
+        start += len(inside) - len(inside.lstrip(BLANKS))
+        inside = inside.strip(BLANKS)
+    places = [match.span() for match in re.finditer(between, inside)]
+    starts = [0, *(last for _, last in places)]
+    ends = [*(first for first, _ in places), len(inside)]
+    return [(start + first, start + last) for first, last in zip(starts, ends, strict=True)]
+
+
+def parse_polynomial(
+    text: str, variables: Sequence[str], constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS
+) -> fmpq_mpoly:
+    """The polynomial in `ring(variables)` that `text` spells; `constants` are names that stand for numbers.
+
+    A division by something that is not constant is refused, even where it would leave no remainder (`x^2/x`).
+    Raises `ExpressionError` with the column of the mistake; `InputError` for bad names or inexact constants.
+
+    >>> parse_polynomial("x^3/3 + a*x*y^2", ["x", "y"], {"a": fmpq(2, 3)})
+    1/3*x^3 + 2/3*x*y^2
+    >>> parse_polynomial("2x", ["x"])
+    Traceback (most recent call last):
+    kahanmaps.errors.ExpressionError: found 'x' right after '2', expected an operator between them: write 2*x
+      2x
+       ^
+    """
+    _check_expression(text, variables, constants)
+    work = _Arithmetic(text, ring(variables), constants, limits, quotients=False)
+    return work.polynomial(_parse(work)).value
+
+
+def parse_rational_function(
+    text: str, variables: Sequence[str], constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS
+) -> RationalFunction:
+    """The quotient of polynomials in `ring(variables)` that `text` spells; common factors stay as they are written.
+
+    Raises as `parse_polynomial` does.
+
+    >>> from kahanmaps.algebra.printing import format_rational_function
+    >>> format_rational_function(parse_rational_function("x/(y-1) + 1/(y-1)", ["x", "y"]))
+    '(x + 1)/(y - 1)'
+    """
+    _check_expression(text, variables, constants)
+    work = _Arithmetic(text, ring(variables), constants, limits, quotients=True)
+    value = _parse(work)
+    if isinstance(value, fmpq) or value.below is None or value.above.value.is_zero():
+        return RationalFunction(work.polynomial(value).value, work.one.value)
+    # Integer coefficients below, or bringing it to normal form would cost one lcm for each of them.
+    scale = value.below.scale
+    return RationalFunction(value.above.value * scale, value.below.value * scale)
+
+
+def parse_constant(text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS) -> fmpq:
+    """The number that an expression in numbers and `constants` comes to. Raises as `parse_polynomial` does.
+
+    >>> parse_constant("(1 + a)^2/3", {"a": fmpq(1, 2)})
+    3/4
+    """
+    _check_expression(text, (), constants)
+    # There are no variables, hence no quotients of polynomials.
+    return cast(fmpq, _parse(_Arithmetic(text, None, constants, limits, quotients=False)))
+
+
+def _check_expression(text: object, variables: Sequence[str], constants: Mapping[str, fmpq]) -> None:
+    require_text(text, "an expression", "write it as text, e.g. '1/10*x^2'")
+    check_names(variables, iterates=True)
+    check_names([*variables, *constants], iterates=True)
+    for name, value in constants.items():
+        if not isinstance(value, fmpq):
+            raise wrong_kind(value, f"an exact number (fmpq) as {name}", "make one with parse_number('1/10')")
+
 
 _TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*~*)|\*\*|[-+*/^()]"
@@ -68,31 +317,6 @@ class _Quotient(NamedTuple):
 
 _Value = fmpq | _Quotient
 _T = TypeVar("_T")
-
-
-def read_polynomial(text: str, ring: fmpq_mpoly_ctx, constants: Mapping[str, fmpq], limits: Limits) -> fmpq_mpoly:
-    """See `parse_polynomial`."""
-    work = _Arithmetic(text, ring, constants, limits, quotients=False)
-    return work.polynomial(_parse(work)).value
-
-
-def read_rational_function(
-    text: str, ring: fmpq_mpoly_ctx, constants: Mapping[str, fmpq], limits: Limits
-) -> RationalFunction:
-    """See `parse_rational_function`."""
-    work = _Arithmetic(text, ring, constants, limits, quotients=True)
-    value = _parse(work)
-    if isinstance(value, fmpq) or value.below is None or value.above.value.is_zero():
-        return RationalFunction(work.polynomial(value).value, ring.constant(1))
-    # Integer coefficients below, or bringing it to normal form would cost one lcm for each of them.
-    scale = value.below.scale
-    return RationalFunction(value.above.value * scale, value.below.value * scale)
-
-
-def read_constant(text: str, constants: Mapping[str, fmpq], limits: Limits) -> fmpq:
-    """See `parse_constant`."""
-    # There are no variables, hence no quotients of polynomials.
-    return cast(fmpq, _parse(_Arithmetic(text, None, constants, limits, quotients=False)))
 
 
 class Token(str):
@@ -489,7 +713,9 @@ class _Arithmetic:
         meant = ""
         if len(name) <= 40:  # the search for a look-alike is quadratic
             folded = {other.lower(): other for other in known}
-            meant = "".join(folded[other] for other in difflib.get_close_matches(name.lower(), folded, 1, 0.7))
+            from difflib import get_close_matches
+
+            meant = "".join(folded[other] for other in get_close_matches(name.lower(), folded, 1, 0.7))
             products = (f"{name[:i]}*{name[i:]}" for i in range(1, len(name)) if {name[:i], name[i:]} <= set(known))
             meant = next(products, meant)
         hint = f"did you mean {meant}? " if meant else ""

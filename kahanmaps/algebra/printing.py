@@ -1,0 +1,366 @@
+"""Exact values as text: numbers, polynomials and rational functions, in any notation, and plain data for JSON and CSV.
+
+What is printed by `format_...` parses back to the same value wherever that value lies within the limits of parsing.py.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from io import StringIO
+from math import isfinite, prod
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
+
+from kahanmaps.algebra.parsing import wrong_kind
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of, primitive_part
+
+_MOST_FACTORED = 2000  # terms of a polynomial that is printed in factors
+_ONE = fmpq(1)
+
+
+def format_number(value: fmpq) -> str:
+    """The number as `p` or `p/q` in lowest terms, of any length.
+
+    >>> format_number(fmpq(-2, 4)), format_number(fmpq(3))
+    ('-1/2', '3')
+    """
+    if not isinstance(value, fmpq):
+        raise wrong_kind(value, "an exact number (fmpq)", "make one with parse_number('1/10')")
+    return str(value)
+
+
+def format_point(point: Sequence[fmpq]) -> str:
+    """The numbers of a point, separated by commas: the inverse of `parse_point`.
+
+    >>> format_point((fmpq(1, 2), fmpq(-1, 3), fmpq(0)))
+    '1/2,-1/3,0'
+    """
+    return ",".join(format_number(entry) for entry in point)
+
+
+def format_polynomial(polynomial: fmpq_mpoly) -> str:
+    """The polynomial, its terms in the order of its ring: the inverse of `parse_polynomial`.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_polynomial(x**3/3 + fmpq(2, 3)*x*y**2 - y)
+    'x^3/3 + 2/3*x*y^2 - y'
+    """
+    if not isinstance(polynomial, fmpq_mpoly):
+        raise wrong_kind(polynomial, "a polynomial (fmpq_mpoly)", "make one with parse_polynomial")
+    names = names_of(polynomial)
+    pieces: list[str] = []
+    for monomial, coefficient in polynomial.terms():
+        if coefficient < 0:
+            pieces.append(" - " if pieces else "-")
+            coefficient = -coefficient
+        elif pieces:
+            pieces.append(" + ")
+        powers = [n if k == 1 else f"{n}^{k}" for n, k in zip(names, monomial, strict=True) if k]
+        product = "*".join(powers if coefficient.p == 1 and powers else [str(coefficient), *powers])
+        pieces.append(f"{product}/{coefficient.q}" if coefficient.p == 1 and powers and coefficient.q != 1 else product)
+    return "".join(pieces) or "0"
+
+
+def format_univariate(polynomial: fmpq_poly, name: str = "t") -> str:
+    """A polynomial in one variable as people write it.
+
+    >>> format_univariate(fmpq_poly([-2, 0, 1]))
+    't^2 - 2'
+    """
+    text = ""
+    for power in range(polynomial.degree(), -1, -1):
+        coefficient = polynomial[power]
+        if coefficient == 0:
+            continue
+        size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
+        letter = "" if power == 0 else name if power == 1 else f"{name}^{power}"
+        number = "" if size == 1 and letter else format_number(size) + ("*" if letter else "")
+        text += f" {sign} {number}{letter}" if text else f"{'-' if sign == '-' else ''}{number}{letter}"
+    return text or "0"
+
+
+def format_rational_function(function: RationalFunction) -> str:
+    """The quotient, with brackets only where they are needed: the inverse of `parse_rational_function`.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_rational_function(RationalFunction(x + 1, 2*y)), format_rational_function(RationalFunction(x, y**2))
+    ('(x/2 + 1/2)/y', 'x/y^2')
+    """
+    if not isinstance(function, RationalFunction):
+        raise wrong_kind(function, "a RationalFunction", "make one with parse_rational_function")
+    above = format_polynomial(function.numerator)
+    if function.numerator.is_zero() or function.denominator.is_one():
+        return above
+    below = format_polynomial(function.denominator)
+    if len(function.numerator) > 1:
+        above = f"({above})"
+    # A name or its power stands by itself; a/2*y would be a*y/2.
+    if any(sign in below for sign in "*+- "):
+        below = f"({below})"
+    return f"{above}/{below}"
+
+
+def format_factored(function: RationalFunction) -> str:
+    """The quotient, above and below in irreducible factors over Q where that is shorter.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_factored(RationalFunction(2*x**3*y - 2*x*y, (x - y)**2)), format_factored(RationalFunction(x + 1, 2*y))
+    ('2*x*y*(x^2 - 1)/(x - y)^2', '(x/2 + 1/2)/y')
+    """
+    found = shorter_factors(function)
+    return format_rational_function(function) if found is None else format_product(*found)
+
+
+def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
+    """Polynomials of coprime integers with exponents, and a number, that multiply to a function; None if not shorter.
+
+    Numerator and denominator are each in irreducible factors over Q, or one polynomial times variables.
+    """
+    factors, constant, is_shorter = list[tuple[fmpq_mpoly, int]](), fmpq(1), False
+    for sign, polynomial in ((1, function.numerator), (-1, function.denominator)):
+        if len(polynomial) == 0 or len(polynomial) > _MOST_FACTORED:
+            return None
+        content, whole = primitive_part(polynomial)
+        constant *= content**sign
+        powers = [(primitive_part(g)[1], int(k)) for g, k in whole.factor()[1]]
+        variables = [one for one in powers if len(one[0]) == 1]
+        rest = whole / prod(g**k for g, k in variables) if variables else whole
+        choices = [powers, [*variables, *([(rest, 1)] if len(rest) > 1 else [])]]
+        chosen = min(choices, key=lambda powers: len(format_product(powers)))
+        is_shorter |= len(chosen) > 1 or any(k > 1 for _, k in chosen)
+        factors += [(g, sign * k) for g, k in chosen]
+    return (factors, constant) if is_shorter else None
+
+
+def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _ONE) -> str:
+    """A number times powers of polynomials, short ones first, those with negative exponents below a line.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_product([(x + y, 2), (y, -1), (x - 1, -3)], fmpq(-2, 3)), format_product([(x + y, 1)])
+    ('-2*(x + y)^2/(3*y*(x - 1)^3)', 'x + y')
+    """
+    parts = []
+    for number, powers in sides(factors, constant):
+        bases = [(f"({format_polynomial(g)})" if len(g) > 1 else format_polynomial(g), k) for g, k in powers]
+        told = [base + (f"^{k}" if k > 1 else "") for base, k in bases]
+        parts.append(([str(number)] if number > 1 else []) + told)
+    above, below = ("*".join(part) for part in parts)
+    if len(factors) == 1 and factors[0][1] == 1 and constant == 1:
+        return format_polynomial(factors[0][0])
+    sign = "-" if constant < 0 else ""
+    if not below:
+        return f"{sign}{above or 1}"
+    return f"{sign}{above or 1}/({below})" if len(parts[1]) > 1 else f"{sign}{above or 1}/{below}"
+
+
+def sides(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
+    """The positive number and the powers, short ones first, of a product that stand above a line, and below it."""
+
+    def size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
+        return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
+
+    return [
+        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=size))
+        for sign, number in ((1, abs(int(constant.p))), (-1, int(constant.q)))
+    ]
+
+
+# Formulas in any notation
+
+
+def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
+    """The first terms that take about so many characters, perhaps none; exact, all if they fit.
+
+    >>> from kahanmaps.algebra.parsing import parse_polynomial
+    >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)
+    x^20 + 20*x^19*y + 190*x^18*y^2
+    """
+    kept: dict[tuple[int, ...], fmpq] = {}
+    names, left = names_of(polynomial), characters
+    for monomial, value in terms_of(polynomial):
+        # The length of a number without writing it: a coefficient of a million digits takes seconds.
+        left -= int((value.p.bit_length() + value.q.bit_length()) * 0.30103) + 3
+        left -= sum(len(name) + 2 for name, exponent in zip(names, monomial, strict=True) if exponent)
+        if left < 0:
+            break
+        kept[monomial] = value
+    return polynomial if len(kept) == len(polynomial) else polynomial.context().from_dict(kept)
+
+
+@dataclass(frozen=True)
+class Notation:
+    """How a language writes formulas: names, positive numbers and powers, and what stands around terms and factors.
+
+    `signs` are a minus before the first term, and plus and minus before others; `gap` stands between terms, `times`
+    between factors. `enclosed` puts brackets around a sum, `fraction` one text above or before another, `row` holds a
+    sum or a product together. Terms stand in the order of the ring, and in them, with `eps_first`, eps.
+    """
+
+    name: Callable[[str], str]
+    number: Callable[[fmpq], str]
+    power: Callable[[str, int], str]
+    signs: tuple[str, str, str] = ("-", "+ ", "- ")
+    gap: str = " "
+    times: str = "*"
+    fraction: Callable[[str, str], str] = "({})/({})".format
+    enclosed: Callable[[str], str] = "({})".format
+    row: Callable[[str], str] = str
+    eps_first: bool = True
+
+    def terms(self, polynomial: fmpq_mpoly) -> list[str]:
+        """The terms with their signs.
+
+        >>> from kahanmaps.algebra.parsing import parse_polynomial
+        >>> PLAIN.terms(parse_polynomial("3/2*x^2*z - y", ["x", "y", "z"]))
+        ['3/2*x^2*z', '- y']
+        """
+        names = names_of(polynomial)
+        order = sorted(range(len(names)), key=lambda k: self.eps_first and names[k] != "eps")
+        written = {k: self.name(names[k]) for k in order}
+        first, plus, minus = self.signs
+        found: list[str] = []
+        for monomial, coefficient in terms_of(polynomial):
+            powers = ((written[k], monomial[k]) for k in order if monomial[k])
+            factors = [name if exponent == 1 else self.power(name, exponent) for name, exponent in powers]
+            if not factors or abs(coefficient) != 1:  # a 1 is left out before others
+                factors.insert(0, self.number(abs(coefficient)))
+            sign = (minus if found else first) if coefficient < 0 else plus if found else ""
+            found.append(sign + self.times.join(factors))
+        return found or [self.number(fmpq(0))]
+
+    def polynomial(self, polynomial: fmpq_mpoly) -> str:
+        """A polynomial, exact."""
+        return self.row(self.gap.join(self.terms(polynomial)))
+
+    def rational(self, function: RationalFunction) -> str:
+        """A quotient of polynomials, exact, without fractions inside the fraction, in factors where they are shorter.
+
+        Both sides of a fraction start with a positive term. Common factors stay, as they do in `RationalFunction`.
+        """
+        found = shorter_factors(function)
+        if found is None:
+            is_negative, *parts = above_and_below(function)
+            above, below = map(self.polynomial, parts)
+            is_whole = parts[1].is_one()
+        else:
+            is_negative, (over, under) = found[1] < 0, sides(*found)
+            above, below, is_whole = self._product(*over), self._product(*under), under == (1, [])
+        whole = above if is_whole else self.fraction(above, below)
+        return self.row(self.signs[0] + whole) if is_negative else whole
+
+    def _product(self, number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
+        """One side of a product as one row: the number and the variables together, then sums in brackets."""
+        if number == 1 and [k for _, k in powers] == [1]:
+            return self.polynomial(powers[0][0])
+        variables = [g**k for g, k in powers if len(g) == 1]
+        parts = [self.polynomial(prod(variables[1:], start=variables[0] * number))] if variables else []
+        if not variables and (number > 1 or not powers):
+            parts = [self.number(fmpq(number))]
+        for g, k in powers:
+            if len(g) > 1:
+                base = self.enclosed(self.polynomial(g))
+                parts.append(base if k == 1 else self.power(base, k))
+        return parts[0] if len(parts) == 1 and variables else self.row(self.times.join(parts))
+
+
+PLAIN = Notation(str, str, "{}^{}".format)
+
+
+def above_and_below(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq_mpoly]:
+    """Whether it is negative, and the sides of a fraction as they are written: no fractions, first terms positive.
+
+    Polynomials have the denominator 1 and their own signs.
+    """
+    above, below = function.numerator, function.denominator
+    if function.is_polynomial or above.is_zero():
+        return False, above, above.context().constant(1)
+    factor = fmpq(common_denominator(above))
+    signs = [1 if part.coefficient(0) > 0 else -1 for part in (above, below)]
+    return signs[0] != signs[1], above * (factor * signs[0]), below * (factor * signs[1])
+
+
+def terms_of(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:
+    """Exponents and coefficients in the order of the ring, one by one: of very many only the first may be wanted."""
+    for k in range(len(polynomial)):
+        yield tuple(int(exponent) for exponent in polynomial.monomial(k)), polynomial.coefficient(k)
+
+
+# Plain data
+
+_EXACT = 2**53  # up to which every reader of JSON holds integers exactly
+
+
+def plain(value: Any) -> Any:
+    """The value as plain data: by its `to_json` where it has one; sequences as lists, larger integers as text.
+
+    >>> from flint import fmpq
+    >>> plain([fmpq(1, 2), 7, 2**61 - 1, fmpq_mat([[1, -3]]), {"eps": None}])
+    ['1/2', 7, '2305843009213693951', [['1', '-3']], {'eps': None}]
+    """
+    if value is None or isinstance(value, bool | float) or (isinstance(value, int) and abs(value) < _EXACT):
+        return value
+    if hasattr(value, "to_json"):
+        return value.to_json()
+    if isinstance(value, Mapping):
+        return {name: plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, fmpq_mat) or type(value).__module__ == "numpy":
+        return plain(value.tolist())
+    return format_polynomial(value) if isinstance(value, fmpq_mpoly) else str(value)
+
+
+def json_float(value: Any) -> float | str:
+    """A JSON number, or the text inf, -inf or nan."""
+    number = float(value)
+    return number if isfinite(number) else repr(number)
+
+
+def all_fields(value: Any) -> dict[str, Any]:
+    """All fields of a dataclass as plain data, and those of the dataclasses in it."""
+    return {one.name: _deep(getattr(value, one.name)) for one in fields(value) if one.name[0] != "_"}
+
+
+def _deep(value: Any) -> Any:
+    if is_dataclass(value) and not hasattr(value, "to_json"):
+        return all_fields(value)
+    return [_deep(entry) for entry in value] if isinstance(value, list | tuple) else plain(value)
+
+
+def attributes(value: Any, /, *names: str, **others: str) -> dict[str, Any]:
+    """Attributes of a value as plain data, by their names or, after these, by others: `whole="is_whole"`."""
+    under = {**dict(zip(names, names, strict=True)), **others}
+    return {name: plain(getattr(value, attribute)) for name, attribute in under.items()}
+
+
+# An integer, p/q or a decimal. The bound on the exponent keeps 1e999999999 from filling the memory of who reads it.
+NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)")
+# What a spreadsheet would run. An apostrophe in front makes it text; since texts that begin with apostrophes and then
+# so get one more, taking one away leads back to what was there.
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
+
+
+def guarded(text: str) -> str:
+    """The text, with an apostrophe where a spreadsheet would run it; numbers never get one.
+
+    >>> [guarded(text) for text in ("-3", "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
+    ['-3', '-1/2', "'=HYPERLINK(1)", "'-x", "''-x"]
+    """
+    return "'" + text if _FORMULA.match(text) and not NUMBER.fullmatch(text) else text
+
+
+def csv_line(cells: Iterable[str]) -> str:
+    """A line of a CSV file."""
+    # The csv module may quote only those line ends that are in its terminator: with both of them there, no cell can
+    # break a line, whatever the version of Python.
+    line = StringIO(newline="")
+    csv.writer(line, lineterminator="\r\n").writerow(cells)
+    return line.getvalue().removesuffix("\r\n") + "\n"

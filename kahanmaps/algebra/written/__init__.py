@@ -1,1 +1,0 @@
-"""Expressions, numbers and polynomials as people write them."""
