@@ -23,6 +23,7 @@ FLOORS = [
     *("algebra", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
     *("display", "languages", "plots", "reports"),
+    "internals",
 ]
 
 NEVER_IN_THE_LIBRARY = {"click", "rich", "kahanmaps_cli"}

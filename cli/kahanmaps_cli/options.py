@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
 from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import ExpressionError, InputError, quoted
-from kahanmaps_cli import library as lib
 
 if TYPE_CHECKING:
     OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import symbols_and_eps
 from kahanmaps_cli.screen.progress import Progress, say

@@ -17,8 +17,8 @@ from typing import Any, TypeVar
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import counted, quoted, suggestion
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options

@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.checks.table import CHECKS
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.params import ExactNumber

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import as_typed, say

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import counted, quoted
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Whole
 from kahanmaps_cli.runs.ensemble_starts import normal_form_for, requested_starts, starts_record
@@ -61,7 +61,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     file = opt.load_system(system, {**options, "quiet": quiet})
     integrals = lib.functions_along(file, options["integrals"], in_floats=True)
     eps = opt.eps_of(file, options)
-    number = lib.fmpq(1) if eps is None else eps
+    number = lib.rational(1) if eps is None else eps
     file.map.at(number)  # the demands on eps, in the words of orbit
     starts = requested_starts(file, options)
     normal_form = normal_form_for(file, options["method"])

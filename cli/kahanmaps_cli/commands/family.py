@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import InputError, counted, quoted
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
@@ -202,11 +202,13 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     if (system is None) == (matrix is None):
         raise click.UsageError("give a SYSTEM of kind [family], or --matrix ROWS, one of the two")
     if matrix is not None:
+        from flint import fmpq_mat
+
         rows = [list(lib.parse_point(row)) for row in matrix.split(";")]
         if len(rows) > (most := lib.MAX_DIMENSION) or any(len(row) != len(rows) for row in rows):
             shape = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
             raise InputError(f"found {shape}, expected a square matrix, at most {most} x {most}")
-        A, variables = lib.fmpq_mat(rows), None
+        A, variables = fmpq_mat(rows), None
     else:
         member = _member(system, parameters)[1]
         A, variables = member.A, member.variables
@@ -373,7 +375,7 @@ def _write(file: lib.SystemFile, output: str | None) -> None:
     lib.write_whole(output, text.encode())
 
 
-def _print_matrix(matrix: lib.fmpq_mat) -> None:
+def _print_matrix(matrix: Any) -> None:
     rows = [[formula(cell, 24) for cell in row] for row in lib.plain(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
 from kahanmaps_cli.screen.progress import Progress, say
@@ -57,7 +57,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         found = lib.lyapunov_exponents(
             file.map,
             starts,
-            lib.fmpq(1) if eps is None else eps,
+            lib.rational(1) if eps is None else eps,
             steps,
             transient=transient,
             seconds=options["seconds"],

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Arithmetic, PointText, Steps, Whole
 from kahanmaps_cli.screen.outputs import OutputFile

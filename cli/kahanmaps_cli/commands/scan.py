@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.options import output_options
 from kahanmaps_cli.params import Seconds
 from kahanmaps_cli.runs.scan_run import ending, scan_options, scanned

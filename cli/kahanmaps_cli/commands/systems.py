@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
 from kahanmaps_cli.screen.render import envelope, print_json

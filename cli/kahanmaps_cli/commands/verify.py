@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.display import markup
 from kahanmaps.display.checks import headline, witness_lines
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.screen.progress import Progress

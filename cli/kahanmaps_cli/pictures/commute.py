@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, two_variables
@@ -54,7 +54,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
     file, second = load_pair(system, other, options)
     eps = eps_of(file if second is None or file.map.has_eps else second, options)
-    eps = lib.fmpq(1) if eps is None else eps
+    eps = lib.rational(1) if eps is None else eps
     chosen = two_variables("--axes", options["axes"], file.variables)
     if second is None:
         captions, pairs = list[str](), list(lib.pairs_of_member(file))

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import InputError
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.commands.heights import require_heights, surveyed

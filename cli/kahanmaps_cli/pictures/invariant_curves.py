@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, two_variables

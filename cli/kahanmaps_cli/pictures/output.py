@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import printable
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import OptionType, PointText
 from kahanmaps_cli.screen.outputs import OutputFile, deliver

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import counted
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, window_from, window_option
@@ -82,7 +82,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     _require_sense(options)
     file = opt.load_system(options["system"], options)
     eps = opt.eps_of(file, options)
-    file.map.at(lib.fmpq(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
+    file.map.at(lib.rational(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
     notes: list[str] = []
     field = lib.field_of(file)
     starts = _starts(file, field, eps, options)

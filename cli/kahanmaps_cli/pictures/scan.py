@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.pictures.output import Drawn, picture, window_from, window_option
 from kahanmaps_cli.runs.scan_run import ending, names_of, primes_of, scan_options, scanned
 from kahanmaps_cli.screen.progress import Progress
@@ -40,7 +40,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     if window is not None and options["modulo"] is not None:
         raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
     modulo, primes = options["modulo"], primes_of(options["primes"])
-    if modulo is not None and not (modulo in primes if primes else lib.fmpz(modulo).is_prime()):
+    from flint import fmpz
+
+    if modulo is not None and not (modulo in primes if primes else fmpz(modulo).is_prime()):
         raise click.UsageError(f"found --modulo {modulo}, expected one of the primes (--primes)")
     names = names_of(options)
     if len(names) != 2:

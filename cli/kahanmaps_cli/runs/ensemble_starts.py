@@ -13,8 +13,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import ExpressionError, InputError
-from kahanmaps_cli import library as lib
 
 MAX_TEXT_BYTES = 100_000_000
 MAX_NPY_BYTES = 2_000_000_000
@@ -22,7 +22,7 @@ MAX_NUMBERS = 50_000_000  # of all starts together
 _MAGIC = b"\x93NUMPY"
 
 
-def drawn(count: int, dim: int, box: Any, seed: int) -> lib.NDArray[Any]:
+def drawn(count: int, dim: int, box: Any, seed: int) -> lib.FloatArray:
     """Starts at random: doubles from -box to box; the same ones for the same seed."""
     if count < 1:
         raise InputError(f"found --random {count}, expected at least 1 start")
@@ -39,7 +39,7 @@ def drawn(count: int, dim: int, box: Any, seed: int) -> lib.NDArray[Any]:
     return lib.starts_in_box(count, dim, size, seed)
 
 
-def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.NDArray[Any]:
+def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
     """The starts of the options: those of a file, or drawn at random, `count` of them unless the options say."""
     if options["starts"] is not None:
         return read_starts(options["starts"], file.variables)
@@ -67,7 +67,7 @@ def normal_form_for(file: lib.SystemFile, method: str | None) -> lib.SystemNorma
     return normal_form
 
 
-def read_starts(path: str, variables: Sequence[str]) -> lib.NDArray[Any]:
+def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
     """The starts in a file, or on standard input for "-": an array (n, dim) of doubles.
 
     Raises InputError with file and line of the first mistake.
@@ -96,7 +96,7 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.NDArray[Any]:
     return _from_text(text, where, variables)
 
 
-def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[Any]:
+def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArray:
     """The array of a .npy file; nothing is ever unpickled."""
     import numpy as np
 
@@ -120,7 +120,7 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[
     if rows.size > MAX_NUMBERS:
         raise InputError(f"{where}: found an array of shape {shape}, expected at most {MAX_NUMBERS} numbers")
     with np.errstate(over="ignore"):
-        starts: lib.NDArray[Any] = np.ascontiguousarray(rows, dtype=np.float64)
+        starts: lib.FloatArray = np.ascontiguousarray(rows, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if len(bad):
         found = starts[bad[0]][~np.isfinite(starts[bad[0]])][0]
@@ -128,7 +128,7 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.NDArray[
     return starts
 
 
-def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.NDArray[Any]:
+def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.FloatArray:
     """The points of text, one a line; a first line of names says in which columns the variables stand."""
     import numpy as np
 

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import quoted
-from kahanmaps_cli import library as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.progress import Progress, say
 from kahanmaps_cli.signals import interruptible

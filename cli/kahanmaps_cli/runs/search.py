@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.render import envelope, print_json
 from kahanmaps_cli.screen.terminal import formula, tell

@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from kahanmaps import internals as lib
 from kahanmaps.maps.orbits.writers import Writer, title
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.screen.terminal import columns, echo, tell
 
 _NARROWEST = 9  # a column of numbers with the middle left out

@@ -18,7 +18,7 @@ from urllib.parse import unquote
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 
 _KEY = "kahanmaps_cli.files"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli import library as lib
+from kahanmaps import internals as lib
 from kahanmaps_cli.screen.progress import say
 from kahanmaps_cli.screen.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, shorten, styled, tell
 

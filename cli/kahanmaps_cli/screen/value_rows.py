@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import KahanmapsError
-from kahanmaps_cli import library as lib
 from kahanmaps_cli.options import load_system
 from kahanmaps_cli.screen.progress import Progress, say
 from kahanmaps_cli.screen.render import print_json
