@@ -106,6 +106,7 @@ def cycle_census(
     dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
     Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
 
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)

@@ -123,6 +123,7 @@ def lyapunov_exponents(
     0, no steps and starts of a wrong shape.
     Source: benettin-1980.
 
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> oscillator = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
     >>> found = lyapunov_exponents(oscillator, [1, 0], "1/10", 100)
     >>> bool(np.abs(found.mean).max() < 1e-12), found.ended

@@ -333,6 +333,7 @@ def period(
 
     Raises InputError where it has none, with the reason.
 
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
     'aperiodic'
     """

@@ -96,6 +96,7 @@ def orbit(
     Raises:
         InputError: for wrong values, and for what the map, the method and the arithmetic do not allow together.
 
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> riccati = QuadraticSystem.from_text(["x"], ["x^2"])
     >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3)]
     [['1/5'], ['1/4'], ['1/3'], ['1/2']]
@@ -191,6 +192,7 @@ class Trajectory:
     and all points are computed and kept. `integrals` are functions of x and eps (PhaseFunction) by name, whose values
     tables and files are to have beside the points.
 
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
     >>> len(found), found[-1].x, found.rows()[0]
     (4, (1/2,), {'step': 0, 'x': '1/5'})
@@ -428,6 +430,7 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, told: Callable[[st
 
     >>> from kahanmaps.algebra.fields import RR
     >>> from kahanmaps.maps.kahan import KahanMap
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
     >>> bits_for(lambda bits: Orbit(KahanMap(system, "1/10", RR(bits)), [1, 2], 50), 15)
     128
