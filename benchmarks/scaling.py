@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.records import Outcome, Record, Task, TaskLimits
 from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running.cluster import record_on
 from kahanmaps.experiments.running.run import Batch, executor_for, plan
@@ -43,7 +43,7 @@ def costs_of_a_record(folder: Path, number: int, size: int) -> list[object]:
     costs = [(time.perf_counter() - start) / number]
     for chunk in (1, 100):
         with Store.open(folder / f"{size}-{chunk}.db", create=True) as store:
-            store.plan("scaling", f"{number} tasks", Limits(time=600.0), tasks, {})
+            store.plan("scaling", f"{number} tasks", TaskLimits(time=600.0), tasks, {})
             start = time.perf_counter()
             for first in range(0, number, chunk):
                 store.add(records[first : first + chunk])

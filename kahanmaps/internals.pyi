@@ -69,8 +69,8 @@ from .experiments.results.records import VERDICTS as VERDICTS
 from .experiments.results.records import Record as Record
 from .experiments.results.records import option_words as option_words
 from .experiments.results.records import system_words as system_words
-from .experiments.results.store import Found as Found
 from .experiments.results.store import Store as Store
+from .experiments.results.store import StoredTask as StoredTask
 from .experiments.results.summary import summarise as summarise
 from .experiments.running.local import TRIES as TRIES
 from .experiments.running.run import Batch as Batch
@@ -107,7 +107,7 @@ from .laboratory.growth.degrees import degree_growth as degree_growth
 from .laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS
 from .laboratory.growth.height_survey import HeightSurvey as HeightSurvey
 from .laboratory.growth.height_survey import height_survey as height_survey
-from .laboratory.known import Statement as Statement
+from .laboratory.known import KnownStatement as KnownStatement
 from .laboratory.laboratory import Laboratory as Laboratory
 from .laboratory.modular_points import NoPoint as NoPoint
 from .laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials as darboux_polynomials

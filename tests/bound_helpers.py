@@ -5,7 +5,7 @@ import math
 from flint import fmpq, fmpq_mpoly
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.bounds import Size
+from kahanmaps.algebra.bounds import CoefficientSize
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 
 F = FunctionField(["x", "y", "z"], 10**9)
@@ -43,7 +43,7 @@ def covers(bound, function):
     return true_size(above)[0] <= bound.above.degree and true_size(below)[0] <= bound.pole_degree
 
 
-def covers_polynomial(size: Size, polynomial: fmpq_mpoly) -> bool:
+def covers_polynomial(size: CoefficientSize, polynomial: fmpq_mpoly) -> bool:
     degree, bits = true_size(polynomial)
     return degree <= size.degree and bits <= size.bits + 1e-6
 

@@ -11,13 +11,13 @@ import pytest
 
 from kahanmaps.experiments.results import store as store_module
 from kahanmaps.experiments.results.export import write_jsonl
-from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.records import Outcome, Record, Task, TaskLimits
 from kahanmaps.experiments.results.store import Store
 
 # For hundreds of small databases: a disk that others use makes each wait to be synchronised.
 MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
 
-LIMITS = Limits(time=1.5, memory=1 << 30)
+LIMITS = TaskLimits(time=1.5, memory=1 << 30)
 
 
 def task(number: int) -> Task:

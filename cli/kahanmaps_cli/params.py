@@ -26,7 +26,7 @@ _WRITE = {"\u2212\u2013": "write the minus sign as -", ";": "the numbers of a po
 _MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
 
-class Kind(OptionType):
+class ParameterKind(OptionType):
     """What `read` makes of the text of an option, with these settings; its InputError is the message.
 
     Values that are no texts are defaults, and left alone.
@@ -118,25 +118,25 @@ def _read_shard(text: str) -> tuple[int, ...]:
     return numbers
 
 
-ExactNumber = partial(Kind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
-PointText = partial(Kind, "point", _read_point)  # such numbers separated by commas
+ExactNumber = partial(ParameterKind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
+PointText = partial(ParameterKind, "point", _read_point)  # such numbers separated by commas
 Arithmetic = partial(
-    Kind, "kind", lambda text: lib.Arithmetic.parse(text)
+    ParameterKind, "kind", lambda text: lib.Arithmetic.parse(text)
 )  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
-Seconds = partial(Kind, "seconds", _read_seconds)  # a time above 0
-Steps = partial(Kind, "n1,n2,...", _read_steps)  # step numbers separated by commas
-Shard = partial(Kind, "i/n", _read_shard)  # I/N: the I-th of N parts
-ShortInteger = partial(Kind, "integer", _read_short_integer)  # what `type=int` means in our commands
+Seconds = partial(ParameterKind, "seconds", _read_seconds)  # a time above 0
+Steps = partial(ParameterKind, "n1,n2,...", _read_steps)  # step numbers separated by commas
+Shard = partial(ParameterKind, "i/n", _read_shard)  # I/N: the I-th of N parts
+ShortInteger = partial(ParameterKind, "integer", _read_short_integer)  # what `type=int` means in our commands
 
 
-def Whole(least: int = 0) -> Kind:
+def Whole(least: int = 0) -> ParameterKind:
     """An integer that is at least `least`."""
-    return Kind("integer", _read_whole, least)
+    return ParameterKind("integer", _read_whole, least)
 
 
-def NameValue(name_is_optional: bool = False) -> Kind:
+def NameValue(name_is_optional: bool = False) -> ParameterKind:
     """NAME=VALUE; without a name the whole text is the value where `name_is_optional`."""
-    return Kind("name=value", _read_pair, name_is_optional)
+    return ParameterKind("name=value", _read_pair, name_is_optional)
 
 
 def _spelt_out(text: str) -> str:

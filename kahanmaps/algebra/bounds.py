@@ -22,7 +22,7 @@ from kahanmaps.errors import InputError
 
 
 @dataclass(frozen=True)
-class Size:
+class CoefficientSize:
     """A bound on an integer polynomial: total degree, and log2 of the sum of the absolute coefficients.
 
     That sum is submultiplicative and subadditive, so that bounds follow a computation step by step.
@@ -36,26 +36,26 @@ class Size:
     degree: int
     bits: float
 
-    def __mul__(self, other: Size) -> Size:
-        return Size(self.degree + other.degree, self.bits + other.bits)
+    def __mul__(self, other: CoefficientSize) -> CoefficientSize:
+        return CoefficientSize(self.degree + other.degree, self.bits + other.bits)
 
-    def __add__(self, other: Size) -> Size:
+    def __add__(self, other: CoefficientSize) -> CoefficientSize:
         low, high = sorted((self.bits, other.bits))
         bits = high + math.log2(1 + 2 ** (low - high)) if high - low < 200 else high + 1e-9
-        return Size(max(self.degree, other.degree), bits)
+        return CoefficientSize(max(self.degree, other.degree), bits)
 
-    def __pow__(self, exponent: int) -> Size:
-        return Size(self.degree * exponent, self.bits * exponent)
+    def __pow__(self, exponent: int) -> CoefficientSize:
+        return CoefficientSize(self.degree * exponent, self.bits * exponent)
 
-    def __or__(self, other: Size) -> Size:
+    def __or__(self, other: CoefficientSize) -> CoefficientSize:
         """A bound for either polynomial."""
-        return Size(max(self.degree, other.degree), max(self.bits, other.bits))
+        return CoefficientSize(max(self.degree, other.degree), max(self.bits, other.bits))
 
 
-ONE = Size(0, 0.0)
+ONE = CoefficientSize(0, 0.0)
 
 
-def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Size, int]:
+def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[CoefficientSize, int]:
     """What pairs of elements, or of matrices, amount to that are to be equal, all computed over `field`.
 
     Returns:
@@ -76,7 +76,7 @@ class BoundField(Field):
     characteristic = 0
 
     def __init__(self) -> None:
-        self._denominators: list[Size] = []
+        self._denominators: list[CoefficientSize] = []
         self._number_of: dict[int, tuple[Any, int]] = {}
 
     @property
@@ -89,18 +89,18 @@ class BoundField(Field):
 
     def variable(self) -> Bound:
         """A variable."""
-        return Bound(self, Size(1, 0.0), 1, {})
+        return Bound(self, CoefficientSize(1, 0.0), 1, {})
 
     def polynomial(self, degree: int, bits: float) -> Bound:
         """A polynomial with integer coefficients of this degree, the sum of their absolute values below 2^bits."""
-        return Bound(self, Size(degree, bits), 1, {})
+        return Bound(self, CoefficientSize(degree, bits), 1, {})
 
     @property
     def pole_degree(self) -> int:
         """The degree of the product of everything that must not be zero."""
         return sum(size.degree for size in self._denominators)
 
-    def denominator(self, of: Any, size: Size) -> int:
+    def denominator(self, of: Any, size: CoefficientSize) -> int:
         """The number of the denominator that belongs to the object `of`; one object has one denominator.
 
         Not so the common bound of the entries of a matrix, which stands for another one each time.
@@ -114,7 +114,7 @@ class BoundField(Field):
             self._denominators.append(size)
         return known[1]
 
-    def product(self, powers: Mapping[int, int]) -> Size:
+    def product(self, powers: Mapping[int, int]) -> CoefficientSize:
         """The size of a product of denominators."""
         total = ONE
         for number, power in powers.items():
@@ -127,12 +127,14 @@ class BoundField(Field):
                 raise InputError("found a bound of another field of bounds, whose denominators have other numbers")
             return value
         number = rational(value)
-        return Bound(self, Size(0, log2(number.p)), int(number.q), {})
+        return Bound(self, CoefficientSize(0, log2(number.p)), int(number.q), {})
 
     def convert_matrix(self, matrix: fmpq_mat) -> BoundMatrix:
         above, below = matrix.numer_denom()
         largest = max((abs(entry) for entry in above.entries()), default=fmpz(0))
-        return BoundMatrix(self, matrix.nrows(), matrix.ncols(), Bound(self, Size(0, log2(largest)), int(below), {}))
+        return BoundMatrix(
+            self, matrix.nrows(), matrix.ncols(), Bound(self, CoefficientSize(0, log2(largest)), int(below), {})
+        )
 
     def random(self, rng: random.Random, height: int = 10) -> Bound:
         return self.variable()
@@ -165,17 +167,17 @@ class Bound(Element):
 
     field: BoundField
 
-    def __init__(self, field: BoundField, above: Size, scale: int, below: Mapping[int, int]) -> None:
+    def __init__(self, field: BoundField, above: CoefficientSize, scale: int, below: Mapping[int, int]) -> None:
         self.field = field
         self.above = above
         self.scale = scale
         self.below = dict(below)
         self.is_common = False
 
-    def over(self, scale: int, below: Mapping[int, int]) -> Size:
+    def over(self, scale: int, below: Mapping[int, int]) -> CoefficientSize:
         """The numerator over a larger denominator."""
         missing = {number: power - self.below.get(number, 0) for number, power in below.items()}
-        return self.above * self.field.product(missing) * Size(0, log2(scale // self.scale))
+        return self.above * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
 
     @property
     def pole_degree(self) -> int:
@@ -195,7 +197,7 @@ class Bound(Element):
 
     def _over(self, other: Bound) -> Bound:
         number = self.field.denominator(other, other.above)
-        above = self.above * self.field.product(other.below) * Size(0, log2(other.scale))
+        above = self.above * self.field.product(other.below) * CoefficientSize(0, log2(other.scale))
         return Bound(self.field, above, self.scale, _together(self.below, {number: 1}))
 
     def _same(self, other: Bound) -> bool:
@@ -243,7 +245,7 @@ class BoundMatrix:
         if self._columns != other._rows:
             raise InputError("matrices whose sizes do not fit are multiplied")
         product = self.entry * other.entry
-        product.above *= Size(0, log2(self._columns))
+        product.above *= CoefficientSize(0, log2(self._columns))
         return BoundMatrix(self.field, self._rows, other._columns, product)
 
     def det(self) -> Bound:
@@ -256,12 +258,12 @@ class BoundMatrix:
         """Cramer's rule: with entries N/d the solution is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
         number = self.field.denominator(self, self._minor(n))
-        d = self.field.product(entry.below) * Size(0, log2(entry.scale))
-        inverse = Bound(self.field, self._minor(n - 1) * Size(0, log2(n)) * d, 1, {number: 1})
+        d = self.field.product(entry.below) * CoefficientSize(0, log2(entry.scale))
+        inverse = Bound(self.field, self._minor(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {number: 1})
         return BoundMatrix(self.field, n, right._columns, inverse * right.entry)
 
-    def _minor(self, size: int) -> Size:
-        return self.entry.above**size * Size(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
+    def _minor(self, size: int) -> CoefficientSize:
+        return self.entry.above**size * CoefficientSize(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
 
 
 def log2(value: fmpz | int) -> float:

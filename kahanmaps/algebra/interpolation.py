@@ -73,7 +73,7 @@ class Budget:
             raise Stop(f"the time is over, after {self.spent} values")
 
 
-class Values:
+class SampledValues:
     """The values modulo one prime so far, and the monomials at their points."""
 
     def __init__(self, black_box: BlackBox, prime: int, budget: Budget) -> None:
@@ -222,12 +222,12 @@ def reconstruct(
     budget = Budget(max_samples, deadline)
     primes: list[int] = []
 
-    def fresh() -> Values:
+    def fresh() -> SampledValues:
         prime = draw(rng)
         while prime in primes:
             prime = draw(rng)
         primes.append(prime)
-        return Values(black_box, prime, budget)
+        return SampledValues(black_box, prime, budget)
 
     reason = ""
     try:
@@ -245,7 +245,7 @@ def reconstruct(
 # -- modulo the first prime --------------------------------------------------------------------------------------------
 
 
-def _first_prime(values: Values, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
+def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
     """The functions modulo one prime."""
     p = values.prime
     values.take(values.anywhere(symbols, rng))
@@ -302,7 +302,7 @@ def _size(polynomial: nmod_poly) -> int:
 
 
 def _along_line(
-    values: Values, anchor: Point, direction: Point, max_degree: int, rng: random.Random
+    values: SampledValues, anchor: Point, direction: Point, max_degree: int, rng: random.Random
 ) -> list[tuple[nmod_poly, nmod_poly]]:
     """All entries as fractions (N, D) of polynomials in t at the points anchor + t direction; D is monic.
 
@@ -385,7 +385,7 @@ def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, S
 
 
 def fit(
-    values: Values,
+    values: SampledValues,
     shapes: dict[int, Shape],
     pairs: list[tuple[list[int], list[int]]],
     symbols: int,
@@ -418,7 +418,7 @@ def fit(
 
 
 def _solve(
-    values: Values,
+    values: SampledValues,
     usable: list[int],
     shapes: dict[int, Shape],
     members: list[int],
@@ -478,7 +478,11 @@ def _solve(
 
 
 def _lift(
-    first: list[Quotient], fresh: Callable[[], Values], names: tuple[str, ...], primes: list[int], rng: random.Random
+    first: list[Quotient],
+    fresh: Callable[[], SampledValues],
+    names: tuple[str, ...],
+    primes: list[int],
+    rng: random.Random,
 ) -> tuple[RationalFunction, ...]:
     """The functions over Q. Raises Unlucky where values modulo other primes do not fit."""
     modulus = primes[-1]
@@ -535,8 +539,8 @@ def _recognised(
 
 
 def _refuting(
-    functions: tuple[RationalFunction, ...], fresh: Callable[[], Values], rng: random.Random
-) -> Values | None:
+    functions: tuple[RationalFunction, ...], fresh: Callable[[], SampledValues], rng: random.Random
+) -> SampledValues | None:
     """The black box modulo a prime where the functions do not give its value, if one of some fresh primes is such."""
     for _ in range(_CONFIRMATIONS):
         values = fresh()

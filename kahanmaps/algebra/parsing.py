@@ -26,7 +26,7 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, Unknown
 
 
 @dataclass(frozen=True)
-class Limits:
+class ExpressionLimits:
     """How large a text, and what it stands for, may be. Meant to be out of the way of honest use.
 
     The limits hold for results and for every value on the way to them. Digits are bounded before anything is computed,
@@ -44,7 +44,7 @@ class Limits:
     words: int = 5_000_000  # of 64 bits, of all values on the way; pairs of terms that are multiplied count too
 
 
-LIMITS = Limits()
+LIMITS = ExpressionLimits()
 NO_CONSTANTS: Mapping[str, fmpq] = MappingProxyType({})
 
 BLANKS = " \t\r\n"
@@ -84,7 +84,7 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
         seen.add(name)
 
 
-def number_in(text: str, start: int, end: int, digits: int, limits: Limits) -> fmpq:
+def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLimits) -> fmpq:
     """The number in `text[start:end]`; mistakes are reported with their column in the whole text."""
     while start < end and text[start] in BLANKS:
         start += 1
@@ -137,7 +137,7 @@ def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
     return InputError(f"found a value of type {type(value).__name__}, expected {expected}: {hint}")
 
 
-def parse_number(text: str, *, limits: Limits = LIMITS) -> fmpq:
+def parse_number(text: str, *, limits: ExpressionLimits = LIMITS) -> fmpq:
     """The rational number that `text` spells: an integer, p/q or a finite decimal, with blanks around it.
 
     Raises `ExpressionError` for anything else, and for numbers beyond the limits.
@@ -154,7 +154,7 @@ def parse_number(text: str, *, limits: Limits = LIMITS) -> fmpq:
     return number_in(text, 0, len(text), limits.number_digits, limits)
 
 
-def parse_point(text: str, dimension: int | None = None, *, limits: Limits = LIMITS) -> tuple[fmpq, ...]:
+def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLimits = LIMITS) -> tuple[fmpq, ...]:
     """The numbers in a list, with commas between them or blanks, perhaps in brackets; `dimension` of them, if given.
 
     Raises `ExpressionError`, which names the entry (counted from 1) and its column in the whole text.
@@ -210,7 +210,11 @@ def point_entries(text: str) -> list[tuple[int, int]]:
 
 
 def parse_polynomial(
-    text: str, variables: Sequence[str], constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS
+    text: str,
+    variables: Sequence[str],
+    constants: Mapping[str, fmpq] = NO_CONSTANTS,
+    *,
+    limits: ExpressionLimits = LIMITS,
 ) -> fmpq_mpoly:
     """The polynomial in `ring(variables)` that `text` spells; `constants` are names that stand for numbers.
 
@@ -231,7 +235,11 @@ def parse_polynomial(
 
 
 def parse_rational_function(
-    text: str, variables: Sequence[str], constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS
+    text: str,
+    variables: Sequence[str],
+    constants: Mapping[str, fmpq] = NO_CONSTANTS,
+    *,
+    limits: ExpressionLimits = LIMITS,
 ) -> RationalFunction:
     """The quotient of polynomials in `ring(variables)` that `text` spells; common factors stay as they are written.
 
@@ -251,7 +259,9 @@ def parse_rational_function(
     return RationalFunction(value.above.value * scale, value.below.value * scale)
 
 
-def parse_constant(text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS) -> fmpq:
+def parse_constant(
+    text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: ExpressionLimits = LIMITS
+) -> fmpq:
     """The number that an expression in numbers and `constants` comes to. Raises as `parse_polynomial` does.
 
     >>> parse_constant("(1 + a)^2/3", {"a": fmpq(1, 2)})
@@ -420,7 +430,7 @@ class _Reader:
         return self.work.number(token) if token.kind == "number" else self.work.name(token)
 
 
-def _check_shape(text: str, limits: Limits) -> None:
+def _check_shape(text: str, limits: ExpressionLimits) -> None:
     """Length and brackets, before anything else looks at the text."""
     if len(text) > limits.characters:
         raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
@@ -469,7 +479,12 @@ class _Arithmetic:
     """
 
     def __init__(
-        self, text: str, ring: fmpq_mpoly_ctx | None, constants: Mapping[str, fmpq], limits: Limits, quotients: bool
+        self,
+        text: str,
+        ring: fmpq_mpoly_ctx | None,
+        constants: Mapping[str, fmpq],
+        limits: ExpressionLimits,
+        quotients: bool,
     ) -> None:
         self.text = text
         self.ring = ring

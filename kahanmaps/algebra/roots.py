@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import flint
 from flint import arb, fmpq, fmpq_mpoly, fmpq_poly, fmpz, nmod_poly
 
-from kahanmaps.algebra.bounds import Bound, BoundField, Size, log2
+from kahanmaps.algebra.bounds import Bound, BoundField, CoefficientSize, log2
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, ComplexBallField, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
@@ -85,7 +85,7 @@ class Root:
             # For all conjugates: the root is b/q for a b that is integral, and of Cauchy's size at most.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
-            return Bound(field, Size(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
+            return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
         if isinstance(field, FunctionField) and field.modulus is not None:
             return field.variables[-1]
         raise InputError(f"a {self} is no element of {field}")

@@ -29,7 +29,7 @@ MAX_QUOTIENT = 130  # dimension of the quotient ring, so the number of solutions
 
 
 @dataclass(frozen=True)
-class Component:
+class SolutionComponent:
     """Solutions: `values` are the variables as polynomials of degree at most 1 in those that stay free.
 
     `equations` hold for the free variables (none: a linear family, or one point where nothing is free).
@@ -57,7 +57,7 @@ class Component:
         """The direction of the family that belongs to its free variable i."""
         return [v.derivative(i).leading_coefficient() if v.degrees()[i] else fmpq(0) for v in self.values]
 
-    def contains(self, other: Component) -> bool:
+    def contains(self, other: SolutionComponent) -> bool:
         """Whether the linear family `other`, or the point, lies in this linear family."""
         size = len(self.values)
         slopes = [self.slopes(i) for i in self.free]
@@ -75,11 +75,11 @@ class Solutions:
     `conjugate` are the parts that have no rational point, in the order of `irrational`, which tells of them in words.
     """
 
-    components: list[Component] = field(default_factory=list)
-    unsolved: list[Component] = field(default_factory=list)
-    conjugate: list[Component] = field(default_factory=list)
+    components: list[SolutionComponent] = field(default_factory=list)
+    unsolved: list[SolutionComponent] = field(default_factory=list)
+    conjugate: list[SolutionComponent] = field(default_factory=list)
     irrational: list[str] = field(default_factory=list)
-    without_basis: list[Component] = field(default_factory=list)  # of the unsolved, those with too large a one
+    without_basis: list[SolutionComponent] = field(default_factory=list)  # of the unsolved, those with too large a one
     reason: str = ""  # why something is unsolved
 
     @property
@@ -218,7 +218,7 @@ class _Solver:
         if any(p.is_constant() for p in equations):
             return
         if not equations:
-            self.found.components.append(Component(values))
+            self.found.components.append(SolutionComponent(values))
             return
         if time.monotonic() > self.deadline:
             self.stopped = "the time is over"
@@ -252,7 +252,7 @@ class _Solver:
         basis = groebner(equations)
         if basis is None:
             self._give_up(equations, values, "a Groebner basis would be too large")
-            self.found.without_basis.append(Component(values, tuple(equations)))
+            self.found.without_basis.append(SolutionComponent(values, tuple(equations)))
             return
         self.solve(basis, values, based=True)
 
@@ -286,10 +286,10 @@ class _Solver:
 
     def _no_rational_point(self, text: str, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
         self.found.irrational.append(text)
-        self.found.conjugate.append(Component(values, tuple(equations)))
+        self.found.conjugate.append(SolutionComponent(values, tuple(equations)))
 
     def _give_up(self, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], reason: str) -> None:
-        part = Component(values, tuple(equations))
+        part = SolutionComponent(values, tuple(equations))
         if part not in self.found.unsolved:
             self.found.unsolved.append(part)
         self.found.reason = reason
@@ -343,10 +343,10 @@ def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list
     return found
 
 
-def without_contained(components: Sequence[Component]) -> list[Component]:
+def without_contained(components: Sequence[SolutionComponent]) -> list[SolutionComponent]:
     """Each solution once: no component twice, and none inside a larger one."""
     ordered = sorted(components, key=lambda c: -len(c.free))
-    kept: list[Component] = []
+    kept: list[SolutionComponent] = []
     for component in ordered:
         if not any(larger.contains(component) for larger in kept):
             kept.append(component)

@@ -25,7 +25,7 @@ from typing import Any, Protocol
 
 from flint import fmpq
 
-from kahanmaps.algebra.bounds import BoundField, Size, bound_of
+from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
 from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.algebra.roots import Root
@@ -70,7 +70,7 @@ class Identity:
         return seed_for(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
 
     @cached_property
-    def bound(self) -> tuple[Size, int]:
+    def bound(self) -> tuple[CoefficientSize, int]:
         """Bounds for the polynomials that vanish where the sides are equal, and the degree of what must not be zero.
 
         They come from the two sides themselves, computed with bounds in the place of numbers.
@@ -79,7 +79,7 @@ class Identity:
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
         # Without values no bound: such an identity is never supported, whatever it does over GF(p).
-        return (Size(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
+        return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
         """Both sides, None where they are not defined."""
@@ -173,7 +173,7 @@ class Statement(Protocol):
     def no_value(self) -> str: ...
 
     @property
-    def bound(self) -> tuple[Size, int]: ...
+    def bound(self) -> tuple[CoefficientSize, int]: ...
 
     @property
     def conjugates(self) -> int: ...
@@ -237,7 +237,7 @@ def _undecided(text: str, **data: Any) -> Decision:
     return Decision(Verdict.UNDECIDED, Evidence(METHOD, text, data))
 
 
-def log2_error(equation: Size, poles: int, conjugates: int = 1) -> float:
+def log2_error(equation: CoefficientSize, poles: int, conjugates: int = 1) -> float:
     """log2 of the probability that a random point over GF(p) passes although the polynomial equation is false.
 
     `poles` is the degree of the product of all denominators. Coefficients may lie in a number field of degree at most

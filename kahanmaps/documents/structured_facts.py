@@ -36,7 +36,7 @@ _UP_TO = re.compile(r"degree <= ([0-9]{1,3})")
 _RELATION_KEYS = ("monomials", "dimension")
 
 
-class Relations(NamedTuple):
+class ClaimedRelations(NamedTuple):
     """A Hirota-Kimura basis: along a generic orbit `dimension` independent combinations of `functions` vanish.
 
     `text` is how the file writes the functions; they are polynomials over Q in the variables of the system.
@@ -47,7 +47,7 @@ class Relations(NamedTuple):
     dimension: int
 
 
-def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Relations, ...]:
+def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[ClaimedRelations, ...]:
     """The relations of a [catalog] section, their functions as exact polynomials in `variables`.
 
     `section` is `SystemFile.catalog`. Empty where the section has none. Raises InputError for functions that cannot be
@@ -58,7 +58,7 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Rel
     ((1, x, y), 1)
     """
     return tuple(
-        Relations(
+        ClaimedRelations(
             given if isinstance(given := table["monomials"], str) else ", ".join(given),
             relation_functions(given, variables),
             table["dimension"],

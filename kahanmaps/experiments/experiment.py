@@ -15,14 +15,14 @@ from typing import Any
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, show, suggestion
-from kahanmaps.experiments.grid import Grid, RationalRange, Values, has_repeats, read_values
+from kahanmaps.experiments.grid import AxisValues, Grid, RationalRange, has_repeats, read_values
 from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, read_memory, read_time
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
 from kahanmaps.experiments.results.recipes import ENDINGS, family_recipe, find_file, recipe_of
-from kahanmaps.experiments.results.records import Limits, Task, canonical
+from kahanmaps.experiments.results.records import Task, TaskLimits, canonical
 
 PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system
-DEFAULT_LIMITS = Limits(time=3600.0, memory=4 * 10**9)
+DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY_WORD = "family"
@@ -161,7 +161,7 @@ class Experiment:
     recipes: Sequence[Mapping[str, Any]]
     fixed: Mapping[str, Any]
     grid: Grid
-    limits: Limits
+    limits: TaskLimits
     skipped: Sequence[tuple[str, str]] = ()  # systems that cannot be used, and why
 
     @property
@@ -182,7 +182,7 @@ class Experiment:
         """
         axes: dict[str, Any] = {}
         for name, values in self.grid.axes.items():
-            if not isinstance(values, Values):
+            if not isinstance(values, AxisValues):
                 axes[name] = list(values)
                 continue
             read, axes[name] = values.option.read, []
@@ -291,9 +291,9 @@ class ExperimentReader:
         """The options that the spec gives, right or wrong, and where."""
         return {name: place for part in ("axes", "options") for name, place, _ in self.entries(part)}
 
-    def _read_values(self, kind: TaskKind, part: str) -> dict[str, Values]:
+    def _read_values(self, kind: TaskKind, part: str) -> dict[str, AxisValues]:
         """The values in one of the tables, by canonical name; what is wrong is told and left out."""
-        found: dict[str, Values] = {}
+        found: dict[str, AxisValues] = {}
         for name, place, raw in self.entries(part):
             with self._at(place):
                 if name == "parameters" and self.has_parameters:
@@ -327,14 +327,14 @@ class ExperimentReader:
         expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
 
-    def _read_one(self, place: str, option: Option, raw: Any) -> Values | None:
+    def _read_one(self, place: str, option: Option, raw: Any) -> AxisValues | None:
         """The values of one option; None where what is wrong is told already."""
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
                 raise InputError(f"found {show(raw)}, expected a file, a name of the catalogue, or a list of these")
             recipes = self._read_files(place, references)
-            return Values(option, [recipes]) if recipes else None
+            return AxisValues(option, [recipes]) if recipes else None
         if place.endswith(f".{TIME_STEP}"):
             read_eps = option.read  # of half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
@@ -353,7 +353,7 @@ class ExperimentReader:
             zips.append(["eps" if name == TIME_STEP else name for name in written] if sound else None)
         return zips
 
-    def _read_zips(self, axes: Mapping[str, Values]) -> list[tuple[str, ...]]:
+    def _read_zips(self, axes: Mapping[str, AxisValues]) -> list[tuple[str, ...]]:
         zips: list[tuple[str, ...]] = []
         before: set[str] = set()
         given = {name for name, _, _ in self.entries("axes")}
@@ -388,7 +388,7 @@ class ExperimentReader:
                             break
         return zips
 
-    def _read_limits(self, kind: TaskKind, fixed: dict[str, Values]) -> Limits:
+    def _read_limits(self, kind: TaskKind, fixed: dict[str, AxisValues]) -> TaskLimits:
         own = self.sound("limits") or {}
         time, memory, digits = (
             self.sound("limits", name) or self.spec.sound("limits", name) for name in ("time", "memory", "digits")
@@ -403,8 +403,8 @@ class ExperimentReader:
             if "digits" in own:
                 self.mistake("limits.digits", f"found {place} as well, expected one of the two")
         elif digits is not None:
-            fixed["max_digits"] = Values(VOCABULARY["max_digits"], [(digits,)])
-        return Limits(
+            fixed["max_digits"] = AxisValues(VOCABULARY["max_digits"], [(digits,)])
+        return TaskLimits(
             DEFAULT_LIMITS.time if time is None else read_time(time),
             DEFAULT_LIMITS.memory if memory is None else read_memory(memory),
         )

@@ -67,7 +67,7 @@ class RationalRange(Sequence[fmpq]):
         return fmpq(self.numerators[index], self._scale)
 
 
-class Values(Sequence[Any]):
+class AxisValues(Sequence[Any]):
     """The canonical values of an option, in pieces: single values and ranges."""
 
     def __init__(self, option: Option, pieces: Sequence[Sequence[Any]]) -> None:
@@ -92,7 +92,7 @@ def is_range(raw: Any) -> bool:
     return isinstance(raw, str) and ".." in raw
 
 
-def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[Values | None, list[Mistake]]:
+def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisValues | None, list[Mistake]]:
     """The values that a spec gives to an option, and the mistakes with their places (from 1) in a list.
 
     `raw` is one value, a range or a list of both. With `repeats` a single value may be there several times.
@@ -109,7 +109,7 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[Values
             if option.numbers and is_range(item):
                 found = RationalRange.from_text(item)
                 # Between the ends nothing can go wrong that does not go wrong there, but for eps = 0 and fractions.
-                values = Values(option, [found])
+                values = AxisValues(option, [found])
                 zero = found.numerators.index(0) if 0 in found.numerators else 0
                 for k in {0, min(1, len(found) - 1), len(found) - 1, zero}:
                     values[k]
@@ -124,10 +124,10 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[Values
             mistakes.append((place, str(error)))
     if not mistakes and sum(map(len, pieces)) > _MOST:
         mistakes.append(((), f"found {_TOO_MANY}"))
-    return (None if mistakes else Values(option, pieces)), mistakes
+    return (None if mistakes else AxisValues(option, pieces)), mistakes
 
 
-def has_repeats(values: Values) -> bool:
+def has_repeats(values: AxisValues) -> bool:
     """Whether a single value is there several times: those of ranges are not looked at."""
     single = [repr(piece[0]) for piece in values.pieces if not isinstance(piece, RationalRange)]
     return len(set(single)) < len(single)

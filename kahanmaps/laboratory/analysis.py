@@ -26,7 +26,7 @@ from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.known import Known, Statement
+from kahanmaps.laboratory.known import Known, KnownStatement
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
@@ -60,12 +60,12 @@ class Analysis(Findings, Printed):
         return conclude(self)
 
     @property
-    def sections(self) -> list[tuple[str, list[Statement]]]:
+    def sections(self) -> list[tuple[str, list[KnownStatement]]]:
         """The report: titles and their statements, those that have some."""
         return self._sections(self._titled)
 
     @property
-    def final_sections(self) -> list[tuple[str, list[Statement]]]:
+    def final_sections(self) -> list[tuple[str, list[KnownStatement]]]:
         """The first of them, up to the one that is not complete yet."""
         waiting = (k for k, part in enumerate(self._titled) if {part.name, *part.reads}.intersection(self.pending))
         return self._sections(self._titled[: next(waiting, None)])
@@ -76,9 +76,9 @@ class Analysis(Findings, Printed):
         titled = [part for part in self.parts if part.statements is not None]
         return sorted(titled, key=lambda part: TITLES.index(part.title) if part.title in TITLES else len(TITLES))
 
-    def _sections(self, parts: Sequence[Part]) -> list[tuple[str, list[Statement]]]:
+    def _sections(self, parts: Sequence[Part]) -> list[tuple[str, list[KnownStatement]]]:
         told = [(part.title, list(part.statements(self))) for part in parts if part.statements is not None]
-        skipped = [] if self.pending else [Statement(Known.NOTE, text) for text in self.skipped]
+        skipped = [] if self.pending else [KnownStatement(Known.NOTE, text) for text in self.skipped]
         return [(title, lines) for title, lines in (*told, ("not done", skipped)) if lines]
 
     def rows(self) -> list[dict[str, str]]:

@@ -22,7 +22,7 @@ class Known(StrEnum):
 
 
 @dataclass(frozen=True)
-class Statement:
+class KnownStatement:
     """One line of a report and how it is known."""
 
     status: Known

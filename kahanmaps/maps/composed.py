@@ -28,7 +28,7 @@ _TRIES = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class MapFactor:
     """A map of a composition, or its inverse; `values` are those of its symbols, functions of the composition's."""
 
     map: BirationalMap
@@ -61,7 +61,7 @@ class ComposedMap(BirationalMap):
 
     title = "composition"
 
-    def __init__(self, variables: tuple[str, ...], parts: Sequence[Part], symbols: tuple[str, ...]) -> None:
+    def __init__(self, variables: tuple[str, ...], parts: Sequence[MapFactor], symbols: tuple[str, ...]) -> None:
         self.variables, self.parts, self._symbols = variables, tuple(parts), symbols
         self._last: tuple[Field, Any, ComposedMapOver] | None = None
 
@@ -205,7 +205,7 @@ def composed_map(
         symbols = tuple(dict.fromkeys(name for one, _ in powers for name in one.symbols))
     context = ring(symbols)
     own = {name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)}
-    given_parts: list[Part] = []
+    given_parts: list[MapFactor] = []
     for k, (one, power) in enumerate(powers):
         known = own | dict(values[k]) if values else own
         missing = next((name for name in one.symbols if name not in known), None)
@@ -213,10 +213,10 @@ def composed_map(
             raise InputError(
                 f"found a map with the symbol {missing}, expected its value, or a composition with that symbol"
             )
-        given_parts += [Part(one, power < 0, tuple(known[name] for name in one.symbols))] * abs(power)
+        given_parts += [MapFactor(one, power < 0, tuple(known[name] for name in one.symbols))] * abs(power)
     if not given_parts:
         raise InputError("found no map to compose, expected at least one")
-    parts: list[Part] = []  # without those that their neighbours undo
+    parts: list[MapFactor] = []  # without those that their neighbours undo
     for part in given_parts:
         if parts and parts[-1].is_inverse != part.is_inverse and parts[-1].map_and_values == part.map_and_values:
             parts.pop()
@@ -239,9 +239,9 @@ def composed_map(
     return ComposedMap(tuple(variables), parts, tuple(symbols))
 
 
-def _reversed(parts: Sequence[Part]) -> list[Part]:
+def _reversed(parts: Sequence[MapFactor]) -> list[MapFactor]:
     """The inverses in the opposite order."""
-    return [Part(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
+    return [MapFactor(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
 
 
 def is_involution(map_: BirationalMap) -> bool:
@@ -262,7 +262,7 @@ def is_involution(map_: BirationalMap) -> bool:
     return False
 
 
-def _formulas(names: Sequence[str], parts: Sequence[Part]) -> list[RationalFunction] | None:
+def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
     """The coordinates of the image of (x_1, ..., x_n) as functions of the names, eps last, in lowest terms.
 
     None where they take too many products of terms.
@@ -279,7 +279,7 @@ def _formulas(names: Sequence[str], parts: Sequence[Part]) -> list[RationalFunct
     return [RationalFunction(entry.above, entry.below) for entry in point]
 
 
-def _too_large(parts: Sequence[Part]) -> str:
+def _too_large(parts: Sequence[MapFactor]) -> str:
     return (
         f"found a composition of {counted(len(parts), 'map')} whose formulas are too large to be multiplied out, "
         "expected a shorter one: what is asked for is about formulas"

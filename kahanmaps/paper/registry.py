@@ -41,7 +41,7 @@ SECTIONS: dict[int, tuple[str, str]] = {
 }
 
 
-class Kind(StrEnum):
+class ClaimKind(StrEnum):
     """What a claim asserts of its pairs."""
 
     EQUAL = "equal"  # both sides are equal, everywhere
@@ -67,7 +67,7 @@ class Claim:
     formula: str
     function: ClaimFunction
     breaks: tuple[str, ...]
-    kind: Kind = Kind.EQUAL
+    kind: ClaimKind = ClaimKind.EQUAL
     at_most: str = ""  # of a rank that is attained: why it cannot be larger
     least_m: int = 1
     only_m: int | None = None
@@ -152,7 +152,7 @@ def same(K: Field, left: Any, right: Any) -> bool:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ClaimOutcome:
     """What a claim came to on certain objects: how many pairs, and the first that is not as claimed."""
 
     objects: PaperObjects
@@ -164,18 +164,18 @@ class Outcome:
         return self.failure is None
 
 
-def evaluate(claim: Claim, o: PaperObjects) -> Outcome:
+def evaluate(claim: Claim, o: PaperObjects) -> ClaimOutcome:
     """Run a claim. May raise SingularStep and the like where something is not defined."""
     pairs = 0
     with o.K.working():
         for left, right in claim.function(o):
             pairs += 1
-            if same(o.K, left, right) != (claim.kind is not Kind.DIFFERENT):
-                return Outcome(o, pairs, (left, right))
-    return Outcome(o, pairs, None)
+            if same(o.K, left, right) != (claim.kind is not ClaimKind.DIFFERENT):
+                return ClaimOutcome(o, pairs, (left, right))
+    return ClaimOutcome(o, pairs, None)
 
 
-def witness_of(outcome: Outcome) -> Witness | None:
+def witness_of(outcome: ClaimOutcome) -> Witness | None:
     """The point at which a claim failed, with both sides; of matrices the first entry that differs."""
     if outcome.failure is None:
         return None

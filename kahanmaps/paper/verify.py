@@ -28,7 +28,7 @@ from typing import Any, cast
 
 from flint import fmpq_poly
 
-from kahanmaps.algebra.bounds import BoundField, Size, bound_of
+from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.functions import BudgetExceeded
@@ -52,8 +52,8 @@ from kahanmaps.paper.registry import (
     SECTIONS,
     UNDEFINED,
     Claim,
-    Kind,
-    Outcome,
+    ClaimKind,
+    ClaimOutcome,
     claims,
     entries,
     evaluate,
@@ -280,7 +280,7 @@ class Verifier:
         if self.member is None or self.member.is_generic:
             return None
         bounds = self.bounds()
-        if not claim.distinct_roots and claim.kind in (Kind.EQUAL, Kind.DIFFERENT):
+        if not claim.distinct_roots and claim.kind in (ClaimKind.EQUAL, ClaimKind.DIFFERENT):
             pairs = sum(1 for _ in claim.function(bounds))
             if not pairs:
                 return "there is no associated system but f itself: chi is a power of one irreducible polynomial"
@@ -316,7 +316,7 @@ class Verifier:
         reason = self.outside(claim)
         if reason is not None:
             return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", reason))
-        if claim.kind is not Kind.EQUAL:
+        if claim.kind is not ClaimKind.EQUAL:
             return self._verify_existence(claim)
         statement = ClaimAtPoints(self, claim)
         decision = decide(statement, self.settings.seed, self.settings.error_bits)
@@ -362,11 +362,11 @@ class Verifier:
             if outcome.holds and outcome.pairs:
                 where = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
                 method = "exact rational point" if objects.K is QQ else "point over GF(p)"
-                text = f"{'both sides differ' if claim.kind is Kind.DIFFERENT else 'attained'} at {where}"
-                if claim.kind is Kind.ATTAINED and claim.at_most:
+                text = f"{'both sides differ' if claim.kind is ClaimKind.DIFFERENT else 'attained'} at {where}"
+                if claim.kind is ClaimKind.ATTAINED and claim.at_most:
                     text += f", and it cannot be larger: {claim.at_most}"
                 # Modulo p a rank may be smaller and an equation hold that does not hold over Q, but not conversely.
-                is_proof = claim.kind is Kind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
+                is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
                 verdict = Verdict.PROVED if is_proof else Verdict.SUPPORTED
                 return self._finding(claim, verdict, Evidence(method, text, {"points": tried}))
             if tried >= _POINTS:
@@ -374,7 +374,7 @@ class Verifier:
         if outcome is None or not outcome.pairs:
             text = f"the claim is not defined at any of {_MAX_UNDEFINED} random points"
             return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
-        text = "both sides agree" if claim.kind is Kind.DIFFERENT else "not attained"
+        text = "both sides agree" if claim.kind is ClaimKind.DIFFERENT else "not attained"
         if claim.in_general:
             special = f"stated in general; for this member {text} at {tried} random points: {self.what_is_special()}"
             evidence = Evidence("special member", special, {"points": tried})
@@ -382,7 +382,7 @@ class Verifier:
         evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
         return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
 
-    def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
+    def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
         """A proof, if there is one."""
         blocks, order = claim.blocks_for_proof(self.m), self.options.order
         if self.member is None:
@@ -491,14 +491,14 @@ class Verifier:
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
         return [finding for finding in found if finding.is_as_expected] or found
 
-    def _broken(self, claim: Claim, name: str) -> Outcome | None:
+    def _broken(self, claim: Claim, name: str) -> ClaimOutcome | None:
         """The claim on input broken by a control, at a point at which it fails; else the last outcome.
 
         One point refutes an equation, a rational one unless m is large; that something differs, exists or has a certain
         rank is refuted where several points in a row do not show it. Over Q ranks and steps of broken maps, where
         nothing cancels, take minutes from m = 5 on.
         """
-        at_one = claim.kind is Kind.EQUAL
+        at_one = claim.kind is ClaimKind.EQUAL
         needed = 1 if at_one else _POINTS
         finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
         outcome, failed = None, 0
@@ -513,7 +513,7 @@ class Verifier:
                     except (*UNDEFINED, LookupError):
                         continue
                     if outcome.holds:
-                        if claim.kind is not Kind.EQUAL:
+                        if claim.kind is not ClaimKind.EQUAL:
                             return outcome
                         continue
                     failed += 1

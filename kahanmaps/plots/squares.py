@@ -29,7 +29,7 @@ Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j], None where a map has n
 
 
 @dataclass(frozen=True)
-class Pair:
+class MapPair:
     """Two maps that are compared, systems standing for theirs; the second is scaled where it has another step.
 
     `names` are short texts, `note` says how variables are matched, where that needs a word.
@@ -48,7 +48,7 @@ class Squares:
     `stopped` says in a sentence why points are missing, empty where none is.
     """
 
-    pair: Pair
+    pair: MapPair
     g_after_f: Lattice
     f_after_g: Lattice
     stopped: str
@@ -86,7 +86,7 @@ class Squares:
 
 
 def squares(
-    pair: Pair, start: Sequence[Any], eps: Any, steps: int = 1, progress: Callable[[str], None] = lambda _: None
+    pair: MapPair, start: Sequence[Any], eps: Any, steps: int = 1, progress: Callable[[str], None] = lambda _: None
 ) -> Squares:
     """Walk `steps` steps of each map from an exact start in both orders; eps is exact, the time step is 2 eps.
 
@@ -129,7 +129,7 @@ def squares(
     return Squares(pair, g_after_f, f_after_g, missing[0] if missing else "")
 
 
-def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
+def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
     """The maps of a member that are drawn: two associated ones, and the control J grad H_0 and J grad H_1.
 
     The first is the system itself, the second has the other sign at the last factor of chi. Where m = 1 the control is
@@ -148,15 +148,15 @@ def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
     J = standard_structure(member.dim)
     first = member.chosen
     second = member.associate((*member.signs[:-1], -member.signs[-1]))
-    associated = Pair(first.system, second.system, (f"f_{first.label}", f"f_{second.label}"))
+    associated = MapPair(first.system, second.system, (f"f_{first.label}", f"f_{second.label}"))
     f = CubicHamiltonian(member.chain[0], J).system
     if member.m == 1:
-        return associated, Pair(f, f.scaled(2), ("f", "2 f"))
+        return associated, MapPair(f, f.scaled(2), ("f", "2 f"))
     g = CubicHamiltonian(member.chain[1], J).system
-    return associated, Pair(f, g, ("J grad H_0", "J grad H_1"))
+    return associated, MapPair(f, g, ("J grad H_0", "J grad H_1"))
 
 
-def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> Pair:
+def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
     """Two systems of one dimension; with `eps2` the second has this step: it is scaled by eps2/eps."""
     g: QuadraticSystem | BirationalMap
     g, note = matched(file, other)
@@ -167,4 +167,4 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
         if rational(eps2) == 0:
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         g = g.scaled(rational(eps2) / rational(eps))
-    return Pair(file.map, g, ("f", "g"), note)
+    return MapPair(file.map, g, ("f", "g"), note)

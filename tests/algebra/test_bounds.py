@@ -12,7 +12,7 @@ from flint import fmpq
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.bounds import BoundField, Size
+from kahanmaps.algebra.bounds import BoundField, CoefficientSize
 
 
 def bounded(K, element):
@@ -53,7 +53,7 @@ def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
     K = BoundField()
     p, q = K.matrix(1, 2, [K.polynomial(3, 1.0), K.polynomial(2, 1.0)]).entries()
     total = K.one / p + K.one / q
-    assert (total.above, total.pole_degree) == (Size(3, 2.0), 6)
+    assert (total.above, total.pole_degree) == (CoefficientSize(3, 2.0), 6)
     assert not K.is_zero(p)
     assert not K.is_zero(q)
     assert K.pole_degree == 12

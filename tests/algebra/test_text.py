@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import (
-    Limits,
+    ExpressionLimits,
     parse_constant,
     parse_number,
     parse_point,
@@ -42,10 +42,10 @@ def mistakes(heading: str) -> list[tuple[str | int, ...]]:
     return [(text, int(column), *words) for column, text, *words in rows]
 
 
-def refusal(text: str, limits: Limits | None = None) -> ExpressionError:
+def refusal(text: str, limits: ExpressionLimits | None = None) -> ExpressionError:
     """The error that a text meets as a rational function of x, y, z."""
     with pytest.raises(ExpressionError) as caught:
-        parse_rational_function(text, NAMES, {"a": THIRD}, limits=limits or Limits())
+        parse_rational_function(text, NAMES, {"a": THIRD}, limits=limits or ExpressionLimits())
     return caught.value
 
 
@@ -264,19 +264,19 @@ def test_a_hostile_text_is_refused(name: str):
 @pytest.mark.parametrize(
     ("limits", "good", "bad"),
     [
-        (Limits(characters=5), "x + y", "x  + y"),
-        (Limits(depth=2), "((x)) + ((y))", "(((x)))"),
-        (Limits(degree=3), "(x + y)^3/(x + z)^3", "(x + y)^2*(x + z)^2"),
-        (Limits(exponent=3), "2^-3*x^3", "2^4"),
-        (Limits(digits=3), "999*x", "1000*x"),
-        (Limits(digits=3), "31^2", "32^2*3"),
-        (Limits(digits=3), "x/999", "x/999 + y/998"),
-        (Limits(terms=3), "(x + y)^2", "(x + y)^3"),
-        (Limits(power_of_ten=3), "1e3*x", "1e-4*x"),
-        (Limits(words=100), "(x + y)^2", "(x + y + z)^9"),
+        (ExpressionLimits(characters=5), "x + y", "x  + y"),
+        (ExpressionLimits(depth=2), "((x)) + ((y))", "(((x)))"),
+        (ExpressionLimits(degree=3), "(x + y)^3/(x + z)^3", "(x + y)^2*(x + z)^2"),
+        (ExpressionLimits(exponent=3), "2^-3*x^3", "2^4"),
+        (ExpressionLimits(digits=3), "999*x", "1000*x"),
+        (ExpressionLimits(digits=3), "31^2", "32^2*3"),
+        (ExpressionLimits(digits=3), "x/999", "x/999 + y/998"),
+        (ExpressionLimits(terms=3), "(x + y)^2", "(x + y)^3"),
+        (ExpressionLimits(power_of_ten=3), "1e3*x", "1e-4*x"),
+        (ExpressionLimits(words=100), "(x + y)^2", "(x + y + z)^9"),
     ],
 )
-def test_every_limit_has_two_sides(limits: Limits, good: str, bad: str):
+def test_every_limit_has_two_sides(limits: ExpressionLimits, good: str, bad: str):
     parse_rational_function(good, NAMES, limits=limits)
     refusal(bad, limits)
 

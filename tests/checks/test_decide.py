@@ -19,7 +19,7 @@ from helpers import fraction, rationals
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.bounds import BoundField, Size
+from kahanmaps.algebra.bounds import BoundField, CoefficientSize
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, decide, log2_error, small_points
@@ -32,7 +32,7 @@ SUPPORTED, REFUTED, UNDECIDED = Verdict.SUPPORTED, Verdict.REFUTED, Verdict.UNDE
 class Stated(Identity):
     """An identity with any bound for its equation and its poles."""
 
-    stated: tuple[Size, int] = (Size(1, 1.0), 0)
+    stated: tuple[CoefficientSize, int] = (CoefficientSize(1, 1.0), 0)
 
     @property
     def bound(self):
@@ -55,7 +55,7 @@ def identity_of(
         (x,) = point
         return ([left(x, eps_value, field)], [right(x, eps_value, field)]) if defined(x, field) else None
 
-    return Stated(1, sides, eps, subject=(), stated=(Size(degree, bits), poles))
+    return Stated(1, sides, eps, subject=(), stated=(CoefficientSize(degree, bits), poles))
 
 
 def counted(identity: Identity) -> tuple[Identity, list[Field]]:
@@ -98,7 +98,7 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
     primes = Fraction(3, 5) * N / Fraction(math.log(2**62))
     bad = Fraction(max(1, math.ceil(bits / 62)), 1) / primes
     roots = Fraction(degree) / N
-    found = log2_error(Size(degree, float(bits)), poles)
+    found = log2_error(CoefficientSize(degree, float(bits)), poles)
     # At most floor(bits/62) primes divide a coefficient; ceil is one more at the most.
     # Doubled: given that no denominator vanishes, which is more likely than not.
     assert found <= math.log2(2 * (bad + roots)) + 1e-9
@@ -108,7 +108,7 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
 @pytest.mark.parametrize(("conjugates", "bits"), [(2, 62), (24, 6200.0)])
 def test_coefficients_in_a_number_field_of_degree_c_multiply_the_bad_primes_by_2_c_squared(conjugates, bits):
     """A norm is c times as long, and at least 1/(2 c) of the primes split: half of what Chebotarev's density gives."""
-    size = Size(0, float(bits))
+    size = CoefficientSize(0, float(bits))
     assert log2_error(size, 0, conjugates) - log2_error(size, 0) == pytest.approx(math.log2(2 * conjugates**2))
 
 

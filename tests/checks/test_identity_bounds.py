@@ -10,7 +10,7 @@ from helpers import HENON_HEILES, LOTKA_VOLTERRA, rationals, systems
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.bounds import Size
+from kahanmaps.algebra.bounds import CoefficientSize
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
@@ -75,8 +75,8 @@ def test_a_smaller_size_would_not_bound_the_difference():
     ((above, _),) = differences(identity)
     degree, bits = true_size(above)
     assert covers_polynomial(identity.bound[0], above)
-    assert not covers_polynomial(Size(degree - 1, identity.bound[0].bits), above)
-    assert not covers_polynomial(Size(identity.bound[0].degree, bits - 0.01), above)
+    assert not covers_polynomial(CoefficientSize(degree - 1, identity.bound[0].bits), above)
+    assert not covers_polynomial(CoefficientSize(identity.bound[0].degree, bits - 0.01), above)
 
 
 # Integrals and densities: of another system, so that the two sides differ

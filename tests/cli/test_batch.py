@@ -213,14 +213,14 @@ def test_a_summary_groups_and_counts(batch, space):
 
 
 def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
-    from kahanmaps.experiments.results.records import Limits, Record, Task
     from kahanmaps.experiments.results.records import Outcome as Word
+    from kahanmaps.experiments.results.records import Record, Task, TaskLimits
     from kahanmaps.experiments.results.store import Store
 
     task = Task("pause", None, {"seed": 1})
     for name, value in (("one.db", 1), ("two.db", 2)):
         with Store.open(name, create=True) as store:
-            store.plan("a", "1", Limits(), [task], {})
+            store.plan("a", "1", TaskLimits(), [task], {})
             store.add([Record(task.key, Word.OK, {"value": value})])
     with Store.open("two.db"):  # nothing is written to what another process may be writing to
         done = batch("merge one.db two.db")

@@ -20,7 +20,7 @@ import pytest
 from small_databases import exported
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.results.records import Job, Limits, Outcome, Task
+from kahanmaps.experiments.results.records import Job, Outcome, Task, TaskLimits
 from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running import cluster
 from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
@@ -61,7 +61,7 @@ for job in read["jobs"]:
 """
 
 
-UNLIMITED = Limits()
+UNLIMITED = TaskLimits()
 
 
 class Machines:
@@ -237,7 +237,7 @@ def test_a_group_that_is_killed_leaves_only_the_guilty_job_lost(workers):
 
 
 def test_a_job_is_done_at_the_second_try_with_its_limits_in_the_environment_of_the_worker(workers, tmp_path):
-    (job,) = jobs_of(1, die=9, once=str(tmp_path / "been-here"), size=1 << 20, limits=Limits(7.5, 10**9))
+    (job,) = jobs_of(1, die=9, once=str(tmp_path / "been-here"), size=1 << 20, limits=TaskLimits(7.5, 10**9))
     (record,) = done(workers, [job])
     assert record.result["limits"] == {"time": 7.5, "memory": 10**9}
     assert record.result["home"] == "kept"
@@ -259,7 +259,7 @@ def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_n
 def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, monkeypatch):
     monkeypatch.setattr(cluster, "START_UP", 0.5)
     monkeypatch.setattr(cluster, "START_UP_OF_A_JOB", 0.05)
-    limits = Limits(time=0.05)
+    limits = TaskLimits(time=0.05)
     good = jobs_of(12, limits=limits)
     bad = jobs_of(1, limits=limits, sleep=600, claim=0)
     workers = shared.workers()

@@ -23,7 +23,7 @@ from helpers import quick
 from small_databases import exported
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.results.records import Job, Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.records import Job, Outcome, Record, Task, TaskLimits
 from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running import local
 from kahanmaps.experiments.running.cluster import do_group
@@ -61,16 +61,16 @@ def start() -> Iterator[Started]:
         workers.close()
 
 
-def fault(order: int, seed: int = 1, limits: Limits | None = None) -> Job:
-    return Job(Task("fault", None, {"order": order, "seed": seed}), limits or Limits(20.0, 400_000_000))
+def fault(order: int, seed: int = 1, limits: TaskLimits | None = None) -> Job:
+    return Job(Task("fault", None, {"order": order, "seed": seed}), limits or TaskLimits(20.0, 400_000_000))
 
 
-def pause(milliseconds: int, seed: int = 0, limits: Limits | None = None) -> Job:
-    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or Limits(20.0))
+def pause(milliseconds: int, seed: int = 0, limits: TaskLimits | None = None) -> Job:
+    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or TaskLimits(20.0))
 
 
 def signalled(number: int, times: int) -> Job:
-    return Job(Task("signalled", None, {"order": int(number), "seed": times}), Limits(20.0))
+    return Job(Task("signalled", None, {"order": int(number), "seed": times}), TaskLimits(20.0))
 
 
 def tries(folder: Path, number: int, times: int) -> int:
@@ -181,7 +181,7 @@ def test_what_a_task_has_started_ends_with_its_worker(faulty):
 
 
 def test_a_task_that_hangs_is_killed_when_its_time_is_over_and_what_was_printed_before_is_not_told():
-    chatter, hang, other = fault(CHATTER), fault(HANG, limits=Limits(time=0.2)), fault(HANG, 0)
+    chatter, hang, other = fault(CHATTER), fault(HANG, limits=TaskLimits(time=0.2)), fault(HANG, 0)
     records = done([chatter, hang, other], workers=1)
     record = records[hang.task.key]
     assert (record.outcome, record.stderr) == (Outcome.TIMEOUT, "")
@@ -217,13 +217,13 @@ def test_an_error_that_comes_of_a_want_of_memory_is_told_as_such(error, is_memor
 
 
 def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
-    records = done([pause(300, seed, Limits(time=1.0)) for seed in range(6)], workers=1)
+    records = done([pause(300, seed, TaskLimits(time=1.0)) for seed in range(6)], workers=1)
     assert all(record.is_ok for record in records.values())  # 1.8 seconds in one worker
 
 
 def test_what_earlier_tasks_left_belongs_to_the_memory_of_a_task():
     jobs = [
-        Job(Task("use", None, {"steps": steps, "seed": seed}), Limits(20.0, 60_000_000))
+        Job(Task("use", None, {"steps": steps, "seed": seed}), TaskLimits(20.0, 60_000_000))
         for seed, steps in enumerate((40, 48, 54, 65, 68, 72))
     ]
     among, alone = done(jobs, workers=1), done(jobs, workers=1, group_seconds=0.0)
@@ -246,7 +246,7 @@ def test_the_limit_of_memory_ends_with_the_task_so_that_its_result_can_be_told()
 
 
 def test_an_error_nobody_expected_is_tried_again_in_a_fresh_worker():
-    jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), Limits(20.0)) for seed in range(2)]
+    jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), TaskLimits(20.0)) for seed in range(2)]
     assert all(record.is_ok for record in done(jobs, workers=1).values())
 
 
@@ -400,7 +400,7 @@ def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path
 def test_a_task_that_is_lost_when_it_is_tried_again_keeps_the_failure_it_had(tmp_path: Path):
     with Store.open(tmp_path / "results.db", create=True) as store:
         task = signalled(9, ALWAYS).task
-        store.plan("one", "one", Limits(), [task], {})
+        store.plan("one", "one", TaskLimits(), [task], {})
         store.add([Record(task.key, Outcome.FAILED, message="before")])
         store.add([Record(task.key, Outcome.LOST)])
         (found,) = store.find(task.key)

@@ -14,7 +14,7 @@ from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, mistakes, only, option,
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.experiment import DEFAULT_LIMITS
-from kahanmaps.experiments.results.records import Limits
+from kahanmaps.experiments.results.records import TaskLimits
 from kahanmaps.experiments.spec import parse_spec, read_spec
 
 # What a spec says
@@ -255,13 +255,13 @@ def test_a_limit_is_in_seconds_or_bytes_unless_it_says_otherwise(name, written, 
 
 
 def test_there_are_limits_where_nothing_is_said():
-    assert only(LORENZ + "axes = {eps = 1}").limits == DEFAULT_LIMITS == Limits(3600.0, 4 * 10**9)
+    assert only(LORENZ + "axes = {eps = 1}").limits == DEFAULT_LIMITS == TaskLimits(3600.0, 4 * 10**9)
 
 
 def test_the_limits_of_an_experiment_come_before_those_of_all():
     common = 'limits = {time = 5, memory = "1 MB", digits = 50}\n'
     spec = parse_spec(common + LORENZ + "axes = {eps = 1}\nlimits = {time = 7}")
-    assert spec.experiments[0].limits == Limits(7.0, 1_000_000)
+    assert spec.experiments[0].limits == TaskLimits(7.0, 1_000_000)
     assert spec.experiments[0][0].options["max_digits"] == 50
 
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, seeds, small_chunks, task, tasks
 
-from kahanmaps.experiments.results.records import Limits, Outcome, Record, Row, digest
+from kahanmaps.experiments.results.records import Outcome, Record, Row, TaskLimits, digest
 from kahanmaps.experiments.results.store import Merged, Planned, Store, StoreError
 
 # Records
@@ -90,7 +90,7 @@ def test_the_same_definition_is_resumed_without_making_a_single_task(store):
         yield
 
     store.plan("a", "1", LIMITS, tasks(1, 2, 2), {})
-    other = Limits(time=9)
+    other = TaskLimits(time=9)
     assert store.plan("a", "1", other, never(), {}) == Planned(3, 2, 0, 0, is_resumed=True)
     assert [job.limits for job in store.pending()] == [other, other]
 
@@ -169,9 +169,12 @@ def test_each_task_is_handed_out_once_whatever_is_added_meanwhile(store):
 
 
 def test_a_job_has_the_limits_of_the_experiment_that_it_comes_from(store):
-    store.plan("a", "1", Limits(time=1), tasks(1), {})
-    store.plan("b", "1", Limits(memory=7), tasks(1, 2), {})
-    assert [(seed(job.task), job.limits) for job in store.pending()] == [(1, Limits(time=1)), (2, Limits(memory=7))]
+    store.plan("a", "1", TaskLimits(time=1), tasks(1), {})
+    store.plan("b", "1", TaskLimits(memory=7), tasks(1, 2), {})
+    assert [(seed(job.task), job.limits) for job in store.pending()] == [
+        (1, TaskLimits(time=1)),
+        (2, TaskLimits(memory=7)),
+    ]
 
 
 def test_an_unknown_experiment_is_named_with_those_there_are_before_anything_is_read(store):
@@ -263,9 +266,9 @@ def test_a_merge_into_an_empty_database_is_a_copy(path):
     source = path.with_name("source.db")
     with Store.open(source, create=True) as store:
         store.plan("a", "1", LIMITS, tasks(1, 2, 2, 3), {digest("d"): "d"})
-        store.plan("b", "2", Limits(), tasks(3, 4), {})
+        store.plan("b", "2", TaskLimits(), tasks(3, 4), {})
         store.add([ok(1), failed(3), ok(4)])
-        store.plan("b", "3", Limits(), tasks(3), {})
+        store.plan("b", "3", TaskLimits(), tasks(3), {})
     with small_chunks(), Store.open(path, create=True) as store:
         assert store.merge(source) == Merged(tasks=4, results=3, replaced=0, conflicts=0)
         assert store.document(digest("d")) == "d"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from kahanmaps import KahanMap, draw_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import Component
+from kahanmaps.algebra.small_systems import SolutionComponent
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
@@ -141,7 +141,7 @@ def test_multiples_are_refuted_as_a_family():
     f = load("euler_top", {}).system
     space = commuting_space(f, "linear")
     t = ring(["t"]).gens()[0]
-    assert str(judge_family(f, space, Component((t,)), Settings()).verdict) == "refuted"
+    assert str(judge_family(f, space, SolutionComponent((t,)), Settings()).verdict) == "refuted"
 
 
 @given(st.lists(st.integers(-2, 2), min_size=12, max_size=12))
@@ -195,7 +195,7 @@ def test_curved_families_are_told_as_equations():
 def test_the_identity_of_a_family_is_bounded(f, g, below):
     first, second = (QuadraticSystem.from_text(["x", "y"], rhs) for rhs in (f, g))
     b = ring(["b"]).gens()[0]
-    family = Component((b / below,))
+    family = SolutionComponent((b / below,))
     equation, _ = check(_family_identity(first, SimpleNamespace(fields=[second]), family), differs=True)
     assert equation.bits >= log2(below)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from kahanmaps import KahanMap
 from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.algebra.small_systems import Component
+from kahanmaps.algebra.small_systems import SolutionComponent
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
@@ -183,7 +183,7 @@ def test_no_time():
     ],
 )
 def test_a_family_of_three_by_three_matrices_is_singular_where_its_determinant_is_zero(entries, singular):
-    part = Component(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))
+    part = SolutionComponent(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))
     assert is_singular(part, 3) is singular
 
 

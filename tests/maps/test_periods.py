@@ -21,7 +21,7 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.division import PeriodicLevels
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic
 from kahanmaps.maps.normal_form.periods import (
-    Kind,
+    PeriodKind,
     period_of,
     period_over_rationals,
     plane_period,
@@ -65,13 +65,13 @@ def test_in_a_small_field_the_period_and_the_poles_are_those_that_walking_finds(
         assert found.meets_pole == met, found
         if period is not None:
             assert (found.period, found.status) == (period, "periodic"), found
-        elif found.kind is Kind.SMOOTH:
+        elif found.kind is PeriodKind.SMOOTH:
             assert_order_on_the_cubic(block, point, found.period, poles(block, field.prime, field.context))
-        elif found.kind is Kind.ADDITIVE:
+        elif found.kind is PeriodKind.ADDITIVE:
             assert found.period == field.prime
-    expected = {Kind.STEPPED} if field.prime <= 3 else {Kind.SMOOTH, Kind.ADDITIVE, Kind.FIXED}
+    expected = {PeriodKind.STEPPED} if field.prime <= 3 else {PeriodKind.SMOOTH, PeriodKind.ADDITIVE, PeriodKind.FIXED}
     if field.prime > 3 and field.q < 20:
-        expected |= {Kind.TRIANGLE, Kind.VERTEX, Kind.AT_POLE, Kind.NO_VALUE}
+        expected |= {PeriodKind.TRIANGLE, PeriodKind.VERTEX, PeriodKind.AT_POLE, PeriodKind.NO_VALUE}
     assert expected <= set(kinds)
 
 
@@ -94,7 +94,7 @@ def test_in_a_large_prime_field_n_T_is_zero_and_no_smaller_multiple_is(prime):
     field, rng = Finite(prime), random.Random(3)
     for block, point in planes_over(field, rng, 2):
         found = plane_period(block, point, prime)
-        assert (found.kind, found.status) == (Kind.SMOOTH, "periodic")
+        assert (found.kind, found.status) == (PeriodKind.SMOOTH, "periodic")
         assert found.period > 10
         assert_order_on_the_cubic(block, point, found.period, poles(block, prime))
 
@@ -104,7 +104,7 @@ def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happe
     rng, answers = random.Random(8), Counter()
     for block, point in planes_over(Finite(prime), rng, 40):
         found = plane_period(block, point, prime)
-        if found.kind is not Kind.SMOOTH:
+        if found.kind is not PeriodKind.SMOOTH:
             continue
         image, met = point, False
         for _ in range(found.period):

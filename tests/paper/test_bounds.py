@@ -10,7 +10,7 @@ from paper.members import member, verifier_of
 
 from kahanmaps.paper import objects_over
 from kahanmaps.paper.controls import broken
-from kahanmaps.paper.registry import Kind, claims
+from kahanmaps.paper.registry import ClaimKind, claims
 from kahanmaps.paper.verify import ClaimAtPoints
 
 # Claims
@@ -27,7 +27,7 @@ def is_short(claim):
 BROKEN = [
     (claim, control)
     for claim in claims()
-    if claim.kind is Kind.EQUAL and claim.makes_sense(1) and is_short(claim)
+    if claim.kind is ClaimKind.EQUAL and claim.makes_sense(1) and is_short(claim)
     for control in claim.breaks
     if control in ("eps", "map", "B")
 ]

@@ -11,7 +11,7 @@ from paper.members import LARGE_SPECTRA, SPECTRA, member, point, values
 
 from kahanmaps.errors import SingularMatrix, SingularStep
 from kahanmaps.paper.controls import CONTROLS, broken
-from kahanmaps.paper.registry import Kind, claims
+from kahanmaps.paper.registry import ClaimKind, claims
 
 QUICK = ["m=1", "m=2, irreducible", "m=3, split"]
 LARGER = [name for name in (*SPECTRA, *LARGE_SPECTRA) if name not in QUICK]
@@ -76,7 +76,7 @@ def members_of(claim, spectra):
 def failing(claim, spectra):
     """The members on which a claim does not do what it says, and those for which it says nothing."""
     names = members_of(claim, spectra)
-    wanted = claim.kind is not Kind.DIFFERENT
+    wanted = claim.kind is not ClaimKind.DIFFERENT
     outcomes = {name: compared(claim, point(name)) for name in names}
     return [name for name, found in outcomes.items() if not found or any(equal is not wanted for equal in found)]
 
@@ -110,7 +110,7 @@ def outcome(claim, name, control):
             found = compared(claim, broken(control, point(name, number)))
         except (SingularStep, SingularMatrix, ZeroDivisionError):
             continue
-        wanted = claim.kind is not Kind.DIFFERENT
+        wanted = claim.kind is not ClaimKind.DIFFERENT
         return "holds" if all(equal is wanted for equal in found) else "fails"
     return None
 

@@ -14,10 +14,10 @@ from paper.members import member, named, point, verifier_of
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.paper import verify
-from kahanmaps.paper.registry import Claim, Kind, claims, evaluate
+from kahanmaps.paper.registry import Claim, ClaimKind, claims, evaluate
 from kahanmaps.paper.verify import normal_form_proof
 
-IDENTITIES = [c for c in claims() if c.kind is Kind.EQUAL and not c.misprint and c.symplectic]
+IDENTITIES = [c for c in claims() if c.kind is ClaimKind.EQUAL and not c.misprint and c.symplectic]
 
 
 @pytest.fixture(autouse=True)
@@ -215,7 +215,7 @@ def test_where_the_roots_are_not_rational_the_witness_is_over_a_prime_field(exam
 
 
 def test_different_sides_are_proved_different_by_a_point(examine):
-    finding = examine(fabricated(false_claim, kind=Kind.DIFFERENT))
+    finding = examine(fabricated(false_claim, kind=ClaimKind.DIFFERENT))
     assert finding.verdict is Verdict.PROVED
     where = finding.evidence.summary.removeprefix("both sides differ at ")
     method = {"an exact rational point": "exact rational point"}.get(where, "point over GF(p)")
@@ -224,17 +224,17 @@ def test_different_sides_are_proved_different_by_a_point(examine):
 
 @pytest.mark.parametrize("pairs", [true_claim, lambda o: [*false_claim(o), *true_claim(o)]])
 def test_one_pair_that_agrees_refutes_that_all_differ(pairs, examine):
-    assert examine(fabricated(pairs, kind=Kind.DIFFERENT)).verdict is Verdict.REFUTED
+    assert examine(fabricated(pairs, kind=ClaimKind.DIFFERENT)).verdict is Verdict.REFUTED
 
 
 def test_a_rank_that_is_attained_is_proved_at_a_rational_point(examine):
-    finding = examine(fabricated(lambda o: [(o.rank(o.df), o.n)], kind=Kind.ATTAINED))
+    finding = examine(fabricated(lambda o: [(o.rank(o.df), o.n)], kind=ClaimKind.ATTAINED))
     assert finding.verdict is Verdict.PROVED
     assert finding.evidence.method == "exact rational point"
 
 
 def test_a_rank_that_is_not_attained_is_refuted(examine):
-    finding = examine(fabricated(lambda o: [(o.rank(o.df), o.n + 1)], kind=Kind.ATTAINED))
+    finding = examine(fabricated(lambda o: [(o.rank(o.df), o.n + 1)], kind=ClaimKind.ATTAINED))
     assert finding.verdict is Verdict.REFUTED
     assert (finding.witness.left, finding.witness.right) == (("4",), ("5",))
 

@@ -22,7 +22,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.paper import objects_over
 from kahanmaps.paper import verify as verify_module
 from kahanmaps.paper.controls import CONTROLS
-from kahanmaps.paper.registry import Kind, claims
+from kahanmaps.paper.registry import ClaimKind, claims
 from kahanmaps.paper.verify import Verifier, VerifyOptions, verify
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
@@ -203,7 +203,7 @@ def test_identities_are_proved_for_a_special_member_and_what_is_said_in_general_
     evidence = by_key(report)["hamiltonians-are-independent"].evidence
     assert (evidence.method, evidence.data["points"]) == ("special member", 4)
     assert "H vanishes on the eigenspaces of the roots of t - 2" in evidence.summary
-    identities = {c.key for c in STATED if c.kind is Kind.EQUAL and c.makes_sense(2) and not c.misprint}
+    identities = {c.key for c in STATED if c.kind is ClaimKind.EQUAL and c.makes_sense(2) and not c.misprint}
     assert identities - WITHOUT_NORMAL_FORM <= keys(report, PROVED)
     assert identities <= keys(report, PROVED) | keys(report, SUPPORTED)
 
@@ -211,7 +211,9 @@ def test_identities_are_proved_for_a_special_member_and_what_is_said_in_general_
 def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
     """chi = t^2 - 2: what needs the roots is shown at a point over a prime field in which chi splits."""
     verifier = verifier_of(draw_with_chi(fmpq_poly([-2, 0, 1]), 1))
-    found = [verifier.verify_claim(claim) for claim in STATED if claim.kind is not Kind.EQUAL and claim.makes_sense(2)]
+    found = [
+        verifier.verify_claim(claim) for claim in STATED if claim.kind is not ClaimKind.EQUAL and claim.makes_sense(2)
+    ]
     assert len(found) > 10
     assert {finding.verdict for finding in found} == {PROVED}
     assert {finding.evidence.method for finding in found} == {"exact rational point", "point over GF(p)"}

@@ -14,7 +14,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_ch
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots import squares as module
 from kahanmaps.plots.draw_squares import _in_two_digits, draw_squares, widest_axes
-from kahanmaps.plots.squares import Pair, pair_of_systems, pairs_of_member, squares
+from kahanmaps.plots.squares import MapPair, pair_of_systems, pairs_of_member, squares
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -29,7 +29,7 @@ def both():
 
 
 def plane_pair(f, g):
-    return Pair(QuadraticSystem.from_text(["x", "y"], f), QuadraticSystem.from_text(["x", "y"], g), ("f", "g"))
+    return MapPair(QuadraticSystem.from_text(["x", "y"], f), QuadraticSystem.from_text(["x", "y"], g), ("f", "g"))
 
 
 def test_associated_maps_close_exactly_and_those_of_the_control_leave_a_gap(both):
@@ -44,7 +44,7 @@ def test_one_changed_coefficient_opens_the_square(both):
     f, g = both[0].pair.f, both[0].pair.g
     rhs = [str(p) for p in g.rhs]
     wrong = QuadraticSystem.from_text(g.variables, [rhs[0] + " + 1/1000*x1^2", *rhs[1:]])
-    assert squares(Pair(f, wrong, ("f", "g")), START, "1/50").closes is False
+    assert squares(MapPair(f, wrong, ("f", "g")), START, "1/50").closes is False
 
 
 def test_the_points_are_those_of_the_maps(both):
@@ -130,7 +130,7 @@ def test_axes_in_which_nothing_moves_are_not_chosen():
     names = ["a", "x", "b", "y"]
     f = QuadraticSystem.from_text(names, ["0", "1", "0", "x"])
     g = QuadraticSystem.from_text(names, ["0", "0", "0", "1"])
-    assert widest_axes([squares(Pair(f, g, ("f", "g")), [1, 1, 1, 1], "1/10")]) == (1, 3)
+    assert widest_axes([squares(MapPair(f, g, ("f", "g")), [1, 1, 1, 1], "1/10")]) == (1, 3)
 
 
 def test_each_pair_is_a_panel_with_its_outcome(both):

@@ -439,7 +439,7 @@ def show(key: str, db: str, as_json: bool) -> None:
                 tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
 
 
-def _task_data(store: lib.Store, found: lib.Found) -> dict[str, Any]:
+def _task_data(store: lib.Store, found: lib.StoredTask) -> dict[str, Any]:
     """A task and its record as plain data."""
     task, record, places, attempts = found
     return {

@@ -10,7 +10,7 @@ from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, scan
 
 
-class Pictures(SuggestingGroup):
+class PlotCommands(SuggestingGroup):
     """The group, with what to use instead of the commands that it had."""
 
     removed: ClassVar = {
@@ -19,7 +19,7 @@ class Pictures(SuggestingGroup):
     }
 
 
-@click.group("plot", cls=Pictures)
+@click.group("plot", cls=PlotCommands)
 def command() -> None:
     """Pictures as PDF, SVG or PNG for papers.
 

@@ -26,7 +26,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"
 
 
-class Size(OptionType):
+class PictureSize(OptionType):
     """WIDTH or WIDTHxHEIGHT in centimetres."""
 
     name = "size"
@@ -59,7 +59,9 @@ picture_options: Callable[[F], F] = stack(
         help="FILE.pdf, FILE.svg or FILE.png; - with --format is standard output.",
     ),
     click.option("--format", "kind", type=click.Choice(["pdf", "svg", "png"]), help="Instead of by the ending."),
-    click.option("--size", type=Size(), metavar="WxH", help="Width, or width x height, in cm (default 12 wide)."),
+    click.option(
+        "--size", type=PictureSize(), metavar="WxH", help="Width, or width x height, in cm (default 12 wide)."
+    ),
     click.option("--font-size", type=float, metavar="PT", help="Size of the letters in points (default 9)."),
     click.option("--dpi", type=int, metavar="N", help="Dots per inch of PNG and of clouds of points (default 300)."),
     click.option("--title", help="A title above the picture (default: none)."),

@@ -107,7 +107,7 @@ def option_words(values: Mapping[str, Any]) -> str:
 
 
 @dataclass(frozen=True)
-class Limits:
+class TaskLimits:
     """What one task may take: `time` in seconds, `memory` in bytes beyond what an idle child has; None: no limit.
 
     Limits do not belong to a task and not to its key: a task that ran out of time may be tried again with more.
@@ -122,7 +122,7 @@ class Job:
     """A task to be done, within limits."""
 
     task: Task
-    limits: Limits = Limits()
+    limits: TaskLimits = TaskLimits()
 
 
 class Outcome(StrEnum):

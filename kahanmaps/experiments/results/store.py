@@ -38,11 +38,11 @@ from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note
 from kahanmaps.experiments.results.records import (
     KEY_LENGTH,
     Job,
-    Limits,
     Outcome,
     Record,
     Row,
     Task,
+    TaskLimits,
     canonical,
     digest,
     encodable,
@@ -106,7 +106,7 @@ class Unavailable(KahanmapsError, OSError):
 
 
 @dataclass(frozen=True)
-class Experiment:
+class StoredExperiment:
     """An experiment as it was planned: `total` rows, in which `tasks` different tasks appear.
 
     `id` is its number in the database, `offset` counts the rows of the plan before its own.
@@ -114,7 +114,7 @@ class Experiment:
 
     name: str
     definition: str
-    limits: Limits
+    limits: TaskLimits
     total: int
     tasks: int
     id: int = field(compare=False)
@@ -168,7 +168,7 @@ class Merged:
     conflicting: tuple[str, ...] = ()
 
 
-class Found(NamedTuple):
+class StoredTask(NamedTuple):
     """A task by its key, with its record if there is one, its places (experiment, number), and attempts at it."""
 
     task: Task
@@ -328,7 +328,7 @@ class Store(Displayed):
             raise StoreError(f"{self.name} is damaged (bytes in place of a text or a number): take a copy from before")
         return rows
 
-    def _fetch_plan(self, sql: str, experiment: Experiment, size: int, *values: int) -> Iterator[list[Any]]:
+    def _fetch_plan(self, sql: str, experiment: StoredExperiment, size: int, *values: int) -> Iterator[list[Any]]:
         """What `sql` finds in each stretch of the plan: a bounded number of rows is read, found or not."""
         for first in range(0, experiment.total, size):
             yield self._fetch(sql, (experiment.id, first, first + size - 1, *values))
@@ -396,7 +396,7 @@ class Store(Displayed):
 
     # Experiments and their plans
 
-    def experiments(self, names: Sequence[str] | None = None) -> list[Experiment]:
+    def experiments(self, names: Sequence[str] | None = None) -> list[StoredExperiment]:
         """What is planned, in order; only the experiments with these names, if they are given."""
         rows = self._fetch(
             "SELECT name, definition, limits, total, tasks, id, "
@@ -406,15 +406,15 @@ class Store(Displayed):
         for name in names or ():
             if name not in known:
                 raise StoreError(f"{self.name} has no experiment {name}: it has {', '.join(known) or 'none at all'}")
-        chosen: list[Experiment] = []
+        chosen: list[StoredExperiment] = []
         offset = 0
         for name, definition, limits, total, tasks, id, planned in rows:
             if names is None or name in names:
                 with self._reading(f"the experiment {quoted(name)}"):
                     if total != (planned or 0):
                         raise ValueError(f"{total} tasks are said to be planned, and {planned or 0} are")
-                    limited = Limits(**_table(limits))
-                    chosen.append(Experiment(name, definition, limited, total, index(tasks), id, offset))
+                    limited = TaskLimits(**_table(limits))
+                    chosen.append(StoredExperiment(name, definition, limited, total, index(tasks), id, offset))
                     offset += total
         return chosen
 
@@ -422,7 +422,7 @@ class Store(Displayed):
         self,
         experiment: str,
         definition: str,
-        limits: Limits,
+        limits: TaskLimits,
         tasks: Iterable[Task],
         documents: Mapping[str, str],
         skipped: Iterable[tuple[str, str]] = (),
@@ -460,7 +460,7 @@ class Store(Displayed):
         self._opened().executemany("INSERT OR REPLACE INTO skipped VALUES (?, ?, ?)", rows)
 
     def _replace_plan(
-        self, experiment: str, definition: str, limits: Limits, tasks: Iterable[tuple[str, str]]
+        self, experiment: str, definition: str, limits: TaskLimits, tasks: Iterable[tuple[str, str]]
     ) -> Planned:
         """Plan the tasks with these keys and texts; forget those that neither a plan nor a result needs any more."""
         values = (experiment, definition, digest(definition), canonical(asdict(limits)))
@@ -529,7 +529,7 @@ class Store(Displayed):
 
     def _pending(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
-    ) -> tuple[str, list[tuple[Experiment, int, int, int]]]:
+    ) -> tuple[str, list[tuple[StoredExperiment, int, int, int]]]:
         """A query for the tasks without a result in a stretch of the plan, and its values for each experiment."""
         part, parts = shard
         if not 1 <= part <= parts:
@@ -673,7 +673,7 @@ class Store(Displayed):
             for id, one in experiments.items()
         ]
 
-    def _skipped(self, experiment: Experiment) -> list[tuple[str, str]]:
+    def _skipped(self, experiment: StoredExperiment) -> list[tuple[str, str]]:
         sql = "SELECT system, reason FROM skipped WHERE experiment = ? ORDER BY system"
         return self._fetch(sql, (experiment.id,))
 
@@ -684,7 +684,7 @@ class Store(Displayed):
             WHERE NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)"""
         return int(self._fetch(sql)[0][0])
 
-    def find(self, prefix: str) -> list[Found]:
+    def find(self, prefix: str) -> list[StoredTask]:
         """The tasks whose key begins like this, at most 20; the first 4 digits at least."""
         prefix = prefix.lower()
         if not re.fullmatch(f"[0-9a-f]{{4,{KEY_LENGTH}}}", prefix):
@@ -702,7 +702,7 @@ class Store(Displayed):
             "WHERE p.task = ? ORDER BY p.experiment, p.number"
         )
         return [
-            Found(self._task(key, text), self._record(key, row), self._fetch(places, (id,)), row[-1] or 0)
+            StoredTask(self._task(key, text), self._record(key, row), self._fetch(places, (id,)), row[-1] or 0)
             for id, key, text, *row in tasks
         ]
 

@@ -32,7 +32,7 @@ _LISTED = 60
 _MAX_WIDTH = 160  # characters of a cell for the eye: what failures say, what systems are
 
 
-class Table(NamedTuple):
+class SummaryTable(NamedTuple):
     """A table of texts. The first `words` columns are words, the others numbers, to be aligned on the right."""
 
     title: str
@@ -76,7 +76,7 @@ class Summary(Displayed):
             groups.append(data)
         return {"by": list(self.by), "groups": groups}
 
-    def tables(self, digits: int = 6) -> list[Table]:
+    def tables(self, digits: int = 6) -> list[SummaryTable]:
         """Counts, numbers and flags as texts, without tables that have no rows and counts of what never happened.
 
         Numbers have so many significant digits, long texts are shortened.
@@ -94,7 +94,7 @@ class Summary(Displayed):
         lines = [(*g.values, name, *cells.values()) for g in self.groups for name, cells in g.flags.items()]
         pieces += [("true or false", ["flag", "true", "false"], lines)] if lines else []
         return [
-            Table(
+            SummaryTable(
                 title,
                 (*self.by, *columns),
                 tuple(tuple(_text(value, digits) for value in line) for line in lines),

@@ -35,7 +35,7 @@ from threading import Thread
 from typing import IO, Any
 
 from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.experiments.results.records import Documents, Executor, Job, Limits, Outcome, Record, Task, canonical
+from kahanmaps.experiments.results.records import Documents, Executor, Job, Outcome, Record, Task, TaskLimits, canonical
 from kahanmaps.experiments.running.local import GROUP_SECONDS, TAIL, TRIES, LocalWorkers, ending
 from kahanmaps.processes import end_with_parent
 
@@ -350,7 +350,7 @@ def do_group(source: IO[str], target: IO[str]) -> None:
     workers = LocalWorkers(1, group["documents"].__getitem__, tries=1)
     try:
         for job in group["jobs"]:
-            workers.submit(Job(Task.from_text(job["task"]), Limits(**job["limits"])))
+            workers.submit(Job(Task.from_text(job["task"]), TaskLimits(**job["limits"])))
             while workers.in_flight:
                 for record in workers.wait(60.0):
                     target.write(canonical(record.to_json()) + "\n")

@@ -43,7 +43,7 @@ from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period, require_time
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
-    Found,
+    SpaceSearch,
     bases_of,
     may_be_conjugate,
     repeat,
@@ -320,7 +320,7 @@ def find_integrals(
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors)
         denominators = denominators_among(factors, laboratory.map.dim)
 
-        def quickly(map_: ModularMap) -> Found:
+        def quickly(map_: ModularMap) -> SpaceSearch:
             return search(map_, profile, cofactors, denominators, deadline, progress)
 
         base = laboratory.maps[0]
@@ -340,7 +340,7 @@ def find_integrals(
         take_relations(base, profile, found, LARGEST_SPAN, deadline, progress)
         if len(found.steps) > steps:
 
-            def thoroughly(map_: ModularMap) -> Found:
+            def thoroughly(map_: ModularMap) -> SpaceSearch:
                 again = quickly(map_)
                 take_relations(map_, profile, again, LARGEST_SPAN, deadline, progress)
                 return again
@@ -382,11 +382,11 @@ def find_integrals(
 def _formulas(
     laboratory: Laboratory,
     base: ModularMap,
-    found: Found,
-    look: Callable[[ModularMap], Found],
+    found: SpaceSearch,
+    look: Callable[[ModularMap], SpaceSearch],
     deadline: float,
     progress: Callable[[str], None],
-) -> tuple[ModularMap, Found, list[Formula], str]:
+) -> tuple[ModularMap, SpaceSearch, list[Formula], str]:
     """The ratios of the polynomials `found` on the map `base`, and why there are no others; first the map and spaces.
 
     Where these may be conjugate over an extension of Q, `look` finds those on maps modulo other primes, where conjugate

@@ -39,7 +39,7 @@ from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, 
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
-from kahanmaps.laboratory.preserve.search import Found, Step, bases_of, pattern
+from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of, pattern
 from kahanmaps.maps.implicit import BirationalMap
 
 
@@ -207,8 +207,8 @@ def integrals_in_iterates(
             break
         for one, spaces in lifts_with_spaces(base, [lift]):
             progress(one.text)
-            found = Found()
-            found.add(Step("iterates", 2, None, one.text, one), sorted(spaces, key=pattern))
+            found = SpaceSearch()
+            found.add(SearchStep("iterates", 2, None, one.text, one), sorted(spaces, key=pattern))
             bases, _ = bases_of(inside, base.prime, found, deadline)
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]

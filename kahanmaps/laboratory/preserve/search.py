@@ -95,7 +95,7 @@ class Branches:
 
 
 @dataclass(frozen=True)
-class Step:
+class SearchStep:
     """One step of a search; `product` is None except for cofactors. `text` says how for people."""
 
     kind: str  # "affine", "relations", "cofactor" or "iterates"
@@ -107,14 +107,14 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Found:
+class SpaceSearch:
     """What a search found on one map: a list of spaces for each step.
 
     The products of the steps are of the `cofactors`, which were tried up to a degree; `searched` are the degrees of
     relations along orbits whose span was searched.
     """
 
-    steps: list[Step] = field(default_factory=list)
+    steps: list[SearchStep] = field(default_factory=list)
     spaces: list[list[DarbouxSpace]] = field(default_factory=list)
     cofactors: Sequence[Cofactor] = ()
     cofactor_degree: int = 0
@@ -135,7 +135,7 @@ class Found:
             parts.append(f"relations of degree {', '.join(map(str, self.searched))} along orbits")
         return f"among {' and '.join(parts)}" if parts else "that was found"
 
-    def add(self, step: Step, spaces: list[DarbouxSpace]) -> None:
+    def add(self, step: SearchStep, spaces: list[DarbouxSpace]) -> None:
         """One more step."""
         self.steps.append(step)
         self.spaces.append(spaces)
@@ -158,17 +158,17 @@ def search(
     denominators: Sequence[Cofactor] = (),
     deadline: float = inf,
     progress: Callable[[str], None] = lambda _: None,
-) -> Found:
+) -> SpaceSearch:
     """Spaces whose ratios are as many independent integrals as the profile shows, as far as cheap searches find them.
 
     These are the span of few relations along orbits, and polynomials with known cofactors or over known denominators.
     Nothing is begun after the `deadline`, a value of time.monotonic(). Raises NoPoint.
     """
-    found, wanted = Found(), profile.codimension
+    found, wanted = SpaceSearch(), profile.codimension
     is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver)
     affine = affine_space(map_)
     if affine is not None:
-        found.add(Step("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
+        found.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
     if is_of_field:  # whose denominators are factors of a determinant, which is longer than few relations
         take_relations(map_, profile, found, SMALL_SPAN, deadline, progress)
     if gradient_rank(map_, found.all_spaces) >= wanted or time.monotonic() > deadline:
@@ -182,7 +182,7 @@ def search(
     found = replace(found, cofactors=result.cofactors, cofactor_degree=result.degree)
     for product, scaled, spaces in result.spaces:
         text = f"{product.origin(found.cofactors)}{', up to a number' * scaled}"
-        step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
+        step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
         found.add(step, sorted(spaces, key=pattern))
     if not is_of_field:
         take_relations(map_, profile, found, SMALL_SPAN, deadline, progress)
@@ -192,7 +192,7 @@ def search(
 def take_relations(
     map_: ModularMap,
     profile: Profile,
-    found: Found,
+    found: SpaceSearch,
     largest: int,
     deadline: float,
     progress: Callable[[str], None],
@@ -212,22 +212,22 @@ def take_relations(
         if spaces is not None:
             found.searched.append(degree)
         if spaces and gradient_rank(map_, [*known, *spaces]) > independent:
-            step = Step("relations", degree, None, f"relations of degree {degree} along orbits")
+            step = SearchStep("relations", degree, None, f"relations of degree {degree} along orbits")
             found.add(step, sorted(spaces, key=pattern))
 
 
 def repeat(
-    found: Found,
+    found: SpaceSearch,
     map_: ModularMap,
     reference: int,
     branches: Mapping[int, Mapping[Pattern, Branches]] = NOTHING,
-) -> Found | None:
+) -> SpaceSearch | None:
     """The same steps on another map; None where they give spaces of another shape (a special value).
 
     `reference` is the prime of `found`. Spaces of the same shape come in any order where there are no `branches` of
     their step, by which they are told apart.
     """
-    again = Found(cofactors=found.cofactors)
+    again = SpaceSearch(cofactors=found.cofactors)
     steps = list(zip(found.steps, found.spaces, strict=True))
     needed = [points_needed(map_.dim, step.degree, *model) for step, model in steps if step.product is not None]
     sample = Sample.of(map_, found.cofactors, max(needed, default=0))
@@ -259,7 +259,7 @@ def classes(group: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:
     return found
 
 
-def may_be_conjugate(found: Found) -> bool:
+def may_be_conjugate(found: SpaceSearch) -> bool:
     """Whether spaces of one degree have the same monomials, as spaces have that are conjugate over an extension of Q.
 
     These exist only modulo primes where the extension splits, and have no formula over Q.
@@ -316,7 +316,7 @@ def _most_alike(
 
 
 def bases_of(
-    laboratory: Laboratory, reference: int, found: Found, deadline: float
+    laboratory: Laboratory, reference: int, found: SpaceSearch, deadline: float
 ) -> tuple[list[list[fmpq_mpoly]], str]:
     """Bases of all spaces, polynomials in (variables, symbols, eps); none, and a reason, where that failed.
 
@@ -327,7 +327,7 @@ def bases_of(
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
 
     @cache
-    def again_at(prime: int, values: tuple[int, ...]) -> Found | None:
+    def again_at(prime: int, values: tuple[int, ...]) -> SpaceSearch | None:
         try:
             return repeat(found, laboratory.map_for(prime, values), reference)
         except (NoPoint, BadPrime):

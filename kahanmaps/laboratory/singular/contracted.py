@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range, divided
-from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of, modulo, roots_modulo
+from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
@@ -40,7 +40,7 @@ Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
 
 
 @dataclass(frozen=True)
-class Component:
+class HypersurfaceComponent:
     """A hypersurface: its exponents in the forms, its degree, its order along the curve t (None: it contains it), and
     its equation on the surface (t, u)."""
 
@@ -65,7 +65,7 @@ class Component:
 
 def components(
     equation: Equation, forms: Sequence[tuple[Any, bool]], curve: Sequence[nmod_poly], direction: Sequence[int]
-) -> list[Component]:
+) -> list[HypersurfaceComponent]:
     """The components of the zeros of forms on the surface curve(t) + u direction, in projective space over GF(p).
 
     With each of the forms over Q stands whether it is one at the image of the point under the map of the equation.
@@ -87,7 +87,7 @@ def components(
             _, exponents = found.setdefault(str(factor), (factor, [0] * len(forms)))
             exponents[k] = int(exponent)
     return [
-        Component(
+        HypersurfaceComponent(
             tuple(exponents),
             int(factor.degrees()[1]),
             min((int(power[0]) for power in factor.monoms() if power[1] == 0), default=None),
@@ -178,13 +178,13 @@ class _Curve:
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
 
-    def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+    def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """The rows of `Orders` for steps along the curve but the last, with forms in place of hypersurfaces."""
         return tuple(
             (mu, *level) for mu, level in zip(divided(run, self.own, self.excess), self.levels(run)[1:], strict=False)
         )
 
-    def levels(self, run: Sequence[Step]) -> list[tuple[int, ...]]:
+    def levels(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
         poles, found = len(self.forms.poles), []
         orders = [self.own, *(step.orders for step in run)]
@@ -193,11 +193,11 @@ class _Curve:
             found.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
         return found
 
-    def components(self, curve: Sequence[nmod_poly]) -> list[Component]:
+    def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
         """Those of the forms on a surface through any curve."""
         return components(self.equation, self.forms.all, curve, self.across)
 
-    def through(self, one: Component, curve: Sequence[nmod_poly]) -> _Curve:
+    def through(self, one: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
         """The same with a point of a component on the surface through a curve. Raises OrdersUnknown without any."""
         for t in range(1, _TRIES):
             for u in one.roots(t):
@@ -206,7 +206,7 @@ class _Curve:
         raise OrdersUnknown("a hypersurface without points modulo a prime")
 
     @cached_property
-    def census(self) -> list[tuple[Component, _Curve]]:
+    def census(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
         """All components on a plane, each with a curve through a point of it; empty where one has no point."""
         try:
             return [(one, self.through(one, self.line)) for one in self.components(self.line)]
@@ -235,7 +235,7 @@ class _Resolved:
         """What is tracked."""
         return self.curve.functions
 
-    def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+    def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """Those of the steps but the last. Raises OrdersUnknown."""
         found, mus = [], divided(run, self.curve.own, self.curve.excess)
         for t, (mu, level) in enumerate(zip(mus, self.curve.levels(run)[1:], strict=False)):

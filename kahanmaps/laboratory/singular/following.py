@@ -19,10 +19,10 @@ from flint import fmpz_poly, nmod_poly
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
 from kahanmaps.laboratory.singular.jets import (
     Function,
+    JetStep,
     Letters,
     NotGeneric,
     PrecisionTooLow,
-    Step,
     equations_of,
     image_of,
     images_of_curve,
@@ -132,7 +132,7 @@ class AlongCurves(Protocol):
     def functions(self) -> tuple[Function, ...]:
         """What `images_of_curve` takes."""
 
-    def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+    def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """For each of the steps, or the first of them, what is divided out and the orders of hypersurfaces."""
 
 
@@ -150,7 +150,7 @@ class Tracked:
     first: tuple[int, ...] = ()
     critical: int = 0
 
-    def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+    def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """The rows of `Orders` for steps along a curve. Where nothing is tracked det M(x) stands for it."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
@@ -158,7 +158,7 @@ class Tracked:
         return tuple((mu, *step.orders[: self.critical]) for mu, step in pairs)
 
 
-def divided(run: Sequence[Step], first: Sequence[int], excess: Sequence[int]) -> list[int]:
+def divided(run: Sequence[JetStep], first: Sequence[int], excess: Sequence[int]) -> list[int]:
     """The powers of t divided out that belong to the map, not to the common factor of the minors of its equation.
 
     `first` are the orders of the functions before the steps, `excess` their exponents in that factor.
@@ -212,7 +212,7 @@ class Course:
 
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
-    ) -> tuple[list[Step], bool]:
+    ) -> tuple[list[JetStep], bool]:
         """So many steps along series as long as needed, and whether these are all: time or precision may end it.
 
         With tangents nothing is tracked.
@@ -221,7 +221,7 @@ class Course:
         functions = () if tangents else self.tracked.functions
         start = self.equations, self.point, self.direction
         while True:
-            run: list[Step] = []
+            run: list[JetStep] = []
             try:
                 for step in islice(images_of_curve(*start, precision, tangents, functions), count):
                     run.append(step)
@@ -233,7 +233,7 @@ class Course:
                     return run, False
                 precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
-    def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[Step, ...]:
+    def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[JetStep, ...]:
         """The same where it does not end early. Raises PrecisionTooLow."""
         run, is_whole = self.steps(count, tangents)
         if not is_whole:

@@ -69,7 +69,7 @@ def valuation(series: nmod_poly, precision: int) -> int | None:
 
 
 @dataclass(frozen=True)
-class Step:
+class JetStep:
     """What is found after one step: valuations in t (None: not below the precision), and the rank of the differential.
 
     `common` is the power of t divided out of all coordinates, of several factors that of their minors put into each
@@ -96,7 +96,7 @@ def images_of_curve(
     precision: int,
     tangents: Sequence[Sequence[int]] = (),
     functions: Sequence[Function] = (),
-) -> Iterator[Step]:
+) -> Iterator[JetStep]:
     """The steps of the curve point + t direction, with its neighbours in the tangent directions; exact.
 
     The equation of the map is one over GF(p), points and vectors are residues (X : Z). Without tangents nothing is said
@@ -136,7 +136,7 @@ def images_of_curve(
             rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         kept = tuple(order or 0 for order in orders)
         denominator = None if None in denominators else sum(order or 0 for order in denominators)
-        yield Step(divided, last, denominator, rank, limit, kept, tuple(curves[0]) if functions else ())
+        yield JetStep(divided, last, denominator, rank, limit, kept, tuple(curves[0]) if functions else ())
 
 
 def _moved(

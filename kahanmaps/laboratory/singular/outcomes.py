@@ -28,10 +28,10 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import NO_ORDERS, NOTHING, AlongCurves, Course, Orders, Range, Tracked
 from kahanmaps.laboratory.singular.jets import (
+    JetStep,
     Letters,
     NotGeneric,
     PrecisionTooLow,
-    Step,
     form_order,
     roots_modulo,
 )
@@ -127,7 +127,7 @@ def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> 
     return minor
 
 
-class Outcome(StrEnum):
+class SingularityOutcome(StrEnum):
     """What becomes of a hypersurface."""
 
     CONFINED = "confined"
@@ -136,7 +136,7 @@ class Outcome(StrEnum):
     UNDECIDED = "undecided"
 
 
-CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = Outcome
+CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = SingularityOutcome
 NO_POINT = "no point was followed"
 NO_TIME = "the time was over before two points were followed (--seconds)"
 POINTS_DIFFER = "the orders along two curves through it modulo different primes are not the same (another --seed)"
@@ -163,10 +163,10 @@ class Hypersurface:
     degree: int = 0
     is_pole: bool = False
     multiplicity: int | None = None
-    status: Outcome = UNDECIDED
+    status: SingularityOutcome = UNDECIDED
     contracted_at: int | None = None
     confined_at: int | None = None
-    steps: tuple[Step, ...] = ()
+    steps: tuple[JetStep, ...] = ()
     primes: tuple[int, ...] = ()
     note: str = ""
     followed: int = 0
@@ -384,7 +384,7 @@ def unwritten(
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
-def _by_ranks(ranks: Sequence[int], full: int) -> tuple[Outcome, int | None, int | None]:
+def _by_ranks(ranks: Sequence[int], full: int) -> tuple[SingularityOutcome, int | None, int | None]:
     """Status, the step that contracts and the step that ends it."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:

@@ -80,7 +80,7 @@ _STOPPED = "the time was over before all singularities were followed (--seconds)
 _DIFFERENT = "the singularities at two values of eps differ (--eps)"
 
 
-class TooLong(InputError):
+class TooLongFormula(InputError):
     """Why the singularities of a composition are not followed."""
 
 
@@ -215,7 +215,7 @@ def singularities(
             return SingularityRun(exact_eps, "?", line.degree, None, (), False, False, False)
         run = _map_by_map(map_, exact_eps, line.degree, seed, limits, progress)
         if run is None and not over.is_bilinear:
-            raise TooLong(
+            raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
                 "such with equations that are linear in both points: of these the singularities are known by random "
                 "points"
@@ -400,7 +400,7 @@ def patterns(
         if is_short and all(can_be_written(map_, value, part) for value in values):
             try:
                 runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
-            except TooLong:
+            except TooLongFormula:
                 return _unknown("the composition is too long for its singularities to be followed")
             found = patterns_of(runs, map_.has_eps)
         else:

@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
-from kahanmaps.algebra.small_systems import Component, decoupling, normal_form, solve_system, without_contained
+from kahanmaps.algebra.small_systems import SolutionComponent, decoupling, normal_form, solve_system, without_contained
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
@@ -209,8 +209,8 @@ class _Search:
     C: fmpq_mat | None
     found: CommutingSystems
     space: CommutingSpace = field(default_factory=lambda: CommutingSpace((), (), 0))
-    points: list[Component] = field(default_factory=list)
-    families: list[Component] = field(default_factory=list)
+    points: list[SolutionComponent] = field(default_factory=list)
+    families: list[SolutionComponent] = field(default_factory=list)
 
     def run(self) -> None:
         f, found = self.f, self.found
@@ -233,7 +233,7 @@ class _Search:
             found.basis = list(self.space.fields)
             found.dimension = len(found.basis) if len(found.basis) == self.space.dimension else None
             size = self.space.dimension
-            whole = Component(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
+            whole = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
             # Where f is affine the space may be large, and often all of it commutes: a proof without equations.
             if found.dimension is not None and f.degree <= 1 and affine(f, self.space.fields) is not None:
                 self._add_family(whole, judge_family(f, self.space, whole, self.settings))
@@ -263,7 +263,7 @@ class _Search:
             else:
                 found.solutions.append(self._field(weights, finding))
 
-    def _solve(self, part: Component, level: int) -> None:
+    def _solve(self, part: SolutionComponent, level: int) -> None:
         """Solve the equations of the order that belongs to `level` inside a part of the space."""
         order, found = ORDERS[level], self.found
         self.settings.progress(f"equations at eps^{order}, {len(part.free)} unknowns")
@@ -277,7 +277,7 @@ class _Search:
             zero = gens[0].context().constant(0)
             moved = [sum((y * T[i, j] for j, y in enumerate(gens) if T[i, j] != 0), zero) for i in range(len(gens))]
             equations = [p.compose(*moved, ctx=zero.context()) for p in equations]
-            part = Component(tuple(v.compose(*moved, ctx=zero.context()) for v in part.values))
+            part = SolutionComponent(tuple(v.compose(*moved, ctx=zero.context()) for v in part.values))
         solutions = solve_system(equations, part.values, self.deadline)
         found.irrational += [text for text in solutions.irrational if text not in found.irrational]
         for component in solutions.components:
@@ -291,7 +291,7 @@ class _Search:
             else:
                 self._leave(component, solutions.reason)
 
-    def _leave(self, part: Component, reason: str) -> None:
+    def _leave(self, part: SolutionComponent, reason: str) -> None:
         """Tell of equations that were not solved; a few of them are enough."""
         texts = [format_polynomial(p) for p in part.equations]
         shown = "; ".join(f"{text if len(text) < 200 else text[:200] + '...'} = 0" for text in texts[:6])
@@ -303,7 +303,7 @@ class _Search:
         elif len(self.found.undecided) == MAX_TOLD:
             self.found.undecided.append("and more equations that were not solved")
 
-    def _family(self, family: Component, level: int) -> None:
+    def _family(self, family: SolutionComponent, level: int) -> None:
         if any(known.contains(family) for known in self.families):
             return
         if not self._in_time():
@@ -321,7 +321,7 @@ class _Search:
                 "and not all of it commutes"
             )
 
-    def _add_family(self, family: Component, finding: Finding) -> None:
+    def _add_family(self, family: SolutionComponent, finding: Finding) -> None:
         if finding.verdict is Verdict.UNDECIDED:
             self.found.undecided.append(f"a family with {len(family.free)} parameters: {finding.evidence.summary}")
             return

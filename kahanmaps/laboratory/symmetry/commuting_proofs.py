@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import Component
+from kahanmaps.algebra.small_systems import SolutionComponent
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding
 from kahanmaps.checks.commute import commutativity
@@ -52,7 +52,7 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
     return judge(claim, identity, settings, proof, formula=_FORMULA)
 
 
-def judge_family(f: QuadraticSystem, space: CommutingSpace, family: Component, settings: Settings) -> Finding:
+def judge_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
     """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
     members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
     proof = affine(f, members) or _in_dimension_one(f, f)
@@ -91,7 +91,7 @@ def _in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None
     return theorems.evidence("the lemma of Moebius maps", [("f and g are proportional, in dimension 1", proportional)])
 
 
-def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Component) -> Identity:
+def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent) -> Identity:
     """Commutativity as an identity in x, eps and the free parameters, which follow the coordinates of the point."""
     n, free = f.dim, family.free
     zero = family.values[0].context().constant(0)

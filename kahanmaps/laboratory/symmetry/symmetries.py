@@ -21,7 +21,7 @@ from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import coefficients_in, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
-from kahanmaps.algebra.small_systems import Component, solve_system
+from kahanmaps.algebra.small_systems import SolutionComponent, solve_system
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.defaults import SECONDS
@@ -420,7 +420,7 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
     return [c.compose(*back, ctx=context) for part in parts for c in coefficients_in(part, n)]
 
 
-def is_singular(part: Component, n: int) -> bool:
+def is_singular(part: SolutionComponent, n: int) -> bool:
     """Whether det S = 0 on the whole linear family of n x n matrices, its entries row by row.
 
     >>> a = ring(["a"]).gens()[0]

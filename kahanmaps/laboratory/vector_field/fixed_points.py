@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_product
-from kahanmaps.algebra.small_systems import Component, groebner, normal_form, quotient_monomials, solve_system
+from kahanmaps.algebra.small_systems import SolutionComponent, groebner, normal_form, quotient_monomials, solve_system
 from kahanmaps.errors import counted
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
@@ -141,7 +141,7 @@ def fixed_points(system: SystemLike, seconds: float = 10) -> FixedPointSearch:
     return FixedPointSearch(tuple(found), undecided)
 
 
-def _on(system: QuadraticSystem, part: Component, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
+def _on(system: QuadraticSystem, part: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
     """The points of one part, whose equations have this Groebner basis."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     free = sorted({*part.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})

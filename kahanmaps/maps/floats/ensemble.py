@@ -26,7 +26,7 @@ from kahanmaps.maps.floats.steps import (
     SINGULAR,
     STATUS,
     Lanes,
-    Table,
+    RecordTable,
     advance_by_numpy,
     map_step,
     planar_step,
@@ -262,7 +262,7 @@ class FloatEnsemble:
             tables = []
             for interval in intervals:
                 length = (first + count) // interval - first // interval if interval else 0
-                tables.append(Table(interval, np.empty((length, rows, self.n))))
+                tables.append(RecordTable(interval, np.empty((length, rows, self.n))))
             self._advance(first, count, [table for table in tables if len(table.states)])
             self.step = first + count
             for interval, states in tables:  # states after the end of an orbit become NaN
@@ -282,7 +282,7 @@ class FloatEnsemble:
                 break
         self._interrupted = False
 
-    def _advance(self, first: int, count: int, tables: list[Table]) -> None:
+    def _advance(self, first: int, count: int, tables: list[RecordTable]) -> None:
         if not self._compiled:
             advance_by_numpy(self._step, self._lanes, first, count, tables)
             return

@@ -21,7 +21,7 @@ from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
-from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, FloatStep, Lanes, Table
+from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, FloatStep, Lanes, RecordTable
 from kahanmaps.maps.floats.straight_line import Code, Value
 
 _FORMS = {  # of operations: $v is the type of a vector of numbers, $m of truth values, $s its name in functions
@@ -144,7 +144,7 @@ class MachineCode:
     def __init__(self, step: FloatStep, width: int) -> None:
         self._engine, self._call = _compiled(_text(step, width))
 
-    def advance(self, lanes: Lanes, low: int, high: int, first: int, steps: int, tables: Sequence[Table]) -> None:
+    def advance(self, lanes: Lanes, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
         """Take the orbits low, ..., high - 1 `steps` steps from the index `first`; there are at most two tables."""
         records: list[Any] = []
         for every, states in tables:

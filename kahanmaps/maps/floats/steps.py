@@ -28,9 +28,9 @@ from kahanmaps.maps.floats.straight_line import (
     MAX_OPERATIONS,
     NEAR,
     Code,
-    Findings,
-    Pair,
-    TooLong,
+    ComplexPair,
+    StepFindings,
+    TooManyOperations,
     extreme,
     solve,
     solve_two,
@@ -44,7 +44,7 @@ RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
 STATUS = ("completed", "overflow", "singular")  # by code; the words of OrbitEnd
 
 
-Write = Callable[[Sequence[Any], Findings], Sequence[Any]]
+Write = Callable[[Sequence[Any], StepFindings], Sequence[Any]]
 
 
 class FloatStep:
@@ -84,13 +84,13 @@ class FloatStep:
 
     def _code(self, careful: bool) -> Code | None:
         limit = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
-        code, asked = Code(self.rows, limit), Findings(careful)
+        code, asked = Code(self.rows, limit), StepFindings(careful)
         try:
             image = self._write(code.arguments, asked)
             for x in image:
                 asked.number(x)
             code.outputs = [*image, *asked.outputs()]
-        except TooLong:
+        except TooManyOperations:
             return None
         return code
 
@@ -98,7 +98,7 @@ class FloatStep:
 def planar_step(blocks: PlanarBlocks) -> FloatStep:
     """A step of a normal form."""
 
-    def write(z: Sequence[Any], asked: Findings) -> list[Any]:
+    def write(z: Sequence[Any], asked: StepFindings) -> list[Any]:
         image: list[Any] = []
         for r, coefficients in enumerate(blocks.coefficients):
             at, real = len(image), r < blocks.reals
@@ -106,8 +106,8 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
                 U, V = z[at : at + 2]
                 a, b, c, d = coefficients.real.tolist()
             else:
-                U, V = Pair(z[at], z[at + 1]), Pair(z[at + 2], z[at + 3])
-                a, b, c, d = (Pair(x.real, x.imag) for x in coefficients.tolist())
+                U, V = ComplexPair(z[at], z[at + 1]), ComplexPair(z[at + 2], z[at + 3])
+                a, b, c, d = (ComplexPair(x.real, x.imag) for x in coefficients.tolist())
             A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
             for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], asked):
                 image += [x] if real else [x.x, x.y]
@@ -120,7 +120,7 @@ def map_step(factors: Sequence[StepOver]) -> FloatStep:
     """A step of each of the maps, one after the other. Raises InputError where a number is out of range."""
     equations = [float_equation(one) for one in factors]
 
-    def write(x: Sequence[Any], asked: Findings) -> Sequence[Any]:
+    def write(x: Sequence[Any], asked: StepFindings) -> Sequence[Any]:
         for equation in equations:
             x = equation.image(x, asked)
         return x
@@ -146,7 +146,7 @@ class FloatEquation(NamedTuple):
             y.append(y[a] * y[b])
         return y
 
-    def image(self, x: Sequence[Any], asked: Findings) -> list[Any]:
+    def image(self, x: Sequence[Any], asked: StepFindings) -> list[Any]:
         """The image of x."""
         y, n = self.monomials(x), len(self.constants)
         rows = []
@@ -286,7 +286,7 @@ class Lanes(NamedTuple):
         return ended
 
 
-class Table(NamedTuple):
+class RecordTable(NamedTuple):
     """Where states go: those at multiples of `every` to the rows of an array (records, rows, n), from the first on."""
 
     every: int
@@ -297,7 +297,7 @@ _FEW = 16  # orbits, up to which Python's own floats are faster than arrays
 _GROUP = 4096  # orbits that are taken together, so that arrays stay in the processor's cache
 
 
-def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tables: Sequence[Table]) -> None:
+def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
     """Take all orbits `steps` steps from the index `first`: in arrays, or a few one by one in Python's own floats."""
     n = lanes.z.shape[1]
     single = n <= _FEW and step.fast_code is not None

@@ -32,7 +32,7 @@ MAX_OPERATIONS = 4000  # of a fast step; longer ones take too long to be compile
 _SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "le": "<=", "eq": "==", "and": "&", "or": "|"}
 
 
-class TooLong(Exception):
+class TooManyOperations(Exception):
     """A step has more operations than are worth being written out."""
 
 
@@ -62,7 +62,7 @@ class Code:
         key = (name, tuple(sorted(keys, key=repr)) if name in ("add", "mul", "and", "or") else keys)
         if key not in self._known:
             if self._limit is not None and len(self.operations) >= self._limit:
-                raise TooLong
+                raise TooManyOperations
             self._known[key] = Value(self, self.inputs + len(self.operations))
             self.operations.append((name, operands))
         return self._known[key]
@@ -192,28 +192,28 @@ def _negated(x: Any) -> Any:
     return operands[0] if name == "neg" else None
 
 
-class Pair:
+class ComplexPair:
     """A complex number x + i y of values or floats."""
 
     def __init__(self, x: Any, y: Any = 0.0) -> None:
         self.x, self.y = x, y
 
-    def __neg__(self) -> Pair:
-        return Pair(-self.x, -self.y)
+    def __neg__(self) -> ComplexPair:
+        return ComplexPair(-self.x, -self.y)
 
-    def __add__(self, other: Any) -> Pair:
-        other = other if isinstance(other, Pair) else Pair(other)
-        return Pair(self.x + other.x, self.y + other.y)
+    def __add__(self, other: Any) -> ComplexPair:
+        other = other if isinstance(other, ComplexPair) else ComplexPair(other)
+        return ComplexPair(self.x + other.x, self.y + other.y)
 
-    def __sub__(self, other: Any) -> Pair:
-        other = other if isinstance(other, Pair) else Pair(other)
-        return Pair(self.x - other.x, self.y - other.y)
+    def __sub__(self, other: Any) -> ComplexPair:
+        other = other if isinstance(other, ComplexPair) else ComplexPair(other)
+        return ComplexPair(self.x - other.x, self.y - other.y)
 
-    def __rsub__(self, other: float) -> Pair:
-        return Pair(other) - self
+    def __rsub__(self, other: float) -> ComplexPair:
+        return ComplexPair(other) - self
 
-    def __mul__(self, other: Pair) -> Pair:
-        return Pair(self.x * other.x - self.y * other.y, self.x * other.y + self.y * other.x)
+    def __mul__(self, other: ComplexPair) -> ComplexPair:
+        return ComplexPair(self.x * other.x - self.y * other.y, self.x * other.y + self.y * other.x)
 
     __radd__ = __add__
 
@@ -243,7 +243,7 @@ def extreme(name: str, x: Any, y: Any) -> Any:
     return values[0].code.emit(name, x, y) if values else max(x, y) if name == "max" else min(x, y)
 
 
-class Findings:
+class StepFindings:
     """What is asked of the numbers on the way through a step.
 
     `good` says that all is as usual, of a fast step; `near`, `zero` and `finite` belong to a careful one: whether a
@@ -291,7 +291,7 @@ def _negation(x: Any) -> Any:
     return not x if isinstance(x, bool) else ~x
 
 
-def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: Findings) -> list[Any]:
+def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: StepFindings) -> list[Any]:
     """The solution y of M y = r, the rows being those of (M | r); any numbers where M is singular.
 
     `bound` gives a number that no entry of M exceeds, which is needed for fast eliminations only.
@@ -345,23 +345,23 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: Findin
     return found
 
 
-def solve_two(rows: Sequence[Sequence[Any]], asked: Findings) -> list[Any]:
+def solve_two(rows: Sequence[Sequence[Any]], asked: StepFindings) -> list[Any]:
     """Cramer's rule for two equations, whose entries may be complex (`Pair`)."""
     (a, b, r), (c, d, s) = rows
     product = b * c
     det = a * d - product
-    if isinstance(det, Pair):
+    if isinstance(det, ComplexPair):
         norm = det.norm()
         asked.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
         share = _inverse(norm)
-        inverse: Any = Pair(det.x * share, -(det.y * share))
+        inverse: Any = ComplexPair(det.x * share, -(det.y * share))
     else:
         asked.pivot(det, NEAR + NEAR * abs(product))
         inverse = _inverse(det)
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
 
-def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: Findings) -> list[Any]:
+def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindings) -> list[Any]:
     """Gaussian elimination; the careful one exchanges rows where a pivot is small."""
     n, M = len(rows), [[*row, 1.0] for row in rows]  # with the sizes of the rows behind the right-hand side
     order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])

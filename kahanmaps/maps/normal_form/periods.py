@@ -40,7 +40,7 @@ _WALK = 1 << 16  # steps taken where no theorem helps
 _AGREEMENTS = 8
 
 
-class Kind(StrEnum):
+class PeriodKind(StrEnum):
     """What the level cubic of a plane is, and so how its period is found (p is not 2 or 3)."""
 
     FIXED = "a fixed point"  # period 1
@@ -63,7 +63,7 @@ class PlanePeriod:
 
     name: str
     q: int
-    kind: Kind
+    kind: PeriodKind
     status: str
     period: int | None
     meets_pole: bool | None
@@ -163,10 +163,10 @@ def _orbit_period(
 
 # Of the kinds for which neither depends on the field: status, period, and whether a pole is met.
 _KNOWN = {
-    Kind.FIXED: ("periodic", 1, False),
-    Kind.NO_VALUE: ("undefined", None, True),
-    Kind.AT_POLE: ("periodic", 4, True),
-    Kind.VERTEX: ("periodic", 3, False),
+    PeriodKind.FIXED: ("periodic", 1, False),
+    PeriodKind.NO_VALUE: ("undefined", None, True),
+    PeriodKind.AT_POLE: ("periodic", 4, True),
+    PeriodKind.VERTEX: ("periodic", 3, False),
 }
 
 
@@ -192,10 +192,10 @@ def plane_period(
     kind, gamma = _classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
-    if kind is Kind.ADDITIVE:
+    if kind is PeriodKind.ADDITIVE:
         return PlanePeriod(name, q, kind, "periodic", prime, _parabolic_meets_pole(block, point, prime))
     at_infinity = poles(block, prime, context)
-    if kind is Kind.TRIANGLE:
+    if kind is PeriodKind.TRIANGLE:
         period = 3 * _multiplicative_order(-8, prime)
         meets_pole = _walk_meets_pole(block, point, period) if at_infinity else False
         return PlanePeriod(name, q, kind, "periodic", period, meets_pole)
@@ -207,17 +207,17 @@ def plane_period(
     return PlanePeriod(name, q, kind, "periodic", order, _smooth_meets_pole(block, point, order, q, at_infinity))
 
 
-def _classify(block: PlanarBlock, point: Triple) -> tuple[Kind, Any]:
+def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
     """The kind of a point (U : V : 1) outside characteristics 2 and 3, and gamma if the level is smooth."""
     above, below = block.level(point)
     if block.is_zero or (point[0] == 0 and point[1] == 0):
-        return Kind.FIXED, None
+        return PeriodKind.FIXED, None
     disc = block.discriminant
     if below == 0:
-        return (Kind.NO_VALUE if above == 0 or disc == 0 else Kind.AT_POLE), None
+        return (PeriodKind.NO_VALUE if above == 0 or disc == 0 else PeriodKind.AT_POLE), None
     delta = disc * above * above / (below * below)
     if delta == 0:
-        return (Kind.FIXED if same_point(block.image(point), point) else Kind.ADDITIVE), None
+        return (PeriodKind.FIXED if same_point(block.image(point), point) else PeriodKind.ADDITIVE), None
     gamma = 1 - delta
     if gamma == 0:
         image = point
@@ -225,8 +225,8 @@ def _classify(block: PlanarBlock, point: Triple) -> tuple[Kind, Any]:
             image = block.image(image)
         # A base point is no vertex, so that the vertices have images, and (0, 0, 0) is none.
         vertex = any(entry != 0 for entry in image) and same_point(image, point)
-        return (Kind.VERTEX if vertex else Kind.TRIANGLE), None
-    return Kind.SMOOTH, gamma
+        return (PeriodKind.VERTEX if vertex else PeriodKind.TRIANGLE), None
+    return PeriodKind.SMOOTH, gamma
 
 
 def _multiplicative_order(number: int, prime: int) -> int:
@@ -301,11 +301,11 @@ def _by_walking(block: PlanarBlock, point: Triple, q: int, name: str) -> PlanePe
     for step in range(1, min(q * q + q + 1, _WALK) + 1):
         image = block.image(image)
         if all(entry == 0 for entry in image):
-            return PlanePeriod(name, q, Kind.STEPPED, "undefined", None, True, f"no value after {step} steps")
+            return PlanePeriod(name, q, PeriodKind.STEPPED, "undefined", None, True, f"no value after {step} steps")
         met = met or bool(image[2] == 0)
         if same_point(image, point):
-            return PlanePeriod(name, q, Kind.STEPPED, "periodic", step, met)
-    return PlanePeriod(name, q, Kind.STEPPED, "undecided", None, met or None, "the start did not come back")
+            return PlanePeriod(name, q, PeriodKind.STEPPED, "periodic", step, met)
+    return PlanePeriod(name, q, PeriodKind.STEPPED, "undecided", None, met or None, "the start did not come back")
 
 
 # Over the rationals.
@@ -369,8 +369,8 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
     kind, gamma = _classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, 0, kind, *_KNOWN[kind])
-    if kind is not Kind.SMOOTH:
-        reason = "a parabolic map" if kind is Kind.ADDITIVE else "-8 is no root of unity"
+    if kind is not PeriodKind.SMOOTH:
+        reason = "a parabolic map" if kind is PeriodKind.ADDITIVE else "-8 is no root of unity"
         return PlanePeriod(name, 0, kind, "aperiodic", None, None, reason)
     order, reason = torsion_order(gamma)
     if order is None:

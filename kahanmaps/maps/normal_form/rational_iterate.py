@@ -26,7 +26,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form import tau, translation
-from kahanmaps.maps.normal_form.periods import Kind, plane_period_over_rationals
+from kahanmaps.maps.normal_form.periods import PeriodKind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Block, PlanesPoint
@@ -203,11 +203,11 @@ class _Plane:
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
         found = plane_period_over_rationals(block, start)
         self.period = found.period
-        self.lazy = found.period is not None or found.kind in (Kind.ADDITIVE, Kind.NO_VALUE)
+        self.lazy = found.period is not None or found.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
         self.pole: int | None = None
-        if found.kind is Kind.NO_VALUE:
+        if found.kind is PeriodKind.NO_VALUE:
             self.pole = 1
-        elif found.kind is Kind.ADDITIVE:
+        elif found.kind is PeriodKind.ADDITIVE:
             r = translation.parabolic_ratio(block, start)
             if not (r is None or isinstance(r, fmpq)):  # an element of a number field: is it rational?
                 r = r.coefficients[0] if not any(entry != 0 for entry in r.coefficients[1:]) else None

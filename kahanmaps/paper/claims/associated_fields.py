@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import Kind, Pairs, claim
+from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
 @claim("Def. 4", "def assoc", "B^T J = J B, B^2 = I", breaks=("J", "B"), blockwise=True)
@@ -130,7 +130,7 @@ def A_is_diagonalisable(o: PaperObjects) -> Pairs:
     "Lemma 7, proof",
     "",
     "A = S diag(W, W^T) S^{-1}, S^T J S = J",
-    kind=Kind.EXISTS,
+    kind=ClaimKind.EXISTS,
     breaks=("A",),
     distinct_roots=True,
     symplectic=False,
@@ -149,7 +149,7 @@ def symplectic_normal_form_of_A(o: PaperObjects) -> Pairs:
     "Lemma 7, proof",
     "",
     "rank E_i = 2 for the projector E_i onto the eigenspace of lambda_i",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     at_most="the rank of a projector is its trace, and the eigenvalue lambda_i is double",
     breaks=("roots",),
     distinct_roots=True,
@@ -176,7 +176,7 @@ def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
     "Lemma 7",
     "",
     "B_1, ..., B_m linearly independent (m > 2; for m = 2 B_2 = -B_1)",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     least_m=3,
     at_most="there are m of them",
     distinct_roots=True,

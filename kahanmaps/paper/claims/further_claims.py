@@ -8,7 +8,7 @@ from typing import Any
 
 from kahanmaps.paper.claims.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import ClaimFunction, Kind, Pairs, claim, entries
+from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
 from kahanmaps.paper.variations import VARIATIONS, Variation, jordan_block, varied
 
 _ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
@@ -60,7 +60,7 @@ def opposite_field(o: PaperObjects) -> Pairs:
     "Structure",
     "",
     "deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     in_general=True,
     at_most="docs/mathematics.md proves it for all n by the content rule",
     breaks=("f",),
@@ -144,7 +144,7 @@ def compatible_poisson_tensors(o: PaperObjects) -> Pairs:
     "A with a Jordan block",
     "",
     "dim of the cubics = 4m, lambda_1 double, chi the minimal polynomial",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     at_most="docs/mathematics.md proves it for every A that is not derogatory",
     least_m=2,
     breaks=("J",),
@@ -175,7 +175,7 @@ def commutativity_for_idempotents(o: PaperObjects) -> Pairs:
     "Maximality",
     "",
     "Res(N_1, N_2) != 0, (l^3 - l) N_i(l) the components of Phi_f o Phi_{l f} - Phi_{l f} o Phi_f on a block",
-    kind=Kind.DIFFERENT,
+    kind=ClaimKind.DIFFERENT,
     in_general=True,
     breaks=("linear",),
     distinct_roots=True,
@@ -348,7 +348,7 @@ def _register_cell(
     if holds:
         more |= {"symplectic": not variation.theorem, "theorem": variation.theorem}
     else:
-        more |= {"kind": Kind.DIFFERENT, "in_general": True}
+        more |= {"kind": ClaimKind.DIFFERENT, "in_general": True}
     claim(
         variation.title, "", formula if holds else f"not {formula}", breaks=breaks if holds else ("unvaried",), **more
     )(cell)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import comb
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import Kind, Pairs, claim
+from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
 @claim(
@@ -83,7 +83,7 @@ def reasons_for_involution(o: PaperObjects) -> Pairs:
     "",
     "A non-scalar => nabla H_0, nabla H_1, nabla H_2 independent",
     only_m=3,
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     breaks=(),
     distinct_roots=True,
     misprint="a non-scalar A may have a minimal polynomial of degree 2 (here A := B_1), and then H_2 is a combination "
@@ -99,7 +99,7 @@ def independence_for_non_scalar_A(o: PaperObjects) -> Pairs:
     "Prop. 1, proof",
     "",
     "minimal polynomial of degree m => nabla H_i independent",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     in_general=True,
     at_most="there are m of them",
     breaks=("repeated", "H0"),
@@ -172,7 +172,7 @@ def solvability_backwards(o: PaperObjects) -> Pairs:
     "Prop. 2, proof",
     "",
     "A X = X A^T: 2m(m-1) independent equations of m(2m-1)",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     at_most="the 3m quadratic forms on the eigenspaces solve them",
     breaks=("repeated", "A"),
     distinct_roots=True,
@@ -198,7 +198,7 @@ def independent_equations(o: PaperObjects) -> Pairs:
     "",
     "dim of the cubics = 4m for any skew-Hamiltonian A",
     only_m=3,
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     breaks=(),
     distinct_roots=True,
     misprint="stated for any A of the kind; its minimal polynomial has to have degree 3. With lambda_1 := lambda_2 (A "
@@ -214,7 +214,7 @@ def dimension_of_the_cubics_for_any_A(o: PaperObjects) -> Pairs:
     "Prop. 2",
     "",
     "dim of the cubics = 4m, rank of the system C(2m+2,3) - 4m",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     at_most="the 4m cubics on the eigenspaces solve them",
     breaks=("repeated", "A"),
     distinct_roots=True,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import Kind, Pairs, claim
+from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
 @claim("Theorem 11", "th integrals", "H~(x~) = H~(x), H~(x^) = H~(x)", breaks=("B", "inhomogeneous"), blockwise=True)
@@ -29,7 +29,7 @@ def K_tilde_is_shared(o: PaperObjects) -> Pairs:
     "Theorem 11",
     "th integrals",
     "rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     in_general=True,
     at_most="nabla K~_i = B_i nabla H~, and the B_i lie in a space of dimension m",
     breaks=("H0",),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import Kind, Pairs, claim
+from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
 @claim(
     "(1)",
     "skew",
     "dim { A : A^T J = J A } = m(2m-1)",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     at_most="the block form (17) has so many parameters",
     breaks=("J",),
     symplectic=False,
@@ -44,7 +44,7 @@ def chain_of_gradients(o: PaperObjects) -> Pairs:
     "Sect. 1",
     "",
     "rank(nabla H_0, ..., nabla H_{m-1}) = m",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     in_general=True,
     at_most="there are m of them",
     breaks=("repeated", "H0"),
@@ -95,7 +95,7 @@ def matrix_differential_equation_of_perturbed_hamiltonians(o: PaperObjects) -> P
     "Sect. 1",
     "",
     "rank(nabla H~_0, ..., nabla H~_{m-1}) = m",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     in_general=True,
     at_most="there are m of them",
     distinct_roots=True,
@@ -110,7 +110,7 @@ def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
     "Sect. 1",
     "",
     "Phi_{f_0} o Phi_{f_1} != Phi_{f_1} o Phi_{f_0}",
-    kind=Kind.DIFFERENT,
+    kind=ClaimKind.DIFFERENT,
     least_m=2,
     in_general=True,
     distinct_roots=True,
@@ -160,7 +160,7 @@ def signs_at_the_eigenvalues(o: PaperObjects) -> Pairs:
     "Sect. 1",
     "",
     "#{ J B_s nabla H_0 } = 2^{m-1} up to sign",
-    kind=Kind.DIFFERENT,
+    kind=ClaimKind.DIFFERENT,
     in_general=True,
     distinct_roots=True,
     breaks=("B=I",),
@@ -180,7 +180,7 @@ def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
     "Sect. 1",
     "",
     "rank { J B_s nabla H_0 } = m",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     in_general=True,
     at_most="B_s is a combination of I, A, ..., A^(m-1)",
     breaks=("B=I",),
@@ -196,7 +196,7 @@ def independent_associated_fields(o: PaperObjects) -> Pairs:
     "Sect. 1",
     "",
     "rank { Phi_{f_s}(x) - x } >= m",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     at_most="it is counted up to m only",
     in_general=True,
     breaks=("B=I",),

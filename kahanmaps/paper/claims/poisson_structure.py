@@ -11,7 +11,7 @@ from math import comb
 from typing import Any
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import Kind, Pairs, claim
+from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
 @claim("Theorem 12 (70)", "Pi short", "Pi = J - eps^2 f'^2 J, skew", breaks=("f",), blockwise=True)
@@ -209,7 +209,7 @@ def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
     "Lemma 13, proof",
     "",
     "these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions",
-    kind=Kind.ATTAINED,
+    kind=ClaimKind.ATTAINED,
     least_m=3,
     at_most="the gradients (C_0 w, ..., C_(m-1) w) solve them",
     breaks=("repeated",),

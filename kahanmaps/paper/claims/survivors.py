@@ -18,7 +18,7 @@ from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.paper.claims.further_claims import STATEMENTS
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, Outcome, claims, same, witness_of
+from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, ClaimOutcome, claims, same, witness_of
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
@@ -86,7 +86,7 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
             except UNDEFINED:
                 continue
             if failure is not None:
-                witness = witness_of(Outcome(o, 1, failure))
+                witness = witness_of(ClaimOutcome(o, 1, failure))
                 return (_words(o, ones), witness) if witness is not None else None
     return None
 

@@ -38,7 +38,7 @@ from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.products import constants_of
 from kahanmaps.laboratory.preserve.results import Search
-from kahanmaps.laboratory.preserve.search import Found, Step, bases_of
+from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -211,8 +211,8 @@ def _written(
     text, bases, reason = product.text(cofactors), list[list[fmpq_mpoly]](), ""
     # The others tell spaces that look alike apart; where they are conjugate they have no formulas themselves.
     for together in [spaces, spaces[:1]][len(spaces) == 1 :]:
-        step = Step("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
-        search = Found([step], [list(together)], cofactors)
+        step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
+        search = SpaceSearch([step], [list(together)], cofactors)
         bases, reason = bases_of(laboratory, laboratory.primes[0], search, deadline)
         if bases:
             break

@@ -39,7 +39,7 @@ _FIRST = 2  # the least n of forms
 Groups = Sequence[tuple[int, ...]]  # of coordinates that have a denominator in common
 
 
-class TooLong(Exception):
+class TooLongRelation(Exception):
     """The orbit lies on elliptic curves, but numbers of its forms are too long to be found yet."""
 
 
@@ -70,7 +70,7 @@ def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> Ellipti
                 return exact.steps(map_over, left_out)
             if search.sections:  # there are numbers, but they are too long
                 if most_primes < _MOST_PRIMES:
-                    raise TooLong
+                    raise TooLongRelation
                 return None
         if not is_special:
             break

@@ -11,7 +11,7 @@ from typing import Protocol
 from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
-from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLong, elliptic_steps
+from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 
 # Relations are looked for when the steps so far took about as long as the search will, which depends on the bits of
 # points, and numbers grow by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they
@@ -90,7 +90,7 @@ class RationalOrbit:
                 try:
                     self.relations = relations(self.map, self.start, image)
                     long = inf
-                except TooLong:
+                except TooLongRelation:
                     long = _AGAIN * image.bits
                 self.since = None if self.relations is None else number + 1
 
