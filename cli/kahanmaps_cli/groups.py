@@ -54,6 +54,7 @@ REMOVED_OPTIONS = {
         ("report", name): "'kahanmaps batch show' shows the results of a batch, 'batch export' writes them for pandas"
         for name in ("--db", "--by", "--value")
     },
+    ("cycles", "--reversor"): "cycles are counted by length and compared with no law",
     ("ensemble", "--arithmetic"): "ensembles are in floating point; kahanmaps orbit has exact, mod:P and ball:BITS",
     ("plot portrait", "--density"): "kahanmaps ensemble -o FILE.npy and numpy.histogram2d count points in cells",
     ("plot portrait", "--from"): "a portrait is computed from a SYSTEM; matplotlib draws the points of a file",

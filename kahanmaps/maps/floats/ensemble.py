@@ -347,7 +347,6 @@ class Watched:
 
 def ensemble(
     system: SystemLike,
-    /,
     starts: Any,
     eps: Any = None,
     steps: int = 0,
