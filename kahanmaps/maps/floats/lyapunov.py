@@ -189,7 +189,7 @@ def lyapunov_exponents(
     ended = len(x) - int(alive.sum())
     alive &= counted > 0
     unit = convention.time_step(size, map_) or 1.0
-    order = np.argsort(-sums[alive], axis=1)
+    order = np.argsort(-sums[alive] / unit, axis=1)  # the unit is negative for negative eps
     early = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
     return Lyapunov(
         unit,
