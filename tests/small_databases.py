@@ -73,7 +73,7 @@ def small_chunks():
 PRELUDE = """
 import json, os, resource, sys, time, urllib.parse  # the last one for scripts that give up the right to load it later
 from kahanmaps.experiments.results import store as store_module
-from kahanmaps.experiments.results.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.results.records import TaskLimits, Outcome, Record, Task
 from kahanmaps.experiments.results.store import Store, StoreError, Unavailable
 
 def task(number):

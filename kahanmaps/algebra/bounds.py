@@ -27,10 +27,10 @@ class CoefficientSize:
 
     That sum is submultiplicative and subadditive, so that bounds follow a computation step by step.
 
-    >>> Size(2, 1.0) * Size(3, 0.5)
-    Size(degree=5, bits=1.5)
-    >>> Size(2, 1.0) + Size(3, 1.0)
-    Size(degree=3, bits=2.0)
+    >>> CoefficientSize(2, 1.0) * CoefficientSize(3, 0.5)
+    CoefficientSize(degree=5, bits=1.5)
+    >>> CoefficientSize(2, 1.0) + CoefficientSize(3, 1.0)
+    CoefficientSize(degree=3, bits=2.0)
     """
 
     degree: int

@@ -94,10 +94,10 @@ def squares(
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "0"])
     >>> g = QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])
-    >>> squares(Pair(f, g, ("f", "g")), [1, 2], "1/10").verdict
+    >>> squares(MapPair(f, g, ("f", "g")), [1, 2], "1/10").verdict
     'closes exactly'
     >>> h = QuadraticSystem.from_text(["x", "y"], ["y^2", "0"])
-    >>> squares(Pair(f, h, ("f", "h")), [1, 2], "1/10").verdict
+    >>> squares(MapPair(f, h, ("f", "h")), [1, 2], "1/10").verdict
     'gap 0.762'
     """
     if not 1 <= steps <= MAX_STEPS:

@@ -147,8 +147,8 @@ SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids
             pytest.param(words, marks=pytest.mark.slow)
             for words in [
                 "cycles paper_m3_irreducible --prime 11",
-                "find-integrals paper_m3",
-                "find-density clebsch_first_flow",
+                "find-integrals kirchhoff_case",
+                "find-density so4_euler_manakov",
                 "degrees zhukovski_volterra_2 --terms 100 --seconds 60",
                 "singularities paper_m2 --steps 10000",
                 "scan lotka_volterra --over a,b,c,d",

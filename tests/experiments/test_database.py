@@ -161,7 +161,7 @@ def made():
         yield task(number)
 
 store_module._CACHE = 100  # so little memory that pages of what is not committed go to the disk
-Store.open(path).plan("a", "another", Limits(), made(), {})
+Store.open(path).plan("a", "another", TaskLimits(), made(), {})
 """
     planned(path, 1, 2, 3, records=[ok(2)])
     with start(script, path) as process:

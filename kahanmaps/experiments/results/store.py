@@ -182,7 +182,7 @@ class Store(Displayed):
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder, Store.open(f"{folder}/results.db", create=True) as store:
-    ...     store.plan("steps", "orbit, m = 2", Limits(time=60), [Task("orbit", {"family": {"m": 2}}, {})], {})
+    ...     store.plan("steps", "orbit, m = 2", TaskLimits(time=60), [Task("orbit", {"family": {"m": 2}}, {})], {})
     ...     [job.task.kind for job in store.pending()]
     Planned(total=1, known=0, new_tasks=1, dropped=0, is_resumed=False)
     ['orbit']

@@ -424,7 +424,7 @@ def is_singular(part: SolutionComponent, n: int) -> bool:
     """Whether det S = 0 on the whole linear family of n x n matrices, its entries row by row.
 
     >>> a = ring(["a"]).gens()[0]
-    >>> is_singular(Component((a, a, a, a)), 2), is_singular(Component((a, a, a, -a)), 2)
+    >>> is_singular(SolutionComponent((a, a, a, a)), 2), is_singular(SolutionComponent((a, a, a, -a)), 2)
     (True, False)
     """
     rows = [[*part.values[i * n : (i + 1) * n], None] for i in range(n)]
