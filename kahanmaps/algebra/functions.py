@@ -21,6 +21,7 @@ from kahanmaps.algebra.matrices import EntryMatrix
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.printing import format_rational_function
+from kahanmaps.algebra.work import count
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
@@ -105,6 +106,7 @@ class FunctionField(Field):
     def pay(self, products: int) -> None:
         """Take so many products of terms from the budget. Raises BudgetExceeded where it has not as many."""
         self.budget -= products
+        count(products)
         if self.budget < 0:
             raise BudgetExceeded("expanding the identity would take too many products of terms")
 

@@ -21,7 +21,6 @@ known from these points only. So an answer is strong evidence, not proof.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -31,6 +30,7 @@ from flint import nmod_mat, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.residues import chinese, random_prime, rational_reconstruction, rational_vector
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import BadPrime, InputError
 
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
@@ -58,27 +58,27 @@ class Unlucky(Exception):
 
 
 @dataclass
-class Budget:
+class Samples:
     """What may still be spent, and how long the vectors of values are."""
 
     max_samples: int
-    deadline: float | None
+    budget: Budget | None
     spent: int = 0
     length: int | None = None
 
     def check(self, wanted: int = 0) -> None:
         if self.spent + wanted > self.max_samples:
             raise Stop(f"{self.spent} values were taken and {wanted} more are needed, the limit is {self.max_samples}")
-        if self.deadline is not None and time.monotonic() > self.deadline:
-            raise Stop(f"the time is over, after {self.spent} values")
+        if self.budget is not None and self.budget.is_spent:
+            raise Stop(f"the budget is spent, after {self.spent} values")
 
 
 class SampledValues:
     """The values modulo one prime so far, and the monomials at their points."""
 
-    def __init__(self, black_box: BlackBox, prime: int, budget: Budget) -> None:
+    def __init__(self, black_box: BlackBox, prime: int, samples: Samples) -> None:
         self.prime = prime
-        self.budget = budget
+        self.samples = samples
         self.points: list[Point] = []
         self.values: list[tuple[int, ...]] = []
         self._black_box = black_box
@@ -87,16 +87,16 @@ class SampledValues:
     def take(self, draw: Callable[[], Point]) -> None:
         """One more value, at the first drawn point that has one."""
         for _ in range(_BAD_POINTS):
-            self.budget.check(1)
+            self.samples.check(1)
             point = draw()
-            self.budget.spent += 1
+            self.samples.spent += 1
             found = self._black_box(self.prime, point)
             if found is not None:
                 values = tuple(int(value) % self.prime for value in found)
-                if self.budget.length is None:
-                    self.budget.length = len(values)
-                if len(values) != self.budget.length:
-                    lengths = f"{self.budget.length} and {len(values)}"
+                if self.samples.length is None:
+                    self.samples.length = len(values)
+                if len(values) != self.samples.length:
+                    lengths = f"{self.samples.length} and {len(values)}"
                     raise InputError(f"found values of lengths {lengths}, expected equally many at all points")
                 self.points.append(point)
                 self.values.append(values)
@@ -186,7 +186,7 @@ def reconstruct(
     seed: int = 0,
     max_degree: int = 40,
     max_samples: int = 3000,
-    deadline: float | None = None,
+    budget: Budget | None = None,
     draw: Callable[[random.Random], int] = random_prime,
 ) -> Reconstruction:
     """The rational functions over Q of the symbols `names` that a black box gives the values of.
@@ -198,7 +198,7 @@ def reconstruct(
         seed: decides the primes (of 61 bits) and points.
         max_degree: along any line the degrees of numerator and denominator add up to at most twice this number.
         max_samples: bound for the number of calls.
-        deadline: a value of `time.monotonic()` at which to give up, looked at between calls.
+        budget: to give up when it is spent, looked at between calls; None for never.
         draw: what gives a random prime, where not all will do.
 
     Returns:
@@ -219,7 +219,7 @@ def reconstruct(
     'not the values of a rational function of degree at most 40 along a line'
     """
     rng = random.Random(seed)
-    budget = Budget(max_samples, deadline)
+    samples = Samples(max_samples, budget)
     primes: list[int] = []
 
     def fresh() -> SampledValues:
@@ -227,19 +227,19 @@ def reconstruct(
         while prime in primes:
             prime = draw(rng)
         primes.append(prime)
-        return SampledValues(black_box, prime, budget)
+        return SampledValues(black_box, prime, samples)
 
     reason = ""
     try:
         for _ in range(_UNLUCKY_PRIMES):
             try:
                 functions = _lift(_first_prime(fresh(), len(names), max_degree, rng), fresh, tuple(names), primes, rng)
-                return Reconstruction(functions, "", budget.spent, tuple(primes))
+                return Reconstruction(functions, "", samples.spent, tuple(primes))
             except Unlucky as unlucky:
                 reason = str(unlucky)
     except Stop as stop:
         reason = str(stop)
-    return Reconstruction(None, reason, budget.spent, tuple(primes))
+    return Reconstruction(None, reason, samples.spent, tuple(primes))
 
 
 # -- modulo the first prime --------------------------------------------------------------------------------------------
@@ -333,7 +333,7 @@ def _along_line(
         slope = 1 / vanishing(t)
         for i in range(count):
             if found[i] is None:
-                values.budget.check()
+                values.samples.check()
                 through[i] += vanishing * ((values.values[-1][i] - through[i](t)) * slope)
         vanishing *= nmod_poly([-t, 1], p)
         for i in range(count):
@@ -412,7 +412,7 @@ def fit(
                         wanted = max(wanted, _solve(values, usable, shapes, [i], below, done))
         if wanted == 0:
             return done
-        values.budget.check(wanted)
+        values.samples.check(wanted)
         for _ in range(wanted):
             values.take(draw)
 
@@ -430,7 +430,7 @@ def _solve(
     Raises Unlucky where there are none.
     """
     p = values.prime
-    values.budget.check()
+    values.samples.check()
     below = shapes[members[0]].below if known is None else known.shape.below
     widths = [len(shapes[i].above) for i in members]
     # A point more than is solved with is held out; without symbols all points are the same.

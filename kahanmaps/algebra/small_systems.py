@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 import random
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,6 +20,7 @@ from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly_ctx, fmpz_mpo
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
+from kahanmaps.algebra.work import Budget
 
 # Of a Groebner basis: polynomials, terms of one, bits of a coefficient. FLINT cannot be interrupted.
 GROEBNER_LIMITS = (120, 400, 4_000)
@@ -88,20 +88,20 @@ class Solutions:
         return not self.unsolved
 
 
-def solve_system(equations: Sequence[fmpq_mpoly], variables: Sequence[fmpq_mpoly], deadline: float) -> Solutions:
+def solve_system(equations: Sequence[fmpq_mpoly], variables: Sequence[fmpq_mpoly], budget: Budget) -> Solutions:
     """The rational solutions of `equations` = 0, polynomials in the ring whose generators are `variables`.
 
-    Exact. `deadline` is a value of time.monotonic(): what is not solved by then is returned as unsolved.
+    Exact. What is not solved when the `budget` is spent is returned as unsolved.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
-    >>> found = solve_system([x**2 - 1, x*y - y], (x, y), time.monotonic() + 10)
+    >>> found = solve_system([x**2 - 1, x*y - y], (x, y), Budget())
     >>> [component.values for component in found.components]
     [(-1, 0), (1, y)]
-    >>> solve_system([x**2 - 2, y], (x, y), time.monotonic() + 10).irrational
+    >>> solve_system([x**2 - 2, y], (x, y), Budget()).irrational
     ['x^2 - 2']
     """
-    solver = _Solver(deadline)
+    solver = _Solver(budget)
     solver.solve(list(equations), tuple(variables))
     found = solver.found
     found.components = without_contained(found.components)
@@ -202,8 +202,8 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
 
 
 class _Solver:
-    def __init__(self, deadline: float) -> None:
-        self.deadline = deadline
+    def __init__(self, budget: Budget) -> None:
+        self.budget = budget
         self.found = Solutions()
         self.stopped = ""
 
@@ -220,8 +220,8 @@ class _Solver:
         if not equations:
             self.found.components.append(SolutionComponent(values))
             return
-        if time.monotonic() > self.deadline:
-            self.stopped = "the time is over"
+        if self.budget.is_spent:
+            self.stopped = "the budget is spent"
         elif len(self.found.components) + len(self.found.unsolved) > MAX_PARTS:
             self.stopped = f"there are more than {MAX_PARTS} parts"
         if self.stopped:

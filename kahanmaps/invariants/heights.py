@@ -36,7 +36,6 @@ in common. Two planes with the same cubic and the same start have all in common,
 from __future__ import annotations
 
 import decimal
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -47,6 +46,7 @@ from typing import Any
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.parsing import wrong_kind
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
@@ -202,11 +202,11 @@ def height_growth(
     normal_form: SystemNormalForm | NoNormalForm | None = None,
     every: int = 1,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
-    deadline: float | None = None,
+    budget: Budget | None = None,
 ) -> HeightGrowth:
     """The heights of an orbit of a map over Q at the steps 0, every, 2 every, ... up to `steps`, as far as it goes.
 
-    It is interrupted after the step in flight when time.monotonic() passes the `deadline`.
+    It is interrupted after the step in flight when the `budget` is spent.
 
     With a `normal_form` (family.system_normal_form) the orbit is walked in normal form, and
     for large `every` its points are reached directly; the numbers are the same. Then every height costs a gcd of
@@ -240,7 +240,7 @@ def height_growth(
         # A return to the start is noticed here: at a multiple of the period, where steps are left out.
         heights: list[int] = []
         origin, back = None, None
-        for point in _in_time(iterates, deadline):
+        for point in _within(iterates, budget):
             if origin is None:
                 origin = point.value
             elif back is None and point.value == origin:
@@ -255,7 +255,7 @@ def height_growth(
     else:
         form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
         orbit = Orbit(kahan_map, start, at[-1], normal_form=form, max_digits=max_digits)
-        heights = [height_of(point) for point in _in_time(orbit, deadline) if point.step % every == 0]
+        heights = [height_of(point) for point in _within(orbit, budget) if point.step % every == 0]
         assert orbit.end is not None
         end = orbit.end
     return HeightGrowth(tuple(heights), end, every, method)
@@ -272,11 +272,11 @@ def decimal_text(value: Fraction, digits: int = 6) -> str:
     return format(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)), "f")
 
 
-def _in_time(orbit: Orbit, deadline: float | None) -> Iterator[OrbitPoint]:
-    """The points, until the time is over."""
+def _within(orbit: Orbit, budget: Budget | None) -> Iterator[OrbitPoint]:
+    """The points, until the budget is spent."""
     for point in orbit:
         yield point
-        if deadline is not None and time.monotonic() > deadline:
+        if budget is not None and budget.is_spent:
             orbit.interrupt()
 
 

@@ -7,7 +7,6 @@ The number of integrals and the growth are two separate findings: a map may have
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 import sys
@@ -19,9 +18,10 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from kahanmaps.algebra.printing import attributes, format_polynomial
+from kahanmaps.algebra.work import Budget, units_at
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.inline import as_file
-from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.errors import KahanmapsError
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
@@ -32,9 +32,10 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
-# Seconds for everything, by dimension; about half of it is used where nothing is hard.
-_SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
-_MOST_SECONDS = 150.0
+# Units of work at effort 1 by dimension, for the parts that read integrals, and once more for the others.
+# Most maps take a small part of them.
+_UNITS = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
+_MOST_UNITS = 150e6
 
 
 @dataclass
@@ -100,7 +101,7 @@ class Analysis(Findings, Printed):
             **attributes(self, "symbols"),
             **eps_record(self.eps, self.file.map),
             "arithmetic": "exact formulas, from residues modulo primes",
-            **attributes(self, "seed", "seconds", "dim", "interrupted"),
+            **attributes(self, "seed", "effort", "units", "dim", "interrupted"),
             "verdict": {
                 "integrability": final.kind,
                 "integrals": final.integrals if self.integrals_were_counted else None,
@@ -126,14 +127,14 @@ def analyze(
     symbols: Sequence[str] = (),
     eps: Any = None,
     time_step: Any = None,
-    seconds: float | None = None,
+    effort: int = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
     reached: Callable[[Analysis], None] = lambda _: None,
     parts: Sequence[Part] = ANALYSES,
     processes: int = 1,
 ) -> Analysis:
-    """What a map preserves and how it grows, within a time budget.
+    """What a map preserves and how it grows, within a budget of counted work.
 
     Args:
         system: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an
@@ -141,7 +142,7 @@ def analyze(
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
         eps: an exact number, to analyse the map at that eps only; None for every eps.
         time_step: 2 eps, in its place.
-        seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
+        effort: 1, or more: each more doubles the work that searches may take, each less halves it.
         seed: of everything random.
         progress: is told what is being done.
         reached: gets what is known, at the beginning and after each part.
@@ -150,10 +151,10 @@ def analyze(
             second processor (on Linux only; what runs in other threads should bear a fork). The answers are the same.
 
     Returns:
-        An `Analysis`. Parts that there was no time for are named in `skipped`.
+        An `Analysis`, the same on any machine at any load. Parts that could not be done are named in `skipped`.
 
     Raises:
-        InputError: for eps = 0, unknown symbols, and a time that is not positive.
+        InputError: for eps = 0, unknown symbols, and an effort that is no integer from -20 to 40.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = analyze(load("nahm_tetrahedral"))
@@ -161,11 +162,9 @@ def analyze(
     ('integrable', 1, 'quadratic')
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
-    if seconds is not None and not (seconds > 0 and math.isfinite(seconds)):
-        raise InputError(f"found {seconds} seconds, expected a positive number")
     laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work
-    total = seconds if seconds is not None else _SECONDS.get(file.dim, _MOST_SECONDS)
-    found = Analysis(file, laboratory.eps, total, seed, laboratory.free_symbols, parts=tuple(parts))
+    units = units_at(effort, _UNITS.get(file.dim, _MOST_UNITS))
+    found = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, parts=tuple(parts))
     found.defect = laboratory.defect if file.is_quadratic else ""
     run = Run(found, laboratory, symbols, progress)
     todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
@@ -174,7 +173,12 @@ def analyze(
     can_fork = processes > 1 and processors() > 1 and sys.platform == "linux"
     apart = [part for part in todo if part.is_apart and can_fork]
     skipped: dict[str, str] = {}
-    with _second_process(run, apart) as outcomes:
+    # Parts that may be done apart have a budget of their own, so that it is the same with one process and with two.
+    accounts = {
+        is_apart: _Account(run, [part for part in todo if part.is_apart is is_apart], units)
+        for is_apart in (False, True)
+    }
+    with _second_process(run, apart, accounts[True]) as outcomes:
         here, there = [part for part in todo if part not in apart], list(apart)
         while here or there:
             has_come = bool(there) and (not here or outcomes.poll())
@@ -183,7 +187,8 @@ def analyze(
             if has_come:
                 with suppress(EOFError, OSError):  # the process was killed, or met an error, which it meets here again
                     outcome = outcomes.recv()
-            result, reason = outcome or _outcome(run, part)
+            result, reason, spent = outcome or accounts[part.is_apart].outcome(part)
+            found.units += spent
             if reason:
                 skipped[part.name] = f"{part.name}: {reason}"
                 found.skipped = [skipped[one.name] for one in todo if one.name in skipped]
@@ -196,22 +201,30 @@ def analyze(
             found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")
         else:
             found.skipped.append(f"{others}: for fields only")
-    found.elapsed = total - run.left
     return found
 
 
-def _outcome(run: Run, part: Part) -> tuple[Any, str]:
-    """What a part found; or None, and why it was not done."""
-    if run.left <= 0:
-        return None, "the time was over"
-    try:
-        return part.look(run, **run.budget(part)), ""
-    except KahanmapsError as error:
-        return None, str(error)
+class _Account:
+    """The units that parts share, one after the other: what one leaves goes to those after it."""
+
+    def __init__(self, run: Run, parts: Sequence[Part], units: float) -> None:
+        self.run, self.waiting, self.units = run, list(parts), units
+
+    def outcome(self, part: Part) -> tuple[Any, str, int]:
+        """What a part found; or None, and why it was not done; and the units that it took."""
+        weight, weights = self.run.weight(part), sum(map(self.run.weight, self.waiting))
+        self.waiting.remove(part)
+        budget = Budget(self.units * weight / weights)
+        try:
+            result, reason = part.look(self.run, **self.run.given(part, budget)), ""
+        except KahanmapsError as error:
+            result, reason = None, str(error)
+        self.units = max(0, self.units - budget.spent)
+        return result, reason, budget.spent
 
 
 @contextmanager
-def _second_process(run: Run, parts: Sequence[Part]) -> Iterator[Connection]:
+def _second_process(run: Run, parts: Sequence[Part], account: _Account) -> Iterator[Connection]:
     """A copy of this process that does the parts, if there are any, and sends their outcomes; it ends with the block.
 
     As a copy it has the map and all functions without being told; what it finds comes back as pickles.
@@ -228,10 +241,10 @@ def _second_process(run: Run, parts: Sequence[Part]) -> Iterator[Connection]:
         run.progress = lambda _: None
         with suppress(Exception):
             for part in parts:
-                result, reason = _outcome(run, part)
+                result, reason, spent = account.outcome(part)
                 if not reason:
                     run.found[part.result] = result
-                sender.send((result, reason))
+                sender.send((result, reason, spent))
 
     process = get_context("fork").Process(target=work, daemon=True)
     with suppress(OSError):  # no memory for one more process, or too many: then all is done here

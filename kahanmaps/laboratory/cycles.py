@@ -9,7 +9,6 @@ levels, so integrable maps have longer cycles as well. Source: roberts-jogia-viv
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -27,6 +26,7 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.time_limit import TimeLimit
 
 MAX_POINTS = 2_000_000  # of a whole space, up to dimension 6; half as many with each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
@@ -94,14 +94,13 @@ def cycle_census(
     samples: int | None = None,
     steps: int = DEFAULT_STEPS,
     seed: int = 0,
-    seconds: float | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Census:
     """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
 
     A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
     looked at up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
-    points to follow (500 in larger spaces), for at most `steps` steps each. After `seconds` the work stops and says so.
+    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends it with what is known.
     Of a composition each map is applied in turn: a point is indeterminate where one of them is not defined. Above
     dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
     Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
@@ -114,7 +113,7 @@ def cycle_census(
     exact_eps, map_, prime = rational(resolve_eps(eps, time_step)), as_map(system), integer(prime, "prime")
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
-    space = _ProjectiveMap(map_, exact_eps, prime, None if seconds is None else time.monotonic() + seconds)
+    space = _ProjectiveMap(map_, exact_eps, prime)
     census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
         return _of_all_points(space, census, progress)
@@ -135,7 +134,7 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
             progress(f"p = {p}: the images of {low} of {count} points")
             found = places @ space.images(codes[low : low + space.portion] // places[:, None] % p)
             image[low : low + len(found)] = np.where(found > 0, np.searchsorted(codes, found), count)
-    except TimeoutError:
+    except TimeLimit:
         return replace(census, stopped=True)
     last = image
     for _ in range(count.bit_length()):  # doubles the number of steps, until all orbits are on their cycles
@@ -175,7 +174,7 @@ def _of_samples(
                 lengths[done] = int(is_back.sum())
             goes_on = ~(is_lost | is_back)
             points, start = points[:, goes_on], start[:, goes_on]
-    except TimeoutError:
+    except TimeLimit:
         stopped = True
     census = replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths)
     return replace(census, indeterminate=lost[0], pre_indeterminate=lost[1], open=start.shape[1])
@@ -184,11 +183,11 @@ def _of_samples(
 class _ProjectiveMap:
     """A map at one eps on P^n over GF(p); points are columns of n + 1 residues, the last that is not 0 being 1."""
 
-    def __init__(self, map_: BirationalMap, eps: fmpq, prime: int, deadline: float | None) -> None:
+    def __init__(self, map_: BirationalMap, eps: fmpq, prime: int) -> None:
         if not 2 < prime < MAX_PRIME or map_.dim > MAX_DIMENSION:  # modulo 2 every Kahan map is the identity
             expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
-        self.prime, self.deadline = prime, deadline
+        self.prime = prime
         self.portion = 1 << max(8, 18 - map_.dim)  # points at a time: their minors should stay in the cache
         # Of each map of a composition the forms of its image, or a matrix of forms whose minors they are, as terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
@@ -204,9 +203,7 @@ class _ProjectiveMap:
             self.maps.append((by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """The images of at most `portion` points; columns of zeros where there is none. Raises TimeoutError."""
-        if self.deadline is not None and time.monotonic() > self.deadline:
-            raise TimeoutError
+        """The images of at most `portion` points; columns of zeros where there is none."""
         p = self.prime
         for by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}

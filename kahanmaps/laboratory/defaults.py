@@ -1,20 +1,28 @@
 """How far analyses go unless they are told: one table for `analyze` and for the commands that do one of them alone.
 
-`analyze` gives each of its parts a share of a time by dimension, of which no share is longer than what stands here, so
-that no command finds less than `analyze` does.
+They are bounded by units of counted work (algebra/work.py). `analyze` gives each of its parts a share of units by
+dimension, of which no share is larger than what stands here, so that no command finds less than `analyze` does.
 """
 
 from __future__ import annotations
 
-SECONDS = {
-    "integrals": 60.0,
-    "densities": 60.0,
-    "Poisson tensors": 60.0,
-    "singularities": 60.0,  # for each eps
-    "degrees": 40.0,  # singularities are followed in this time, which `analyze` does apart
-    "heights": 30.0,
-    "symmetries": 30.0,
-    "commuting systems": 60.0,
+from kahanmaps.algebra.work import Budget, units_at
+
+UNITS = {
+    "integrals": 60e6,
+    "densities": 60e6,
+    "Poisson tensors": 60e6,
+    "Darboux polynomials": 60e6,
+    "singularities": 60e6,  # for each eps
+    "degrees": 40e6,  # singularities are followed within this, which `analyze` does apart
+    "dynamical degree": 10e6,
+    "heights": 30e6,
+    "symmetries": 30e6,
+    "commuting systems": 60e6,
+    "fixed points": 10e6,
+    "equivalent systems": 10e6,
+    "limits": 10e6,
+    "invariant curves": 2e6,
 }
 ITERATE_DEGREE = 200_000  # the largest of an iterate that is measured
 
@@ -22,3 +30,8 @@ ITERATE_DEGREE = 200_000  # the largest of an iterate that is measured
 def tensor_degree(dim: int) -> int:
     """The largest degree of the entries of Poisson tensors: 3 in dimension 3, where it takes a second, and else 2."""
     return 3 if dim == 3 else 2
+
+
+def budget_for(search: str, effort: int | Budget) -> Budget:
+    """The budget of a search at an effort, of which 1 is the default and each more doubles the units; or as given."""
+    return effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS[search]))

@@ -7,6 +7,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.family.tensor import TensorStructure
@@ -32,7 +33,7 @@ class Findings:
 
     file: SystemFile
     eps: fmpq | None
-    seconds: float
+    effort: int | Budget
     seed: int
     symbols: tuple[str, ...] = ()
     defect: str = ""  # why the Kahan map at this eps is not birational; empty where it is, and for other maps
@@ -55,7 +56,7 @@ class Findings:
     further: dict[str, Any] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     pending: list[str] = field(default_factory=list)  # the parts that were not gone through yet
-    elapsed: float = 0.0
+    units: int = 0  # of counted work that the parts took
 
     def __getitem__(self, result: str) -> Any:
         """The result of a part, None if it was not reached."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -17,6 +16,7 @@ from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.polynomials import RationalFunction, ring, substitute
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
@@ -235,13 +235,13 @@ class Laboratory:
         self,
         model: Spaces,
         spaces_on: Callable[[ModularMap], Spaces | None],
-        deadline: float,
+        budget: Budget,
         variables: Sequence[str] = (),
         eps_enters: str = "",
     ) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
 
-        `spaces_on` returns None where the map is special. The search ends at `deadline`, a value of time.monotonic().
+        `spaces_on` returns None where the map is special. The search ends when the `budget` is spent.
         Without other `variables` they are those of the map; `eps_enters` is as for formulas in these unless given.
         """
         return closed_forms(
@@ -252,5 +252,5 @@ class Laboratory:
             eps_enters or self.eps_enters,
             root=self.root,
             seed=self.seed,
-            seconds=max(1.0, deadline - time.monotonic()),
+            budget=budget,
         )

@@ -12,6 +12,7 @@ from flint import nmod, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
+from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap
@@ -59,6 +60,7 @@ class ModularMap:
 
     def step(self, x: Point) -> Point | None:
         """The image of a point, None where the map has no value."""
+        count(10 + 2 * self.dim**3)
         try:
             return tuple(int(entry) for entry in self.map.step(x))
         except SingularStep:
@@ -162,6 +164,7 @@ def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: 
     x, table = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
     for layer in layers:
         table += [table[place] * x[variable] for variable, place in layer]
+    count(len(table) / 10)
     return table
 
 

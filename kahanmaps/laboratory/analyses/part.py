@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
@@ -10,6 +9,7 @@ from math import inf
 from typing import Any
 
 from kahanmaps.algebra.printing import plain
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.known import KnownStatement
@@ -32,7 +32,7 @@ class Of(Flag):
 class Part:
     """One analysis, a row of `table.py`.
 
-    `look(run, seconds=..., progress=...)` returns what was found, or None where it does not apply. It becomes
+    `look(run, effort=..., progress=...)` returns what was found, or None where it does not apply. It becomes
     `found[result]`, and by its `to_json` the value of this key in JSON, unless `json` says it in another way.
     `statements` are the lines of the section `title`; the section is complete after this part and those in `reads`.
     """
@@ -42,7 +42,7 @@ class Part:
     title: str = ""
     statements: Callable[[Any], Sequence[KnownStatement]] | None = None
     of: Of = Of.FIELDS
-    share: float = 0.1  # of the whole time
+    share: float = 0.1  # of the whole budget
     result: str = ""  # the name, unless another is given
     reads: tuple[str, ...] = ()
     # The dimension above which it comes last and gets a quarter of its share: others cannot make use of it then.
@@ -60,7 +60,7 @@ class Part:
 
 
 class Run:
-    """One map under analysis, the time that is left for it, and what was found so far."""
+    """One map under analysis, and what was found so far."""
 
     def __init__(
         self, found: Findings, laboratory: Laboratory, symbols: Sequence[str], progress: Callable[[str], None]
@@ -72,7 +72,7 @@ class Run:
         # read.
         self.bare = file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
         self.asked: dict[str, Any] = {"symbols": symbols, "eps": found.eps, "seed": found.seed}
-        self.has_symbols, self.progress, self._began = bool(laboratory.symbols), progress, time.monotonic()
+        self.has_symbols, self.progress = bool(laboratory.symbols), progress
 
     @property
     def field(self) -> QuadraticSystem:
@@ -85,18 +85,15 @@ class Run:
         """The integrals that were found in closed form."""
         return () if self.found.integrals is None else self.found.integrals.integrals
 
-    @property
-    def left(self) -> float:
-        """The seconds that are left."""
-        return self.found.seconds - (time.monotonic() - self._began)
-
     def applies(self, part: Part) -> bool:
         """Whether the part can be done over the field of numbers, and for a map of this kind."""
         kind = Of.NUMBER_FIELDS if self.root is not None else Of.MAPS if self.system is None else Of.FIELDS
         return kind in part.of
 
-    def budget(self, part: Part) -> dict[str, Any]:
-        """The seconds for a part, and whom it tells what it does."""
-        share = part.share / 4 if self.dim > part.slow_above else part.share
-        seconds = max(0.5, min(share * self.found.seconds, self.left))
-        return {"seconds": seconds, "progress": lambda text: self.progress(f"{part.name}: {text}")}
+    def weight(self, part: Part) -> float:
+        """The weight of a part among the others, by which they share the budget."""
+        return part.share / 4 if self.dim > part.slow_above else part.share
+
+    def given(self, part: Part, budget: Budget) -> dict[str, Any]:
+        """What a part is called with: its budget, and whom it tells what it does."""
+        return {"effort": budget, "progress": lambda text: self.progress(f"{part.name}: {text}")}

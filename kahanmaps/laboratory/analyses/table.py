@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from kahanmaps.algebra.printing import attributes
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.family.tensor import TensorStructure, tensor_structure
@@ -62,30 +64,30 @@ def _algebra(run: Run, **_: Any) -> TensorStructure | None:
     return None if isinstance(run.found.normal_form, SystemNormalForm) else tensor_structure(run.field)
 
 
-def _singularities(run: Run, seconds: float, **budget: Any) -> list[SingularityRun]:
+def _singularities(run: Run, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
     """What becomes of contracted hypersurfaces, at two values of eps or the given one; none of too large a map."""
     values = default_eps(run.map, run.seed) if run.found.eps is None else (run.found.eps,)
-    seconds /= len(values)
-    if not all(can_be_written(run.map, value, seconds) for value in values):
+    if not all(can_be_written(run.map, value, effort.part(1 / len(values))) for value in values):
         return []
-    return [follow(run.map, value, seed=run.seed, seconds=seconds, **budget) for value in values]
+    stages = zip(values, effort.share([1] * len(values)), strict=True)
+    return [follow(run.map, value, seed=run.seed, effort=stage, progress=progress) for value, stage in stages]
 
 
-def _degrees(run: Run, **budget: Any) -> DegreeGrowth:
+def _degrees(run: Run, **given: Any) -> DegreeGrowth:
     """Degrees of the iterates, with the patterns of singularities to explain them."""
     runs = run.found.singularities if run.dim <= WRITTEN_DIMENSION else []
     # Where they are known to the end and are those that `degrees` would ask for itself.
     known = patterns_of(runs) if runs else None
-    given: dict[str, Any] = {"patterns": None if known is None or known.running else known, "seed": run.seed}
-    return degree_growth(run.map, run.found.eps, **given, **budget)
+    patterns = None if known is None or known.running else known
+    return degree_growth(run.map, run.found.eps, patterns=patterns, seed=run.seed, **given)
 
 
-def _curves(run: Run, seconds: float, **_: Any) -> Pencil | None:
+def _curves(run: Run, effort: Budget, **_: Any) -> Pencil | None:
     """On which curves a planar map with one integral moves."""
     proved = [one for one in run.integrals if one.verdict is Verdict.PROVED]
     if run.dim != 2 or len(proved) != 1 or run.has_symbols:
         return None
-    return pencil_of(proved[0].name, proved[0].function, run.found.eps, seed=run.seed, seconds=seconds)
+    return pencil_of(proved[0].name, proved[0].function, run.found.eps, seed=run.seed, effort=effort)
 
 
 def _curves_json(found: Findings) -> dict[str, Any]:
@@ -110,24 +112,24 @@ def _relations(run: Run, **_: Any) -> tuple[SparseRelation, ...]:
     return found
 
 
-def _poisson(run: Run, **budget: Any) -> PoissonSearch | None:
+def _poisson(run: Run, effort: Budget, **given: Any) -> PoissonSearch | None:
     """Invariant tensors of low degree, with their Casimirs and the integrals in involution."""
     if run.dim not in _POISSON_DIMENSIONS:
         return None
-    found = find_poisson(run.bare, integrals=(), **run.asked, **budget)
-    return with_brackets(found, run.integrals, budget["seconds"])
+    found = find_poisson(run.bare, integrals=(), **run.asked, effort=effort, **given)
+    return with_brackets(found, run.integrals, effort)
 
 
-def _densities(run: Run, **budget: Any) -> DensitySearch:
+def _densities(run: Run, **given: Any) -> DensitySearch:
     """One in closed form, or else a product of powers of factors of the integrals, and whether there are others."""
-    return with_factors(find_densities(run.bare, **run.asked, integrals=(), **budget), run.integrals)
+    return with_factors(find_densities(run.bare, **run.asked, integrals=(), **given), run.integrals)
 
 
-def _flow(run: Run, **budget: Any) -> FlowAndMap | None:
+def _flow(run: Run, **given: Any) -> FlowAndMap | None:
     """The limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
     if run.found.integrals is None:
         return None
-    flow = flow_and_map(run.found.integrals, known=run.found.integral_count, **budget)
+    flow = flow_and_map(run.found.integrals, known=run.found.integral_count, **given)
     return None if flow is None else with_limit(flow, run.found.densities)
 
 
@@ -161,7 +163,7 @@ ANALYSES = (
     ),
     Part(
         "fixed points",
-        lambda run, seconds, **_: fixed_points(run.field, seconds=seconds),
+        lambda run, effort, **_: fixed_points(run.field, effort),
         "vector field",
         statements.of_vector_field,
         result="fixed_points",
@@ -169,7 +171,7 @@ ANALYSES = (
     ),
     Part(
         "equivalent systems",
-        lambda run, seconds, **_: equivalent_system(run.found.file, run.found.fixed_points, seconds=seconds),
+        lambda run, effort, **_: equivalent_system(run.found.file, run.found.fixed_points, effort),
         result="equivalent",
     ),
     # Degrees make use of singularities; but in more dimensions these are slow, come last, and are not waited for.
@@ -189,7 +191,7 @@ ANALYSES = (
     Part("degrees", _degrees, "growth", statements.of_growth, Of.EVERY, share=0.25, reads=("heights",), is_apart=True),
     Part(
         "integrals",
-        lambda run, **budget: find_integrals(run.bare, **run.asked, **budget),
+        lambda run, **given: find_integrals(run.bare, **run.asked, **given),
         "integrals",
         statements.of_integrals,
         Of.EVERY,
@@ -216,16 +218,14 @@ ANALYSES = (
     Part("the flow", _flow, "the flow", statements.of_flow, Of.MAPS_OVER_Q, share=0.06, result="flow"),
     Part(
         "heights",
-        lambda run, **budget: height_survey(
-            run.map, run.found.eps, starts=2, max_digits=5_000, seed=run.seed, **budget
-        ),
+        lambda run, **given: height_survey(run.map, run.found.eps, starts=2, max_digits=5_000, seed=run.seed, **given),
         of=Of.EVERY,
         share=0.08,
         is_apart=True,
     ),
     Part(
         "symmetries",
-        lambda run, **budget: linear_symmetries(run.field, **budget),
+        lambda run, **given: linear_symmetries(run.field, **given),
         "symmetry",
         statements.of_symmetries,
         is_apart=True,
@@ -233,8 +233,8 @@ ANALYSES = (
     Part(
         "commuting systems",
         # All g of a kind, for every eps.
-        lambda run, **budget: (
-            find_commuting(run.system or run.map, seed=run.seed, **budget) if run.found.eps is None else None
+        lambda run, **given: (
+            find_commuting(run.system or run.map, seed=run.seed, **given) if run.found.eps is None else None
         ),
         "commuting systems",
         statements.of_commuting_systems,

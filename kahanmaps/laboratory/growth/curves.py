@@ -17,7 +17,6 @@ fast as series; in dimension 6 the two are even.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import reduce
@@ -26,6 +25,7 @@ from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import Budget
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
@@ -72,13 +72,13 @@ class Line:
         self,
         map_: MapOver,
         rng: random.Random,
-        deadline: float,
+        budget: Budget,
         max_degree: int,
         start: Sequence[nmod_poly] | None = None,
     ) -> None:
         p = self.prime = map_.field.characteristic
         self.eps = int(map_.eps)
-        self._rng, self._deadline, self._max_degree = rng, deadline, max_degree
+        self._rng, self._budget, self._max_degree = rng, budget, max_degree
         self._context = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
         self._equations = map_.equations
         self.steps = 0
@@ -136,7 +136,7 @@ class Line:
         return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
 
     def _require_time(self) -> None:
-        if time.monotonic() > self._deadline:
+        if self._budget.is_spent:
             raise Stopped(Ended.TIME, f"the time was over at iterate {self.steps + 1}")
 
     def _image(self, equation: Equation, length: int) -> list[nmod_poly]:

@@ -17,9 +17,7 @@ known, and its logarithm is the algebraic entropy (bellon-viallet-1999).
 
 from __future__ import annotations
 
-import math
 import random
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -30,10 +28,11 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.printing import attributes, format_number
+from kahanmaps.algebra.work import Budget
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.defaults import ITERATE_DEGREE, SECONDS
+from kahanmaps.laboratory.defaults import ITERATE_DEGREE, budget_for
 from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
 from kahanmaps.laboratory.growth.proofs import (
@@ -121,7 +120,7 @@ class DegreeGrowth(Printed):
             return "degrees drop where no contracted hypersurface meets points without a value (another --seed)"
         if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
             last = max(self.patterns.lengths)
-            return f"after a pattern of {last} steps {needed - 1} iterates are needed (--seconds, --max-degree)"
+            return f"after a pattern of {last} steps {needed - 1} iterates are needed (--effort, --max-degree)"
         return ""
 
     @property
@@ -270,7 +269,7 @@ def degree_growth(
     eps: Any = None,
     *,
     time_step: Any = None,
-    seconds: float = SECONDS["degrees"],
+    effort: int | Budget = 1,
     max_terms: int | None = None,
     max_degree: int = ITERATE_DEGREE,
     seed: int = 0,
@@ -283,11 +282,11 @@ def degree_growth(
 
     Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and it is explained by
     the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
-    d_1, ..., d_max_terms. Stops in any case after about `seconds`, or before a degree above `max_degree`. `patterns`
-    are those of the singularities, which are followed here, for `steps` steps, where they are not given. Unless
-    `enclosed` is false, exponential growth in the plane is proved. Modulo random primes of 61 bits, so the answer is
-    measured and not proved, but for the bounds of the dynamical degree of planar maps; the same for the same `seed`,
-    except for where the time ends it. Raises InputError for wrong values.
+    d_1, ..., d_max_terms. Stops in any case when the budget is spent, which doubles with each more of `effort`, or
+    before a degree above `max_degree`. `patterns` are those of the singularities, which are followed here, for `steps`
+    steps, where they are not given. Unless `enclosed` is false, exponential growth in the plane is proved. Modulo
+    random primes of 61 bits, so the answer is measured and not proved, but for the bounds of the dynamical degree of
+    planar maps; the same for the same `seed`. Raises InputError for wrong values.
 
     Source: bellon-viallet-1999.
 
@@ -300,15 +299,13 @@ def degree_growth(
     exact = None if eps is None else rational(eps)
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-    if not (seconds > 0 and math.isfinite(seconds)):
-        raise InputError(f"found {seconds} seconds, expected a positive number")
     if max_terms is not None and not 0 <= integer(max_terms, "max_terms") <= _MOST_TERMS:
         raise InputError(f"found {max_terms} terms, expected 0 to {_MOST_TERMS}")
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     if max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    return _Search(as_map(system), exact, time.monotonic() + seconds, max_degree, seed, steps, patterns).run(
+    return _Search(as_map(system), exact, budget_for("degrees", effort), max_degree, seed, steps, patterns).run(
         max_terms, enclosed, progress
     )
 
@@ -319,7 +316,7 @@ class _Search:
 
     map: BirationalMap
     eps: fmpq | None
-    deadline: float
+    budget: Budget
     max_degree: int
     seed: int
     steps: int | None
@@ -356,7 +353,7 @@ class _Search:
         def line() -> Line:
             while True:
                 try:
-                    return Line(reduced(self.map, self.eps, rng), rng, self.deadline, self.max_degree)
+                    return Line(reduced(self.map, self.eps, rng), rng, self.budget, self.max_degree)
                 except BadPrime:
                     continue
 
@@ -380,7 +377,7 @@ class _Search:
         primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
         found = self._result(ended, message, primes=primes, residues=residues, notes=tuple(self.notes))
         contracted = self.patterns
-        if contracted is not None and contracted.at and self.eps is None and time.monotonic() <= self.deadline:
+        if contracted is not None and contracted.at and self.eps is None and not self.budget.is_spent:
             named = with_eps(self.map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
             found = replace(found, patterns=replace(contracted, contracted=named))
         period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
@@ -388,8 +385,9 @@ class _Search:
             found = replace(found, proof=linear_iterate(self.map, self.eps, period))
         if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
             return found
-        left = max(1.0, self.deadline - time.monotonic())
-        return replace(found, enclosure=enclose(self.map, self.eps, seed=self.seed, seconds=left, progress=progress))
+        return replace(
+            found, enclosure=enclose(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
+        )
 
     def _result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
         known: dict[str, Any] = {"primes": (), "residues": (), "patterns": self.patterns, **more}
@@ -428,8 +426,7 @@ class _Search:
     def _follow(self) -> None:
         """What the singularities say, if that was not asked before and the map is not affine."""
         if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
-            left = max(0.0, self.deadline - time.monotonic())
-            given: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "seconds": 0.7 * left}
+            given: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
             self.patterns = patterns_of_map(self.map, self.eps, **given)
 
     def _step(self, lines: list[Line], line: Callable[[], Line]) -> None:

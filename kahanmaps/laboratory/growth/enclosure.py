@@ -22,7 +22,6 @@ Nothing here is random but the choice of p, eps and the conic. docs/mathematics.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -35,7 +34,9 @@ from flint import arb, fmpq, fmpq_mpoly, nmod_mat, nmod_poly
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.printing import attributes
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
 from kahanmaps.laboratory.singular.written import forms_over_eps
@@ -89,14 +90,14 @@ def enclose(
     eps: fmpq | None,
     *,
     seed: int = 0,
-    seconds: float = 10.0,
+    effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Enclosure | None:
     """Bounds of the dynamical degree of a planar map, the lower one above 1: positive entropy, proved.
 
     `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), and for all but finitely many eps.
-    Returns None for algebraic coefficients, and where no lower bound above 1 was found in about `seconds` seconds. Then
-    nothing is said: there is none for an integrable map.
+    Returns None for algebraic coefficients, and where no lower bound above 1 was found within the budget: each
+    more of `effort` doubles it. Then nothing is said: there is none for an integrable map.
 
     Source: docs/mathematics.md.
 
@@ -104,25 +105,25 @@ def enclose(
     >>> found = enclose(load("lotka_volterra").map, None)
     >>> found.lower, found.upper
     ('1.973638', '2')
-    >>> enclose(load("nahm_tetrahedral").map, None, seconds=0.1) is None
+    >>> enclose(load("nahm_tetrahedral").map, None, effort=-6) is None
     True
     """
     if map_.dim != 2 or map_.symbols or map_.root is not None:
         return None
     rng = random.Random(f"enclosure {seed_for(seed, map_.subject, eps)}")
-    end = time.monotonic() + seconds
+    budget = budget_for("dynamical degree", effort)
     for _ in range(_TRIES):
         try:
             over = reduced(map_, eps, rng)
             if not is_birational(over, rng):
                 continue
-            found = _lower(over, rng, end, progress)
+            found = _lower(over, rng, budget, progress)
         except (BadPrime, ZeroDivisionError):
             continue
         if found is None:
             return None
         with flint.ctx.workprec(128):  # the least (deg f^n)^(1/n) of the iterates that are written out, rounded up
-            roots = [arb(degree).root(n) for n, degree in enumerate(_written_degrees(map_, eps, end), 1)]
+            roots = [arb(degree).root(n) for n, degree in enumerate(_written_degrees(map_, eps, budget), 1)]
             return replace(found, upper=decimal(min(roots).upper()))
     return None
 
@@ -174,9 +175,9 @@ def lower_bound(below: int, above: int, steps: int) -> arb | None:
         return (arb(fmpq(below - 1, 2 * (above - 1)) - 1).acosh() / steps).exp()
 
 
-def _lower(map_: MapOver, rng: random.Random, end: float, progress: Callable[[str], None]) -> Enclosure | None:
+def _lower(map_: MapOver, rng: random.Random, budget: Budget, progress: Callable[[str], None]) -> Enclosure | None:
     """The best lower bound above 1, rounded down; there is no upper one yet."""
-    line = Line(map_, rng, end - 0.5 * max(0.0, end - time.monotonic()), _LARGEST)
+    line = Line(map_, rng, budget.part(0.5), _LARGEST)
     degrees = [1]
     try:
         while len(degrees) <= _MOST_STEPS:
@@ -193,7 +194,7 @@ def _lower(map_: MapOver, rng: random.Random, end: float, progress: Callable[[st
     steps = max(bounds, key=bounds.__getitem__)
     largest = 0
     for start in _tangents(map_.field.characteristic, rng):
-        tangent = Line(map_, rng, end, _LARGEST, start)
+        tangent = Line(map_, rng, budget, _LARGEST, start)
         try:
             while tangent.steps < steps:
                 tangent.step(0)
@@ -224,7 +225,7 @@ def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
     return lines
 
 
-def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Iterator[int]:
+def _written_degrees(map_: BirationalMap, eps: fmpq | None, budget: Budget) -> Iterator[int]:
     """The degrees of f, f^2, ... from forms without common factor over Q, or Q[eps], while they are short enough."""
     try:
         forms = forms_over_eps(map_.rows, eps)
@@ -243,7 +244,7 @@ def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Itera
         common = reduce(fmpq_mpoly.gcd, image)
         iterate = [entry / common for entry in image]
         yield max(degree_in(entry, 3) for entry in iterate)
-        if time.monotonic() > end or max(map(len, iterate)) > most_terms:
+        if budget.is_spent or max(map(len, iterate)) > most_terms:
             return
 
 

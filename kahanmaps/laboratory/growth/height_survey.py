@@ -8,7 +8,6 @@ rules of `kahanmaps.invariants.heights`; here orbits are drawn and compared.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,12 +17,13 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.printing import attributes, format_point
+from kahanmaps.algebra.work import Budget
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, height_growth
-from kahanmaps.laboratory.defaults import SECONDS
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike, as_map
 
@@ -122,7 +122,7 @@ def height_survey(
     starts: Sequence[Any] | int = DEFAULT_STARTS,
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
-    seconds: float = SECONDS["heights"],
+    effort: int | Budget = 1,
     normal_form: SystemNormalForm | NoNormalForm | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -131,7 +131,8 @@ def height_survey(
 
     A system stands for its Kahan map.
     `eps` is one exact number (or `time_step` = 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a
-    number; after `seconds` no orbit is begun, and the one in flight ends. A random start whose orbit meets a singular
+    number; when the budget is spent, which doubles with each more of `effort`, no orbit is
+    begun, and the one in flight ends. A random start whose orbit meets a singular
     point is replaced by another. Raises InputError for wrong values.
 
     >>> from kahanmaps.documents.catalog import load
@@ -146,9 +147,7 @@ def height_survey(
         raise InputError("found no starts, expected at least one")
     if not isinstance(starts, int) and not all(hasattr(start, "__len__") for start in starts):
         starts = [starts]  # one of them
-    if not seconds > 0:
-        raise InputError(f"found {seconds} seconds, expected a positive number")
-    deadline = time.monotonic() + seconds
+    budget = budget_for("heights", effort)
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
     field = "" if map_.root is None else map_.root.number_field.name
@@ -157,7 +156,7 @@ def height_survey(
         rng = random.Random(f"heights {seed_for(seed, map_.subject, value)}")
         wanted = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
         for k, start in enumerate(wanted):
-            if orbits and time.monotonic() > deadline:
+            if orbits and budget.is_spent:
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
             progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
             for _ in range(_DRAWS if start is None else 1):
@@ -168,9 +167,9 @@ def height_survey(
                     for _ in range(map_.dim)
                 )
                 found = height_growth(
-                    over, candidate, steps, normal_form=normal_form, max_digits=max_digits, deadline=deadline
+                    over, candidate, steps, normal_form=normal_form, max_digits=max_digits, budget=budget
                 )
-                if found.end.status != "singular" or time.monotonic() > deadline:
+                if found.end.status != "singular" or budget.is_spent:
                     break
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))
             if found.end.status == "interrupted":

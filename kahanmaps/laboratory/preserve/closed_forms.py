@@ -7,7 +7,6 @@ roots of g there, by interpolation; the c_j are functions over Q, and are found 
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -21,6 +20,7 @@ from kahanmaps.algebra.interpolation import BlackBox, Point, Reconstruction, rec
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
@@ -140,7 +140,7 @@ def closed_forms(
     *,
     root: Root | None = None,
     seed: int = 0,
-    seconds: float = 60.0,
+    budget: Budget,
 ) -> ClosedForms:
     """The polynomials that span spaces whose reduced echelon bases are known modulo primes.
 
@@ -173,10 +173,9 @@ def closed_forms(
         return tuple(entries)
 
     names = (*symbols, "eps") if eps_enters == "symbol" else tuple(symbols)
-    deadline = time.monotonic() + seconds
     functions: list[RationalFunction] = []
     if any(places):
-        answer = reconstruct_at(root, box, names, seed=seed, deadline=deadline)
+        answer = reconstruct_at(root, box, names, seed=seed, budget=budget)
         if answer.functions is None:
             return ClosedForms(None, answer.reason)
         functions += answer.functions

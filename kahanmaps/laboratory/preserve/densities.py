@@ -7,7 +7,6 @@ are found by their exponents (products.py). Source: celledoni-2019.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -18,12 +17,13 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_factored
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
-from kahanmaps.laboratory.defaults import SECONDS
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -38,7 +38,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period, require_time
+from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -156,7 +156,7 @@ def find_densities(
     flow: bool = False,
     max_degree: int | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
-    seconds: float = SECONDS["densities"],
+    effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DensitySearch:
@@ -171,7 +171,7 @@ def find_densities(
         max_degree: of phi; by default as the number of unknowns allows, at most 12.
         integrals: those that are known: where nothing else is found phi may be a product of powers of their factors.
             By default they are then sought.
-        seconds: the time that the search may take, about.
+        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
         seed: of everything random.
         progress: is told what is being tried.
 
@@ -189,10 +189,10 @@ def find_densities(
     [('x*y', 'proved')]
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
-    require_time(seconds)
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
-    laboratory, deadline = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True), time.monotonic() + seconds
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
+    budget = budget_for("densities", effort)
     if laboratory.defect:
         return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
@@ -203,7 +203,7 @@ def find_densities(
     else:
         progress("densities that are products")
         product, turning = _products(laboratory, max_degree)
-        densities, tried, cut = _search(laboratory, product, max_degree, deadline, progress)
+        densities, tried, cut = _search(laboratory, product, max_degree, budget, progress)
         none_proved = densities and all(one.verdict is not Verdict.PROVED for one in densities)
         if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
             # x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree.
@@ -212,10 +212,9 @@ def find_densities(
             proof = product_density_invariant(laboratory.system, phi)
             densities = densities if proof is None else [FoundDensity(phi, Verdict.PROVED, proof), *densities]
     found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
-    if found.is_open and time.monotonic() < deadline:
+    if found.is_open and not budget.is_spent:
         if integrals is None:
-            left = deadline - time.monotonic()
-            searched = find_integrals(file, symbols=symbols, eps=eps, seconds=left, seed=seed, progress=progress)
+            searched = find_integrals(file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress)
             integrals = searched.integrals
         progress("densities that are products of factors of integrals")
         found = with_factors(found, integrals, max_degree)
@@ -241,23 +240,23 @@ def _search(
     laboratory: Laboratory,
     product: FoundDensity | None,
     max_degree: int | None,
-    deadline: float,
+    budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
     """Densities, the largest degree that was tried, and what ended it; the product where none is simpler."""
     dim = laboratory.map.dim
     top = max_degree if max_degree is not None else _MAX_DEGREE
-    top, until = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0), deadline
+    top, until = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0), budget
     if product is not None:
-        # Only lower degrees are worth a part of the time then, and the others of its own degree.
-        until, top = time.monotonic() + (deadline - time.monotonic()) / 3, min(top, product.degree(dim))
+        # Only lower degrees are worth a part of the budget then, and the others of its own degree.
+        until, top = budget.part(1 / 3), min(top, product.degree(dim))
     # Where the space of a degree is 0, so are those of lower ones: they are leapt over while monomials at least double.
     leaps, tried = [top] if product is None else [max(top - 1, 0), top], -1
     while leaps[0] > 0:
         halved = (d for d in range(leaps[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + leaps[0], dim))
         leaps.insert(0, next(halved, leaps[0] - 1))
     try:
-        while tried < top and time.monotonic() <= until:
+        while tried < top and not until.is_spent:
             degree = next(leap for leap in leaps if leap > tried)
             progress(f"densities of degree {degree}")
             model = _space(laboratory.maps[0], degree)
@@ -272,7 +271,7 @@ def _search(
                 ) -> list[DarbouxSpace]:
                     return [_space(map_, degree, model)]
 
-                forms = laboratory.formulas([model], spaces_on, deadline)
+                forms = laboratory.formulas([model], spaces_on, budget)
                 if forms.bases is None:
                     reason = f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
                 for P in [] if forms.bases is None else forms.bases[0]:

@@ -11,7 +11,6 @@ petrera-pfadler-suris-2009.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +20,19 @@ from typing import Any
 from flint import fmpq_mpoly, nmod_mat
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, rank, split_columns
+from kahanmaps.algebra.modular_matrices import (
+    echelon,
+    integers,
+    kernel,
+    matrix,
+    null_space,
+    rank,
+    reduced,
+    split_columns,
+)
 from kahanmaps.algebra.polynomials import evaluate, names_of
 from kahanmaps.algebra.printing import attributes
+from kahanmaps.algebra.work import Budget
 from kahanmaps.laboratory.modular_points import (
     Exponent,
     ModularMap,
@@ -129,7 +138,7 @@ def relations_on_orbit(
     most = len(support) if most is None else min(most, len(support))
     left = support if len(support) < len(exponents) else None
     rows, point, period = map_.along_orbit(degree, most + _SPARE, left)
-    form, independent = matrix(rows, map_.prime).rref()
+    form, independent = reduced(matrix(rows, map_.prime))
     first, free = split_columns(form, independent)
     found = frozenset(exponents[support[k]] for k in free)
     if independent > most or not leading <= found:
@@ -170,7 +179,7 @@ def orbit_profile(
     maps: Sequence[ModularMap],
     *,
     max_degree: int | None = None,
-    seconds: float = inf,
+    budget: Budget | None = None,
     known: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
@@ -179,13 +188,13 @@ def orbit_profile(
     Args:
         maps: the maps, with different primes and, where eps is not given, different eps.
         max_degree: the last degree; by default it depends on the dimension and on the number of monomials.
-        seconds: no degree is begun after so many seconds.
+        budget: no degree is begun when it is spent; None for as long as it takes.
         known: the gradients of known integrals at a point.
         progress: is told what is being tried.
 
     Returns:
         The `Profile`, measured. It ends where the codimension leaves curves (dim - 1; points, dim, where orbits
-        close), at `max_degree`, or, not complete, when there are too many monomials or the time is over.
+        close), at `max_degree`, or, not complete, when there are too many monomials or the budget is spent.
 
     Raises:
         NoPoint: where orbits meet the singular set.
@@ -199,7 +208,7 @@ def orbit_profile(
     ((0, 2), 2)
     """
     dim = maps[0].dim
-    deadline = time.monotonic() + seconds
+    budget = budget or Budget()
     nullities: list[int] = []
     codimensions: list[int] = []
     with_known = 0
@@ -213,7 +222,7 @@ def orbit_profile(
         is_too_large = comb(dim + degree, degree) > MAX_UNKNOWNS or any(
             len(_not_multiples(dim, degree, lower)) > largest for lower in leading
         )
-        if is_too_large or time.monotonic() > deadline:
+        if is_too_large or budget.is_spent:
             complete = False
             break
         progress(f"relations of degree {degree} along orbits")

@@ -9,7 +9,6 @@ theorems give and was not found is added. What is missing then is sought with it
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,12 +19,13 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, degree, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.normalize import normalized
-from kahanmaps.laboratory.defaults import SECONDS
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, denominators_among
@@ -40,7 +40,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period, require_time
+from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
     SpaceSearch,
@@ -241,7 +241,7 @@ def find_integrals(
     time_step: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
-    seconds: float = SECONDS["integrals"],
+    effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> IntegralSearch:
@@ -253,8 +253,8 @@ def find_integrals(
         eps: an exact number, the formulas are then for this eps only; None: formulas contain eps.
         time_step: 2 eps, in its place.
         flow: ask for the rational integrals of the differential equation instead.
-        max_degree: the largest degree of relations along orbits; by default as dimension and time allow.
-        seconds: the time that the search may take, about.
+        max_degree: the largest degree of relations along orbits; by default as the dimension and the budget allow.
+        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
         seed: of everything random.
         progress: is told what is being tried.
 
@@ -263,7 +263,7 @@ def find_integrals(
         that orbits show is measured modulo two primes.
 
     Raises:
-        InputError: for unknown symbols, symbols in a [family] file, eps = 0 and less than no time.
+        InputError: for unknown symbols, symbols in a [family] file, and eps = 0.
 
     Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
 
@@ -273,12 +273,11 @@ def find_integrals(
     ([('-y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
-    require_time(seconds)
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    deadline = time.monotonic() + seconds
-    collected = _Collected(laboratory, deadline, progress)
+    budget = budget_for("integrals", effort)
+    collected = _Collected(laboratory, budget, progress)
     # What theorems say of the integrals of a Kahan map, on each of the maps: without symbols these have one system.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
@@ -313,7 +312,7 @@ def find_integrals(
     if laboratory.defect:
         return result(empty, laboratory.defect)
     try:
-        profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds, known=known, progress=progress)
+        profile = orbit_profile(laboratory.maps, max_degree=max_degree, budget=budget, known=known, progress=progress)
         cofactors = laboratory.cofactors()
         # Of a system these would be too many, and few integrals of its map have other denominators than those.
         factors = [one.polynomial for one in cofactors if one.polynomial is not None]
@@ -321,10 +320,10 @@ def find_integrals(
         denominators = denominators_among(factors, laboratory.map.dim)
 
         def quickly(map_: ModularMap) -> SpaceSearch:
-            return search(map_, profile, cofactors, denominators, deadline, progress)
+            return search(map_, profile, cofactors, denominators, budget=budget, progress=progress)
 
         base = laboratory.maps[0]
-        base, found, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, deadline, progress)
+        base, found, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, budget, progress)
     except NoPoint as error:
         return result(empty, str(error))
     collected.offer(formulas)
@@ -337,15 +336,15 @@ def find_integrals(
     if not done.is_complete:
         # This may take longer than all that went before, whose formulas are therefore known by now.
         steps = len(found.steps)
-        take_relations(base, profile, found, LARGEST_SPAN, deadline, progress)
+        take_relations(base, profile, found, LARGEST_SPAN, budget, progress)
         if len(found.steps) > steps:
 
             def thoroughly(map_: ModularMap) -> SpaceSearch:
                 again = quickly(map_)
-                take_relations(map_, profile, again, LARGEST_SPAN, deadline, progress)
+                take_relations(map_, profile, again, LARGEST_SPAN, budget, progress)
                 return again
 
-            _, found, formulas, reason = _formulas(laboratory, base, found, thoroughly, deadline, progress)
+            _, found, formulas, reason = _formulas(laboratory, base, found, thoroughly, budget, progress)
             collected.offer(formulas)
             done = result(profile, "")
     if not flow and not done.is_complete and laboratory.root is None:
@@ -357,8 +356,8 @@ def find_integrals(
     elif not reason:
         have = "has" if missing == 1 else "have"
         reason = f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q {found.tried}"
-        if time.monotonic() > deadline:
-            reason += f", and then the {seconds:g} seconds were over"
+        if budget.is_spent:
+            reason += ", and then the budget was spent (--effort)"
         reason += ": coefficients of Hirota-Kimura bases are such integrals"
     reasons = [reason]
     if at_values is not None:
@@ -372,7 +371,7 @@ def find_integrals(
             how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
             reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
     if not profile.complete and (max_degree is not None or not profile.is_settled):
-        why = "too many unknowns" if time.monotonic() < deadline else "the time was over"
+        why = "too many unknowns" if not budget.is_spent else "the budget was spent (--effort)"
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {why}")
     elif not profile.agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")
@@ -384,7 +383,7 @@ def _formulas(
     base: ModularMap,
     found: SpaceSearch,
     look: Callable[[ModularMap], SpaceSearch],
-    deadline: float,
+    budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[ModularMap, SpaceSearch, list[Formula], str]:
     """The ratios of the polynomials `found` on the map `base`, and why there are no others; first the map and spaces.
@@ -394,12 +393,12 @@ def _formulas(
     """
     if may_be_conjugate(found):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
-            if time.monotonic() < deadline and repeat(found, map_, base.prime) is None:
+            if not budget.is_spent and repeat(found, map_, base.prime) is None:
                 base, found = map_, look(map_)
     if not found.steps:
         return base, found, [], ""
     progress("interpolating closed forms")
-    bases, reason = bases_of(laboratory, base.prime, found, deadline)
+    bases, reason = bases_of(laboratory, base.prime, found, budget)
     origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
     at_zero: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
     formulas = list[Formula]()
@@ -413,8 +412,8 @@ def _formulas(
 class _Collected:
     """Integrals that do not depend on each other, with verdicts; none that was refuted."""
 
-    def __init__(self, laboratory: Laboratory, deadline: float, progress: Callable[[str], None]) -> None:
-        self._laboratory, self._deadline, self._progress = laboratory, deadline, progress
+    def __init__(self, laboratory: Laboratory, budget: Budget, progress: Callable[[str], None]) -> None:
+        self._laboratory, self._budget, self._progress = laboratory, budget, progress
         self._gradients = Independent(laboratory.maps[0])
         self.integrals: list[FoundIntegral] = []
         self.in_time: list[TimedIntegral] = []
@@ -479,7 +478,7 @@ class _Collected:
             field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
             eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
             try:
-                if time.monotonic() > self._deadline:
+                if self._budget.is_spent:
                     continue
                 value = inherited.modified(k - affine, field, eps, field.variables[:-1])
             except BudgetExceeded:
@@ -522,7 +521,7 @@ class _Collected:
         laboratory = self._laboratory
         self._gradients = Independent(laboratory.maps[0], [one.function for one in self.integrals])  # free of time
         try:
-            plain, ratios = integrals_in_iterates(laboratory, wanted, self._gradients, self._deadline, self._progress)
+            plain, ratios = integrals_in_iterates(laboratory, wanted, self._gradients, self._budget, self._progress)
         except NoPoint:
             return
         self.offer(plain)

@@ -12,7 +12,6 @@ their place in what it finds. Source: petrera-suris-2018.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial, format_rational_function
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
@@ -179,7 +179,7 @@ def integrals_in_iterates(
     laboratory: Laboratory,
     wanted: int,
     known: Independent,
-    deadline: float,
+    budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]]]:
     """Integrals that do not depend on known ones: those in x alone, and those in iterates, each with its origin.
@@ -188,7 +188,7 @@ def integrals_in_iterates(
         laboratory: the map.
         wanted: how many independent ones there are to be, with the known ones.
         known: the known ones, on the first map of the laboratory.
-        deadline: a value of time.monotonic().
+        budget: nothing is begun when it is spent.
         progress: is told what is being tried.
 
     Returns:
@@ -203,13 +203,13 @@ def integrals_in_iterates(
     inside, back = (laboratory, None) if level is None else level
     base = inside.maps[0]
     for lift in LIFTS if level is not None else LIFTS[1:]:
-        if len(known.rows) >= wanted or time.monotonic() > deadline:
+        if len(known.rows) >= wanted or budget.is_spent:
             break
         for one, spaces in lifts_with_spaces(base, [lift]):
             progress(one.text)
             found = SpaceSearch()
             found.add(SearchStep("iterates", 2, None, one.text, one), sorted(spaces, key=pattern))
-            bases, _ = bases_of(inside, base.prime, found, deadline)
+            bases, _ = bases_of(inside, base.prime, found, budget)
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]
                 functions = functions if back is None else [back(F, one.shift) for F in functions]

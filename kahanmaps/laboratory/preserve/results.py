@@ -10,7 +10,6 @@ from flint import fmpq
 
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.implicit import BirationalMap
@@ -44,12 +43,6 @@ class Search(Printed):
             return []
         step = eps_told(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
         return [f"# for eps = {self.eps} only{step}: check with --eps {self.eps}"]
-
-
-def require_time(seconds: float) -> None:
-    """Raise InputError for less than no time."""
-    if not seconds > 0:
-        raise InputError(f"found {seconds} seconds, expected a time above 0")
 
 
 def closing_period(maps: Sequence[ModularMap]) -> int | None:

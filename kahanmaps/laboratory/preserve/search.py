@@ -15,13 +15,12 @@ are conjugate over an extension and have no formula over Q.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product as cartesian
 from itertools import takewhile
-from math import comb, inf
+from math import comb
 from types import MappingProxyType
 
 from flint import fmpq, fmpq_mpoly
@@ -31,6 +30,7 @@ from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, ring, substitute
 from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.algebra.roots import Root
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
@@ -156,13 +156,14 @@ def search(
     profile: Profile,
     cofactors: Sequence[Cofactor],
     denominators: Sequence[Cofactor] = (),
-    deadline: float = inf,
+    *,
+    budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SpaceSearch:
     """Spaces whose ratios are as many independent integrals as the profile shows, as far as cheap searches find them.
 
     These are the span of few relations along orbits, and polynomials with known cofactors or over known denominators.
-    Nothing is begun after the `deadline`, a value of time.monotonic(). Raises NoPoint.
+    Nothing is begun when the `budget` is spent. Raises NoPoint.
     """
     found, wanted = SpaceSearch(), profile.codimension
     is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver)
@@ -170,22 +171,22 @@ def search(
     if affine is not None:
         found.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
     if is_of_field:  # whose denominators are factors of a determinant, which is longer than few relations
-        take_relations(map_, profile, found, SMALL_SPAN, deadline, progress)
-    if gradient_rank(map_, found.all_spaces) >= wanted or time.monotonic() > deadline:
+        take_relations(map_, profile, found, SMALL_SPAN, budget, progress)
+    if gradient_rank(map_, found.all_spaces) >= wanted or budget.is_spent:
         return found
     dim, top = map_.dim, _COFACTOR_DEGREE.get(map_.dim, 2)
     while comb(dim + top, top) > _MOST_TERMS:
         top -= 1
     progress(f"polynomials of degree up to {top} with {comb(dim + top, top)} terms and known cofactors")
     known = found.all_spaces
-    result = search_cofactors(map_, cofactors, denominators, known, wanted, top, deadline)
+    result = search_cofactors(map_, cofactors, denominators, known, wanted, top, budget)
     found = replace(found, cofactors=result.cofactors, cofactor_degree=result.degree)
     for product, scaled, spaces in result.spaces:
         text = f"{product.origin(found.cofactors)}{', up to a number' * scaled}"
         step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
         found.add(step, sorted(spaces, key=pattern))
     if not is_of_field:
-        take_relations(map_, profile, found, SMALL_SPAN, deadline, progress)
+        take_relations(map_, profile, found, SMALL_SPAN, budget, progress)
     return found
 
 
@@ -194,7 +195,7 @@ def take_relations(
     profile: Profile,
     found: SpaceSearch,
     largest: int,
-    deadline: float,
+    budget: Budget,
     progress: Callable[[str], None],
 ) -> None:
     """Add the spaces that are seen in the span of the relations of a degree, until there are as many as wanted.
@@ -205,7 +206,7 @@ def take_relations(
     for degree in [degree for degree, size in enumerate(few, 1) if size]:
         known = found.all_spaces
         independent = gradient_rank(map_, known)
-        if independent >= profile.codimension or degree in found.searched or time.monotonic() > deadline:
+        if independent >= profile.codimension or degree in found.searched or budget.is_spent:
             continue
         progress(f"closed forms from the relations of degree {degree}")
         spaces = darboux_spaces(map_, degree, known, largest)
@@ -316,7 +317,7 @@ def _most_alike(
 
 
 def bases_of(
-    laboratory: Laboratory, reference: int, found: SpaceSearch, deadline: float
+    laboratory: Laboratory, reference: int, found: SpaceSearch, budget: Budget
 ) -> tuple[list[list[fmpq_mpoly]], str]:
     """Bases of all spaces, polynomials in (variables, symbols, eps); none, and a reason, where that failed.
 
@@ -345,7 +346,7 @@ def bases_of(
                 other = again_at(prime, values)
                 return None if other is None else classes(other.spaces[number])[kind]
 
-            known = tell_apart(model, alike, names, laboratory.seed, deadline, laboratory.root)
+            known = tell_apart(model, alike, names, laboratory.seed, budget, laboratory.root)
             if known is None:
                 why = f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
                 return [], f"integrals were found modulo primes, but no closed form: {why}"
@@ -355,7 +356,7 @@ def bases_of(
         again = repeat(found, map_, reference, branches)
         return None if again is None else again.all_spaces
 
-    forms = laboratory.formulas(found.all_spaces, spaces_on, deadline)
+    forms = laboratory.formulas(found.all_spaces, spaces_on, budget)
     if forms.bases is None:
         return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
     return forms.bases, ""
@@ -366,10 +367,12 @@ def tell_apart(
     alike: Alike,
     names: Sequence[str],
     seed: int,
-    deadline: float,
+    budget: Budget,
     root: Root | None = None,
 ) -> Branches | None:
-    """What tells spaces of one pattern apart at every value of `names`; None where they are conjugate or time is over.
+    """What tells spaces of one pattern apart at every value of `names`; None where they are conjugate.
+
+    None also where the budget is spent first.
 
     `model` are the spaces on one map, `alike(prime, values)` those on others, in any order; None at special values.
     """
@@ -383,7 +386,7 @@ def tell_apart(
     *gens, T = context.gens()
     origin = {"T": fmpq(0)}
     for samples, place in cartesian(_SAMPLES, places[:_COEFFICIENTS]):
-        if time.monotonic() > deadline:
+        if budget.is_spent:
             return None
 
         def symmetric_functions(
@@ -399,7 +402,7 @@ def tell_apart(
                 coefficients = [(here - w * before) % prime for here, before in shifted]
             return coefficients[1:]
 
-        answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, deadline=deadline)
+        answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, budget=budget)
         if answer.functions is None:
             continue
         numerators, denominator = over_one_denominator(answer.functions, context, gens)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
 from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
@@ -115,7 +115,7 @@ class Scanned:
             break
         else:
             return None
-        line = Line(over, rng, math.inf, most)
+        line = Line(over, rng, Budget(), most)
         found: list[int] = []
         try:
             for degree in expected:

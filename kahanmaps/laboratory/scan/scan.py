@@ -10,7 +10,6 @@ is a proof. The kind of growth is that of one rational member, as `degrees` has 
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, islice, product
@@ -20,6 +19,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.work import Budget, units_at
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, counted
@@ -39,7 +39,7 @@ from kahanmaps.processes import processors
 
 Progress = Callable[[str], None]
 
-DEFAULT_SECONDS = 120.0
+UNITS = 120e6  # of counted work at effort 1; the kernel that sweeps does about one a processor and microsecond
 MAX_PARAMETERS = 8
 # By the number of parameters the primes modulo which all members are tried: the ones that are wished, then those for
 # families that take their time. A polynomial of degree 3 in one parameter has all its zeros modulo one prime in 6.
@@ -52,7 +52,7 @@ _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
 }
-# More of these, as many as there is time for, where members are left that may be points over number fields.
+# More of these, as many as the budget allows, where members are left that may be points over number fields.
 _FURTHER = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 # Those for members on random lines of parameter space. Each of the fields of the roots of d, d up to 10 and down to
 # -10, splits modulo three of them: else hypersurfaces that split over such a field have no points to be found.
@@ -61,15 +61,20 @@ _LINES = {2: (24, 12), 3: (32, 16)}  # how many are wished, and fewer, by the nu
 _MORE = 4  # times as many, where hypersurfaces were missed
 _MANY_LINES = (150, 60)
 _PLANES, _OF_PLANES = 24, (19, 23, 29, 31)  # random ones, for what lines do not meet, and the primes
-_PART = 0.3  # of the time, for all members on their first line
-_UNTIL = (0.6, 0.75, 0.85, 0.9)  # of the time: when members, conditions, their confirmation and growth have to be done
+_PART = 0.3  # of the budget, for all members on their first line
+_UNTIL = (
+    0.6,
+    0.75,
+    0.85,
+    0.9,
+)  # of the budget: when members, conditions, their confirmation and growth are done
 _ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed: up to 2 parameters, and more
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
 _MEMBERS = 3  # that confirm a component
 _TRIES = 20  # for a rational member
-_SECONDS, _ATTEMPTS = 30.0, 2  # for the growth at a member
+_OF_GROWTH, _ATTEMPTS = 30e6, 2  # for the growth at a member
 _TERMS, _LARGE = 26, 1000  # where no rational member is known: so many degrees, as far as they are not above this
 _SOME = 100  # the degree up to which they are compared, at least
 _MEASURED_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
@@ -83,10 +88,10 @@ def scan(
     time_step: Any = None,
     terms: int | None = None,
     primes: Sequence[int] | None = None,
-    seconds: float = DEFAULT_SECONDS,
+    effort: int | Budget = 1,
     seed: int = 0,
     jobs: int | None = None,
-    analysis: float | None = None,
+    analysis: int | None = None,
     progress: Progress = lambda _: None,
 ) -> Scan:
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
@@ -98,10 +103,10 @@ def scan(
         time_step: 2 eps, in its place.
         terms: how many iterates are measured, by default as many as have small degrees, at most 7.
         primes: at least three primes, by default such that the members are some ten thousand.
-        seconds: time for everything, about; what was left out then is said.
+        effort: 1, or more: each more doubles the work for everything, each less halves it; what was left out is said.
         seed: of everything random.
         jobs: threads, by default as many as processors; they need numba.
-        analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
+        analysis: the effort of an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
         progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known.
 
@@ -147,9 +152,9 @@ def scan(
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
     terms, room, cost = _terms(map_, len(names), exact, terms, rng)
-    jobs = jobs or processors()
-    most = _PART * seconds * jobs / cost
-    run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs}, seconds, progress)
+    jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
+    most = _PART * budget.units / cost
+    run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs}, budget, cost, progress)
     run.take(_plan(len(names), primes, most))
     known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
     for more in (run.more_lines, run.more_primes):
@@ -164,12 +169,11 @@ def scan(
     run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
     known.sort(key=lambda one: one.degrees[::-1])
     enough: dict[Degrees, DegreeGrowth] = {}  # of these one member is enough, if further degrees of others are its own
-    deadline = run.began + seconds
 
     def with_growth(one: Component, _: Callable[[], None]) -> Component:
         if one.degrees[-1] < 0 or _goes_on(one, enough.get(one.degrees), family):
             return one
-        growth = _growth(one, family, deadline)
+        growth = _growth(one, family, budget)
         if growth is not None and growth.growth not in _MEASURED_EACH:
             enough[one.degrees] = growth
         return replace(one, growth=growth)
@@ -189,8 +193,7 @@ def scan(
             if one.dimension == 0:
                 points.add(one.degrees)
             member, step = family.member(one.values)
-            left = max(0.1, deadline - time.monotonic())
-            told = analyze(member, eps=step, seconds=min(analysis, left), seed=family.seed)
+            told = analyze(member, eps=step, effort=analysis, seed=family.seed)
             return replace(one, verdict=told.conclusion)
 
         known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
@@ -210,12 +213,11 @@ class _Sweeping:
     family: Scanned
     start: str  # of the seeds
     measured: dict[str, Any]
-    seconds: float
+    budget: Budget
+    cost: float  # of a member
     progress: Progress
     sweeps: list[Sweep] = field(default_factory=list)
     omitted: list[str] = field(default_factory=list)
-    # Not before: loops are compiled with the first members, once on a machine, and that may take all the time.
-    began: float = field(default_factory=time.monotonic)
     doing: str = "scan"
     is_interrupted: bool = False
     total: int = 0
@@ -232,11 +234,11 @@ class _Sweeping:
             raise
 
     def until(self, part: float) -> Callable[[], None]:
-        """What raises TimeOver when a part of the time is over."""
+        """What raises TimeOver when a part of the budget is spent."""
 
         def check() -> None:
             self.tell(self.doing)
-            if time.monotonic() > self.began + part * self.seconds:
+            if self.budget.spent > part * self.budget.units:
                 raise TimeOver
 
         return check
@@ -250,9 +252,7 @@ class _Sweeping:
         self.total += _size(len(self.family.names), plan)
 
         def told(done: int, _: int) -> None:
-            done += sum(one.seen for one in self.sweeps)
-            left = (time.monotonic() - self.began) * max(0, self.total - done) / done
-            self.tell(f"scan: {done} of {self.total} members, {left:.0f} s left")
+            self.tell(f"scan: {done + sum(one.seen for one in self.sweeps)} of {self.total} members")
 
         for k, (p, lines, width) in enumerate(plan):
             try:
@@ -262,6 +262,7 @@ class _Sweeping:
                     p,
                     self.family.eps,
                     on=None if lines is None else (lines, width),
+                    units=self.cost,
                     seed=f"{self.start} {p} {lines} {width}",
                     check=self.until(_UNTIL[0]),
                     progress=told,
@@ -316,15 +317,20 @@ class _Sweeping:
         return done, missed
 
 
-def _growth(one: Component, family: Scanned, deadline: float) -> DegreeGrowth | None:
+def _growth(one: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
     """The growth at a rational member, or that which more degrees fit where there is none, or it is special."""
     known = None
     if one.values is not None:
         member, step = family.member(one.values)
-        left = max(0.1, deadline - time.monotonic())
-        given: dict[str, Any] = {"seconds": min(_SECONDS, left), "steps": STEPS, "enclosed": False}
         for attempt in range(_ATTEMPTS):  # singularities are followed at a random eps, which may be special
-            known = degree_growth(member.map, step, seed=family.seed + attempt, **given)
+            known = degree_growth(
+                member.map,
+                step,
+                seed=family.seed + attempt,
+                effort=Budget(min(_OF_GROWTH, budget.left)),
+                steps=STEPS,
+                enclosed=False,
+            )
             if known.growth is not Growth.UNKNOWN:
                 break
     return known if known is not None and _agree(known.degrees, (1, *one.degrees)) else _beyond(one, family)
@@ -372,13 +378,13 @@ def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]
 def _terms(
     map_: BirationalMap, count: int, eps: fmpq | None, terms: int | None, rng: random.Random
 ) -> tuple[int, int, float]:
-    """How many iterates are measured, the room that they need, and the seconds for a member.
+    """How many iterates are measured, the room that they need, and the units for a member.
 
     Tried on members modulo a larger prime.
     """
     import numpy as np
 
-    from kahanmaps.maps.residues.families import LONG, NOWHERE, Family
+    from kahanmaps.maps.residues.families import NOWHERE, Family
 
     if terms is not None and not 1 <= terms <= 2 * _MOST_TERMS:
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
@@ -393,10 +399,7 @@ def _terms(
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
     room = max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
-    family.degrees(np.resize(tried, (LONG, count)), eps, 1, room, rng)  # which compiles
-    began = time.monotonic()
-    family.degrees(np.resize(tried, (LONG, count)), eps, measured, room, rng)
-    return measured, room, (time.monotonic() - began) / LONG
+    return measured, room, family.units([1, *found[:measured]])
 
 
 def _confirmed(

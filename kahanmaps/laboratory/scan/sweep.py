@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap
 
@@ -81,6 +82,7 @@ def sweep(
     room: int,
     *,
     on: tuple[int, int] | None = None,
+    units: float = 0,
     seed: str = "",
     jobs: int = 1,
     check: Callable[[], None] = lambda: None,
@@ -95,6 +97,7 @@ def sweep(
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
         on: None for all members, else how many random affine subspaces of parameter space, and their dimension.
+        units: of work for one member.
         seed: of everything random.
         jobs: threads.
         check: is called now and then, and may raise TimeOver.
@@ -119,6 +122,7 @@ def sweep(
             check()
             some = np.array(points[low : low + _SLICE], dtype=np.int64)
             parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            count_work(units * len(some))
             told(low + len(some), len(points))
         return np.concatenate(parts)
 

@@ -7,7 +7,6 @@ the image say how deep it lies on those. Series are followed for as long as it t
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,6 +15,7 @@ from typing import Any, Protocol
 
 from flint import fmpz_poly, nmod_poly
 
+from kahanmaps.algebra.work import Budget
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
 from kahanmaps.laboratory.singular.jets import (
     Function,
@@ -180,19 +180,19 @@ class Range:
     Memory can only come back where the image of a hypersurface meets points without a value. Beyond the first steps
     its image is therefore followed as a point, which is cheap. Where it meets such points along series again, which is
     not: for at most `along` steps, or `enough` if orders repeat and each step uses up terms, so that series are long.
-    `end` is the time of the monotonic clock at which all of it stops.
+    All of it stops when the `budget` is spent.
     """
 
     shown: int
     reach: int
     along: int
-    end: float
+    budget: Budget
     enough: int
 
     @property
     def is_over(self) -> bool:
-        """Whether the time is over."""
-        return time.monotonic() > self.end
+        """Whether the budget is spent."""
+        return self.budget.is_spent
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class Course:
 
         With tangents nothing is tracked.
         """
-        precision, end = 8, self.limits.end
+        precision = 8
         functions = () if tangents else self.tracked.functions
         start = self.equations, self.point, self.direction
         while True:
@@ -225,11 +225,11 @@ class Course:
             try:
                 for step in islice(images_of_curve(*start, precision, tangents, functions), count):
                     run.append(step)
-                    if time.monotonic() > end:
+                    if self.limits.is_over:
                         return run, len(run) == count
                 return run, True
             except PrecisionTooLow:
-                if precision >= most or time.monotonic() > end:
+                if precision >= most or self.limits.is_over:
                     return run, False
                 precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 

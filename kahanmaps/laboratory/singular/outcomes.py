@@ -138,7 +138,7 @@ class SingularityOutcome(StrEnum):
 
 CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = SingularityOutcome
 NO_POINT = "no point was followed"
-NO_TIME = "the time was over before two points were followed (--seconds)"
+NO_TIME = "the budget was spent before two points were followed (--effort)"
 POINTS_DIFFER = "the orders along two curves through it modulo different primes are not the same (another --seed)"
 
 

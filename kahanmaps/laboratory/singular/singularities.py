@@ -11,7 +11,6 @@ Source: grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,9 +23,10 @@ from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import Budget
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
-from kahanmaps.laboratory.defaults import SECONDS
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
 from kahanmaps.laboratory.singular.contracted import OrdersUnknown, contracted
@@ -64,7 +64,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
 MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
-_DIGITS_A_SECOND = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # by dimension: above 4 less is expanded
+_DIGITS_A_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # by dimension: above 4 less is expanded
 _FEW_DIGITS = 50
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
@@ -76,7 +76,7 @@ _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_DEGREE = 20_000  # of a composition
-_STOPPED = "the time was over before all singularities were followed (--seconds)"
+_STOPPED = "the budget was spent before all singularities were followed (--effort)"
 _DIFFERENT = "the singularities at two values of eps differ (--eps)"
 
 
@@ -170,17 +170,17 @@ def singularities(
     time_step: Any = None,
     steps: int | None = None,
     seed: int = 0,
-    seconds: float = SECONDS["singularities"],
+    effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
     """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their outcome.
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
-    modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
-    SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or coefficients of
-    more than 10,000 digits, or so long that writing formulas would take more than `seconds`. Source:
-    grammaticos-ramani-papageorgiou-1991, zander-2021.
+    modulo two random primes; "not confined" means within so many steps. Stops when the budget is spent, which doubles
+    with each more of `effort`. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of
+    steps, and an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the
+    budget. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -191,15 +191,16 @@ def singularities(
         raise InputError(map_.refusal)
     if map_.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
-    most = _most_digits(map_.dim, seconds)
+    budget = budget_for("singularities", effort)
+    most = _most_digits(map_.dim, budget)
     if (digits := _digits(map_, exact_eps)) > most:
         raise InputError(
             f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
-            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
+            f"in dimension {map_.dim} formulas with longer ones are not written within the budget (--effort)"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
-    limits = _range(map_.dim, steps, time.monotonic() + seconds)
+    limits = _range(map_.dim, steps, budget)
     over, rng = map_.at(exact_eps), random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
     try:
         if is_long(over):
@@ -207,7 +208,7 @@ def singularities(
         map_form = homogeneous_map(over)
     except TooLarge:  # a composition: map by map, or hypersurfaces are told by random points
         try:
-            line = Line(reduced(map_, exact_eps, rng), rng, limits.end, _MAX_DEGREE)
+            line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
         except Stopped as end:
             raise InputError(f"found a composition that is too long here: {end.message}") from end
@@ -380,7 +381,7 @@ def patterns(
     *,
     steps: int | None = None,
     seed: int = 0,
-    seconds: float = 60.0,
+    effort: int | Budget = 1,
 ) -> Patterns:
     """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
 
@@ -388,25 +389,26 @@ def patterns(
     hypersurfaces.
     """
     map_ = as_map(system)
-    end = time.monotonic() + seconds
+    budget = budget_for("singularities", effort)
     found = _unknown("")
     for again in range(_DRAWS if eps is None else 1):
-        if again and (not found.running or time.monotonic() > end):
+        if again and (not found.running or budget.is_spent):
             break
         values = default_eps(map_, seed + again) if eps is None else (eps,)
-        part = max(0.0, end - time.monotonic()) / len(values)
+        stages = budget.share([1] * len(values))
         # What random points stand for is known of equations that are linear in both points.
         is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
-        if is_short and all(can_be_written(map_, value, part) for value in values):
+        if is_short and all(can_be_written(map_, value, budget.part(1 / len(values))) for value in values):
             try:
-                runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
+                given = zip(values, stages, strict=True)
+                runs = [singularities(map_, value, steps=steps, seed=seed, effort=stage) for value, stage in given]
             except TooLongFormula:
                 return _unknown("the composition is too long for its singularities to be followed")
             found = patterns_of(runs, map_.has_eps)
         else:
             several = set()
-            for value in values:
-                limits, equations = _range(map_.dim, steps, time.monotonic() + part), map_.at(value).equations
+            for value, stage in zip(values, stages, strict=True):
+                limits, equations = _range(map_.dim, steps, stage), map_.at(value).equations
                 rng = random.Random(f"patterns {seed_for(seed, map_.subject, value)}")
                 if not _is_dominant(map_, value):
                     known = _not_dominant(value)
@@ -428,15 +430,15 @@ def _digits(map_: BirationalMap, eps: fmpq) -> int:
     return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + map_.digits
 
 
-def _most_digits(dim: int, seconds: float) -> int:
-    """The digits with which formulas are written within this time; a few always are."""
-    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_SECOND[dim] * min(seconds, MAX_DIGITS))))
+def _most_digits(dim: int, budget: Budget) -> int:
+    """The digits with which formulas are written within the budget; a few always are."""
+    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
-def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, seconds: float) -> bool:
+def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, budget: Budget) -> bool:
     """Whether `singularities` takes a map and eps."""
     map_ = as_map(system)
-    return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, seconds)
+    return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, budget)
 
 
 def _not_dominant(eps: fmpq) -> Patterns:
@@ -492,10 +494,10 @@ def steps_by_default(dim: int) -> int:
     return _REACH.get(dim, _LEAST_REACH)
 
 
-def _range(dim: int, steps: int | None, end: float) -> Range:
+def _range(dim: int, steps: int | None, budget: Budget) -> Range:
     reach, along = steps or steps_by_default(dim), steps or _ALONG.get(dim, _LEAST_ALONG)
     enough = steps or min(along, _ENOUGH.get(dim, along))
-    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, end, enough)
+    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, budget, enough)
 
 
 def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:

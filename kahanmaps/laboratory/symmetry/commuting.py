@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import itertools
 import random
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -26,13 +25,14 @@ from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import SolutionComponent, decoupling, normal_form, solve_system, without_contained
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.family.tensor import GENERATOR, over_algebra
-from kahanmaps.laboratory.defaults import SECONDS
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.symmetry.commuting_proofs import affine, judge_family, judge_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
     MAX_UNKNOWNS,
@@ -49,7 +49,7 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_s
 
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
 MAX_TOLD = 6  # sentences about equations that were not solved
-QUICK_DIMENSION, QUICK_SECONDS = 3, 1.0  # all quadratic g are tried by default: some hundredths of a second as a rule
+QUICK_DIMENSION, QUICK_UNITS = 3, 1e6  # all quadratic g are tried by default: some hundredths of this as a rule
 MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
 
 
@@ -165,38 +165,37 @@ def commuting_systems(
     *,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    seconds: float = SECONDS["commuting systems"],
+    effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
     C: fmpq_mat | None = None,
 ) -> CommutingSystems:
     """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
     `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
-    where the dimension is at most 3 and a second is enough to find all of them, else those. Exact over Q; what no lemma
-    proves is supported at random points, with a probability of error below 2^-error_bits. `seconds` bounds the time,
-    roughly. With a matrix C, for which C f' = f' C, only g with C g' = g' C. Raises InputError for another shape or a
-    bound that is not positive. What is too large is told in `undecided`. Source: petrera-suris-2016.
+    where the dimension is at most 3 and little work finds all of them, else those. Exact over Q; what no lemma
+    proves is supported at random points, with a probability of error below 2^-error_bits. Each more of `effort` doubles
+    the work that the search may take. With a matrix C, for which C f' = f' C, only g with C g' = g' C. Raises
+    InputError for another shape or a bound that is not positive. What is too large is told in `undecided`. Source:
+    petrera-suris-2016.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2 + 1", "y^2 - x*y"])
     >>> [(g.trivial, str(g.finding.verdict)) for g in commuting_systems(f).solutions]
     [('0', 'proved'), ('f', 'proved'), ('-f', 'proved')]
     """
-    system = as_system(system)
+    system, budget = as_system(system), budget_for("commuting systems", effort)
     if shape is None:
         if system.dim <= QUICK_DIMENSION:
-            quick = min(seconds, QUICK_SECONDS)
+            quick = Budget(min(budget.left, QUICK_UNITS))
             found = commuting_systems(
-                system, "quadratic", seed=seed, error_bits=error_bits, seconds=quick, progress=progress
+                system, "quadratic", seed=seed, error_bits=error_bits, effort=quick, progress=progress
             )
             if found.complete:
                 return found
         shape = "linear"
     if shape not in SHAPES:
         raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
-    if not seconds > 0:
-        raise InputError(f"found {seconds} seconds, expected a positive number")
     settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
-    search = _Search(system, settings, time.monotonic() + seconds, C, CommutingSystems(system, shape))
+    search = _Search(system, settings, budget, C, CommutingSystems(system, shape))
     search.run()
     return search.found
 
@@ -205,7 +204,7 @@ def commuting_systems(
 class _Search:
     f: QuadraticSystem
     settings: Settings
-    deadline: float
+    budget: Budget
     C: fmpq_mat | None
     found: CommutingSystems
     space: CommutingSpace = field(default_factory=lambda: CommutingSpace((), (), 0))
@@ -251,7 +250,7 @@ class _Search:
         signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in single if p not in trivial}
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
-            if not self._in_time() and weights not in trivial:
+            if not self._in_budget() and weights not in trivial:
                 found.undecided.append(f"the time is over: {len(others) + 3 - k} solutions were not judged")
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
@@ -269,7 +268,7 @@ class _Search:
         self.settings.progress(f"equations at eps^{order}, {len(part.free)} unknowns")
         found.order = max(found.order, order)
         rng = random.Random(f"commuting {self.settings.seed} {order}")
-        equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self._in_time)
+        equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self._in_budget)
         equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
         gens = part.values[0].context().gens()
         T = decoupling(equations, len(gens))
@@ -278,7 +277,7 @@ class _Search:
             moved = [sum((y * T[i, j] for j, y in enumerate(gens) if T[i, j] != 0), zero) for i in range(len(gens))]
             equations = [p.compose(*moved, ctx=zero.context()) for p in equations]
             part = SolutionComponent(tuple(v.compose(*moved, ctx=zero.context()) for v in part.values))
-        solutions = solve_system(equations, part.values, self.deadline)
+        solutions = solve_system(equations, part.values, self.budget)
         found.irrational += [text for text in solutions.irrational if text not in found.irrational]
         for component in solutions.components:
             if component.free:
@@ -286,7 +285,7 @@ class _Search:
             else:
                 self.points.append(component)
         for component in solutions.unsolved:
-            if level + 1 < len(ORDERS) and self._in_time():
+            if level + 1 < len(ORDERS) and self._in_budget():
                 self._solve(component, level + 1)
             else:
                 self._leave(component, solutions.reason)
@@ -306,14 +305,14 @@ class _Search:
     def _family(self, family: SolutionComponent, level: int) -> None:
         if any(known.contains(family) for known in self.families):
             return
-        if not self._in_time():
+        if not self._in_budget():
             self._leave(family, "the time is over")
             return
         self.settings.progress(f"a family with {len(family.free)} parameters")
         finding = judge_family(self.f, self.space, family, self.settings)
         if finding.verdict is not Verdict.REFUTED:
             self._add_family(family, finding)
-        elif level + 1 < len(ORDERS) and self._in_time():
+        elif level + 1 < len(ORDERS) and self._in_budget():
             self._solve(family, level + 1)
         else:
             self.found.undecided.append(
@@ -346,8 +345,8 @@ class _Search:
         names = [name for name, factor in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(factor)]
         return CommutingField(g, matrix, names[0] if names else "", finding)
 
-    def _in_time(self) -> bool:
-        return time.monotonic() < self.deadline
+    def _in_budget(self) -> bool:
+        return not self.budget.is_spent
 
 
 def find_commuting(
@@ -356,7 +355,7 @@ def find_commuting(
     *,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-    seconds: float = SECONDS["commuting systems"],
+    effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CommutingSystems:
     """All quadratic g whose Kahan map commutes with that of f at the same eps, over Q or the number field of f.
@@ -373,7 +372,7 @@ def find_commuting(
     >>> [[g.rhs for g in family.directions] for family in found.families]
     [[['x^2*a', 'y^2'], ['2*x^2', '0'], ['x^2*a', '0'], ['0', 'y^2*a']]]
     """
-    options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "seconds": seconds, "progress": progress}
+    options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "effort": effort, "progress": progress}
     given = as_map(system)
     kahan = given.given if isinstance(given, AlgebraicMap) else given
     if not isinstance(kahan, Kahan) or "eps" in kahan.system.symbols:

@@ -12,7 +12,6 @@ Variables are placed one after the other, and a choice is dropped at the first e
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Iterator
 from itertools import product
 
@@ -20,6 +19,7 @@ from flint import fmpq, fmpq_mat, fmpz
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.work import Budget
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 12
@@ -29,15 +29,15 @@ MAX_FOUND = 1_000  # all permutations in dimension 6 are 720
 Table = dict[tuple[int, ...], fmpq]  # coefficients by the component and the variables
 
 
-def signed_permutations(f: QuadraticSystem, sign: int, deadline: float) -> tuple[list[fmpq_mat], bool]:
+def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[list[fmpq_mat], bool]:
     """The S with f_2(S x) = sign S f_2(x), f_2 the quadratic terms (the linear ones if none).
 
     Where infinitely many are alike up to scales that do not change f_2, finitely many of them: the signed permutations
     for one scale of the variables, for the given one if it has any. Exact. Returns them, and whether these are all:
-    there may be too many, or `deadline` (time.monotonic) passes.
+    there may be too many, or the `budget` is spent.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "4*y^2 + 1"])
-    >>> [S.tolist() for S in signed_permutations(f, 1, time.monotonic() + 10)[0]]
+    >>> [S.tolist() for S in signed_permutations(f, 1, Budget())[0]]
     [[[1, 0], [0, 1]], [[0, 4], [1/4, 0]]]
     """
     found: list[fmpq_mat] = []
@@ -47,7 +47,7 @@ def signed_permutations(f: QuadraticSystem, sign: int, deadline: float) -> tuple
     everywhere = (((i, j, k)[-size:], form[j, k]) for i, form in enumerate(forms) for j in range(n) for k in range(n))
     table: Table = {at: value for at, value in everywhere if value != 0}
     base, scales, numbers = _balanced(table, n)
-    for permutation in _walk(numbers, n, sign, deadline):
+    for permutation in _walk(numbers, n, sign, budget):
         if permutation is None or len(found) >= MAX_FOUND:
             return found, False
         S = fmpq_mat(n, n)
@@ -118,9 +118,9 @@ def _exponent(number: fmpz, b: fmpz) -> int:
 
 
 def _walk(
-    numbers: dict[tuple[int, ...], int], n: int, sign: int, deadline: float
+    numbers: dict[tuple[int, ...], int], n: int, sign: int, budget: Budget
 ) -> Iterator[list[tuple[int, int]] | None]:
-    """The signed permutations for a table of numbers, place and sign of each variable; None where the time is over."""
+    """The signed permutations for a table of numbers, place and sign of each; None at the end of the budget."""
     size = len(next(iter(numbers), (0, 0)))
     # The equations that contain a variable and no later one, each of them once; first those that fail most.
     equations = [
@@ -138,7 +138,7 @@ def _walk(
         )
 
     def further(p: list[int], s: list[int]) -> Iterator[list[tuple[int, int]] | None]:
-        if time.monotonic() > deadline:
+        if budget.is_spent:
             yield None
         elif len(p) == n:
             yield list(zip(p, s, strict=True))

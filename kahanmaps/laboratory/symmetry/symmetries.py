@@ -9,7 +9,6 @@ are verified on coefficients, exactly: everything reported is proved. What was s
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,9 +21,9 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import coefficients_in, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import SolutionComponent, solve_system
+from kahanmaps.algebra.work import Budget
 from kahanmaps.displayed import Printed
-from kahanmaps.errors import InputError
-from kahanmaps.laboratory.defaults import SECONDS
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
 from kahanmaps.maps.kahan import SystemLike
@@ -175,15 +174,14 @@ class Symmetries(Printed):
 def linear_symmetries(
     system: SystemLike,
     *,
-    seconds: float = SECONDS["symmetries"],
+    effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Symmetries:
     """Affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
     Searched: the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled variables, with a
     translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no linear element,
-    all rational matrices. All exact and proved. `seconds` bounds the time, roughly. Raises InputError where it is not
-    positive.
+    all rational matrices. All exact and proved. Each more of `effort` doubles the work of the search.
     Source: cmoq-2013.
 
     >>> found = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
@@ -191,17 +189,15 @@ def linear_symmetries(
     (48, ['(x, y, z) -> (z, x, -y)', '(x, y, z) -> (-x, -z, y)'])
     """
     system = as_system(system)
-    if not seconds > 0:
-        raise InputError(f"found {seconds} seconds, expected a positive number")
-    deadline = time.monotonic() + seconds
+    budget = budget_for("symmetries", effort)
     found = Symmetries(system)
     progress("infinitesimal symmetries")
     _add_infinitesimal(found)
     progress("signed permutations")
-    _add_signed(found, deadline)
+    _add_signed(found, budget)
     if system.dim <= MAX_GENERAL:
         progress("all matrices")
-        _add_general(found, deadline)
+        _add_general(found, budget)
     return found
 
 
@@ -241,25 +237,27 @@ def _infinitesimal(f: QuadraticSystem, vector: Sequence[fmpq], weight: int) -> I
     return Infinitesimal(f.variables, fmpq_mat(n, n, vector[: n * n]), tuple(vector[n * n :]), weight)
 
 
-def _add_signed(found: Symmetries, deadline: float) -> None:
+def _add_signed(found: Symmetries, budget: Budget) -> None:
     f = found.system
     if f.dim > MAX_SIGNED:
         found.undecided.append(f"signed permutations are tried up to dimension {MAX_SIGNED}, found {f.dim}")
         return
     done = True
     for sign in (1, -1):
-        matrices, finished = signed_permutations(f, sign, deadline)
+        matrices, finished = signed_permutations(f, sign, budget)
         done = done and finished
         for S in matrices:
-            if time.monotonic() > deadline:
+            if budget.is_spent:
                 done = False
                 break
-            r = translation(f, S, sign, deadline)
+            r = translation(f, S, sign, budget)
             if r is not None:
                 found.signed.append(Symmetry(f.variables, S, r, sign < 0))
     found.signed.sort(key=lambda t: (t.reversing, not t.obvious, any(e != 0 for e in t.r)))
     if not done:
-        found.undecided.append("there are too many signed permutations, or the time is over: not all were tried")
+        found.undecided.append(
+            "there are too many signed permutations, or the budget is spent: not all were tried (--effort)"
+        )
         return
     found.searched.append("signed permutations, with a translation: all")
     found.order = len({_key(t.S) for t in found.signed})  # for f = 0 each is both kinds
@@ -304,7 +302,7 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
     return group
 
 
-def _add_general(found: Symmetries, deadline: float) -> None:
+def _add_general(found: Symmetries, budget: Budget) -> None:
     """All rational S with f(S x) = sign S f(x), by its polynomial equations."""
     f = found.system
     n = f.dim
@@ -321,7 +319,7 @@ def _add_general(found: Symmetries, deadline: float) -> None:
     complete = True
     for sign in (1, -1):
         equations = matrix_equations(f, matrix, sign)
-        solved = solve_system(equations, gens, deadline)
+        solved = solve_system(equations, gens, budget)
         for component in solved.components:
             # In a family of solutions all are singular: invertible ones would be a group with infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
@@ -358,13 +356,13 @@ def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: i
     return S.det() != 0 and system.composed(S, r) == system.transformed(S).scaled(sign)
 
 
-def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, deadline: float) -> tuple[fmpq, ...] | None:
+def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> tuple[fmpq, ...] | None:
     """An r with f(S x + r) = sign S f(x), 0 if possible; None if none that is rational was found.
 
-    `deadline` is a value of time.monotonic(). Source: cmoq-2013.
+    Source: cmoq-2013.
 
     >>> f = QuadraticSystem.from_text(["x"], ["x^2 + x"])
-    >>> translation(f, fmpq_mat([[-1]]), -1, float("inf"))
+    >>> translation(f, fmpq_mat([[-1]]), -1, Budget())
     (-1,)
     """
     n = f.dim
@@ -388,7 +386,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, deadline: float) -> 
         r = [a + t * v[k] for k, a in enumerate(r)]
     constants = (S * fmpq_mat(n, 1, list(f.c)) * fmpq(sign)).entries()
     equations = [p.compose(*r, ctx=parameters) - value for p, value in zip(f.rhs, constants, strict=True)]
-    solved = solve_system([*equations, gens[-1]], r, deadline)
+    solved = solve_system([*equations, gens[-1]], r, budget)
     if not solved.components:
         return None
     found = solved.components[0].point

@@ -9,7 +9,6 @@ and in the plane all P. Parameters of g are unknowns too. What is found holds; t
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,9 +20,11 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.small_systems import solve_system
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
 from kahanmaps.maps.kahan import SystemLike
@@ -71,14 +72,14 @@ class Equivalence:
 
 
 def equivalent_system(
-    system: SystemLike, fixed: FixedPointSearch | None = None, seconds: float = 10
+    system: SystemLike, fixed: FixedPointSearch | None = None, effort: int | Budget = 1
 ) -> Equivalence | None:
     """A system of the catalogue that an affine change of variables leads to, proved; None where none was found.
 
     Args:
         system: a quadratic system. None is looked for if it is one of the catalogue itself.
         fixed: its fixed points, if they are known already: lines of them are a frame.
-        seconds: bounds the time, roughly.
+        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
 
     >>> from kahanmaps.documents.inline import System
     >>> print(equivalent_system(System("x' = 3*y*z; y' = x*z; z' = -x*y")))
@@ -94,18 +95,18 @@ def equivalent_system(
             return None
     # Systems of the catalogue, frames, and the order of the variables, None where P may be any matrix.
     known, tried = _catalogue(f.dim), list[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]()
-    for frame in _frames(f, fixed_points(f, seconds) if fixed is None else fixed):
+    budget = budget_for("equivalent systems", effort)
+    for frame in _frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
         monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
         for g in known:
             tried += ((g, frame, order) for order in itertools.islice(_fitting(monomials, g.monomials), MAX_ORDERS))
     if f.dim == 2:
         tried += ((g, QQ.identity(2), None) for g in known)
-    deadline = time.monotonic() + seconds
     for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # all that is quick comes first
         for g, frame, order in tried:
-            if time.monotonic() > deadline:
+            if budget.is_spent:
                 return None
-            if (found := _matched(f, g, frame, order, is_scaled, deadline)) is not None:
+            if (found := _matched(f, g, frame, order, is_scaled, budget)) is not None:
                 return found
     return None
 
@@ -173,7 +174,7 @@ def _fitting(wanted: Sequence[Monomials], given: Sequence[Monomials]) -> Iterato
 
 
 def _matched(
-    f: QuadraticSystem, g: _Known, frame: fmpq_mat, order: Sequence[int] | None, is_scaled: bool, deadline: float
+    f: QuadraticSystem, g: _Known, frame: fmpq_mat, order: Sequence[int] | None, is_scaled: bool, budget: Budget
 ) -> Equivalence | None:
     """Solve g(P x + q) = c P f(x) for P = c T F with T a permutation, with a number each if `is_scaled`, or any matrix.
 
@@ -192,10 +193,10 @@ def _matched(
     shift, scale = simple[: n + 1], simple[n + 1 :][: len(entries)]
     always = shift if f.is_homogeneous and g.system.is_homogeneous else []
     for start in (always,) if is_scaled else ([*shift, *scale], [*always, *scale]):
-        solved = solve_system([*highest, *start], unknowns.gens(), deadline)
+        solved = solve_system([*highest, *start], unknowns.gens(), budget)
         for component in (*solved.components, *solved.unsolved):
             equations = [p.compose(*component.values, ctx=unknowns) for p in lower]
-            for point in _points([*equations, *component.equations], component.values, defaults, deadline):
+            for point in _points([*equations, *component.equations], component.values, defaults, budget):
                 c, q, values = point[0], point[1 : n + 1], point[n + 1 + len(entries) :]
                 T = fmpq_mat(n, n)
                 for (i, j), t in zip(entries, point[n + 1 :], strict=False):
@@ -247,16 +248,16 @@ def _points(
     equations: Sequence[fmpq_mpoly],
     values: Sequence[fmpq_mpoly],
     defaults: Sequence[fmpq],
-    deadline: float,
+    budget: Budget,
     depth: int = 0,
 ) -> Iterator[list[fmpq]]:
     """Some rational solutions, one of each family: `values` where the equations for their variables hold."""
     context = values[0].context()
-    solved = solve_system([p for p in equations if not p.is_zero()], values, deadline)
+    solved = solve_system([p for p in equations if not p.is_zero()], values, budget)
     for component in solved.components:
         yield [evaluate(value, QQ, defaults) for value in component.values]
-    for part in solved.unsolved if depth < _DEPTH and time.monotonic() < deadline else ():
+    for part in solved.unsolved if depth < _DEPTH and not budget.is_spent else ():
         i = part.free[0]
         for value in (defaults[i], defaults[i] + 1):
             fixed = [*part.equations, context.gen(i) - value]
-            yield from _points(fixed, part.values, defaults, deadline, depth + 1)
+            yield from _points(fixed, part.values, defaults, budget, depth + 1)

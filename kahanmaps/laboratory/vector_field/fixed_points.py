@@ -9,7 +9,6 @@ rational, and sets of positive dimension, are told by equations. Source: cmoq-20
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +19,9 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_product
 from kahanmaps.algebra.small_systems import SolutionComponent, groebner, normal_form, quotient_monomials, solve_system
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import counted
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
@@ -112,10 +113,11 @@ class FixedPointSearch:
         return attributes(self, "found", "undecided")
 
 
-def fixed_points(system: SystemLike, seconds: float = 10) -> FixedPointSearch:
+def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSearch:
     """All equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
 
-    `seconds` bounds the time, roughly; in dimension above 6 nothing is searched. What is not found is told.
+    Each more of `effort` doubles the work that the search may take; in dimension above 6 nothing is searched. What is
+    not found is told.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> print(fixed_points(pendulum))
@@ -130,7 +132,9 @@ def fixed_points(system: SystemLike, seconds: float = 10) -> FixedPointSearch:
     if system.dim > MAX_DIMENSION:
         return FixedPointSearch((), f"they are sought up to dimension {MAX_DIMENSION}")
     context = ring(system.variables)
-    solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), time.monotonic() + seconds)
+    solved = solve_system(
+        [p for p in system.rhs if not p.is_zero()], context.gens(), budget_for("fixed points", effort)
+    )
     found, undecided = [_on(system, part, []) for part in solved.components], ""
     for part in (*solved.conjugate, *solved.unsolved):
         basis = None if part in solved.without_basis else groebner(part.equations)

@@ -10,8 +10,8 @@ Source: benettin-1980 for the method, petrera-suris-2016, eq. (Jac), for the tan
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import reduce
 from operator import mul
@@ -29,6 +29,7 @@ from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
+from kahanmaps.time_limit import TimeLimit
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
 _PORTION = 200_000  # entries of the tangent maps that are computed at once
@@ -112,13 +113,12 @@ def lyapunov_exponents(
     *,
     time_step: Any = None,
     transient: int = 0,
-    seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Lyapunov:
     """The Lyapunov exponents of the float orbits of a map from `starts`, an array (orbits, dim) of floats, or one.
 
     A system stands for its Kahan map. `eps` is exact, half the time step where there is one, of either sign; `steps`
-    steps are counted after `transient` steps, both for at most about `seconds` seconds. Double precision: the numbers
+    steps are counted after `transient` steps; a TimeLimit ends them with what is known. Double precision: the numbers
     carry rounding and, in chaos, only their statistics mean anything. Returns a Lyapunov; raises InputError for eps =
     0, no steps and starts of a wrong shape.
     Source: benettin-1980.
@@ -150,42 +150,47 @@ def lyapunov_exponents(
         raise InputError(f"found {len(x)} starts, expected at most {MAX_NUMBERS // (n * n)} in dimension {n}")
     orbits = FloatEnsemble(map_, eps, x, kernel="numpy" if len(x) * steps < _LITTLE else None, threads=1)
     equations = map_.at(rational(eps)).equations
-    end = time.monotonic() + seconds
     frames = np.broadcast_to(np.eye(n), (len(x), n, n))
     sums, half, volumes, alive = np.zeros((len(x), n)), np.zeros((len(x), n)), np.zeros(len(x)), np.ones(len(x), bool)
     marks = [transient, transient + steps // 2, transient + steps]
-    while orbits.step < marks[-1] and alive.any() and time.monotonic() <= end:
-        progress(f"step {orbits.step} of {marks[-1]}")
-        mark = next(mark for mark in marks if mark > orbits.step)
-        count = min(mark - orbits.step, _STEPS, max(1, _PORTION // (len(x) * n * n)))
-        before = orbits.x[None]
-        after = np.concatenate(list(orbits.records(count, 1)))[-count:]
-        alive &= ~np.isnan(after).any(axis=(0, 2))
-        points = np.concatenate([before, after])[:, alive]
-        with np.errstate(all="ignore"):
-            maps, logs = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
-            maps, logs = maps.reshape(count, -1, n, n), logs.reshape(count, -1)
-            norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
-        sound = np.isfinite(logs).all(axis=0) & (norms < _LARGEST_NORM).all(axis=0)
-        alive[alive] = sound
-        maps, logs, norms, Q = maps[:, sound], logs[:, sound], norms[:, sound], frames[alive]
-        volumes[alive] += logs.sum(axis=0)
-        # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, that of a product at most the product.
-        conditions = np.maximum(np.log(2.0) + n * (norms - np.log(n) / 2) - logs, norms * _CONDITION / _LARGEST_NORM)
-        first, total = 0, 0.0
-        for k, condition in enumerate([*conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
-            if k and total + condition > _CONDITION:
-                Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first:k], Q))
-                sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
-                first, total = k, 0.0
-            total += condition
-        frames = np.zeros((len(x), n, n))
-        frames[alive] = Q
-        if orbits.step == transient:
-            sums[:], volumes[:] = 0.0, 0.0
-        elif orbits.step == marks[1]:
-            half = sums.copy()
-    counted = max(0, orbits.step - transient)
+    known = 0, sums, half, volumes, alive  # after the last complete portion
+    with suppress(TimeLimit):
+        while orbits.step < marks[-1] and alive.any():
+            progress(f"step {orbits.step} of {marks[-1]}")
+            mark = next(mark for mark in marks if mark > orbits.step)
+            count = min(mark - orbits.step, _STEPS, max(1, _PORTION // (len(x) * n * n)))
+            before = orbits.x[None]
+            after = np.concatenate(list(orbits.records(count, 1)))[-count:]
+            alive &= ~np.isnan(after).any(axis=(0, 2))
+            points = np.concatenate([before, after])[:, alive]
+            with np.errstate(all="ignore"):
+                maps, logs = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
+                maps, logs = maps.reshape(count, -1, n, n), logs.reshape(count, -1)
+                norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
+            sound = np.isfinite(logs).all(axis=0) & (norms < _LARGEST_NORM).all(axis=0)
+            alive[alive] = sound
+            maps, logs, norms, Q = maps[:, sound], logs[:, sound], norms[:, sound], frames[alive]
+            volumes[alive] += logs.sum(axis=0)
+            # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, that of a product at most the product.
+            conditions = np.maximum(
+                np.log(2.0) + n * (norms - np.log(n) / 2) - logs, norms * _CONDITION / _LARGEST_NORM
+            )
+            first, total = 0, 0.0
+            for k, condition in enumerate([*conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
+                if k and total + condition > _CONDITION:
+                    Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first:k], Q))
+                    sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
+                    first, total = k, 0.0
+                total += condition
+            frames = np.zeros((len(x), n, n))
+            frames[alive] = Q
+            if orbits.step == transient:
+                sums[:], volumes[:] = 0.0, 0.0
+            elif orbits.step == marks[1]:
+                half = sums.copy()
+            known = orbits.step, sums.copy(), half, volumes.copy(), alive.copy()
+    done, sums, half, volumes, alive = known
+    counted = max(0, done - transient)
     ended = len(x) - int(alive.sum())
     alive &= counted > 0
     unit = convention.time_step(size, map_) or 1.0
@@ -194,7 +199,7 @@ def lyapunov_exponents(
     return Lyapunov(
         unit,
         counted,
-        min(orbits.step, transient),
+        min(done, transient),
         len(x),
         ended,
         np.take_along_axis(sums[alive], order, axis=1) / (unit * max(1, counted)),

@@ -8,6 +8,7 @@ can only give degrees that are too small: who wants to be certain takes several 
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import reduce
 from math import prod
@@ -113,6 +114,11 @@ class Family:
             for _ in pool.map(part, range(0, count, _CHUNK)):
                 pass
         return found
+
+    def units(self, degrees: Sequence[int]) -> float:
+        """The work for one member whose iterates, from the 0th on, have these degrees, in units (algebra/work.py)."""
+        lengths = [self.dim * self.degree * d + 1 for d in degrees[:-1]]
+        return float(sum((len(self.terms) + self.dim**3) * length**2 for length in lengths)) / 2000
 
     def coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
         """The coefficients of the equation, an array (members, 2, places)."""

@@ -14,11 +14,10 @@ are is an eigenvalue problem, and they change with the scales of the variables. 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product as cartesian
-from math import inf, prod
+from math import prod
 from operator import sub
 from typing import Any
 
@@ -29,6 +28,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField,
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
 from kahanmaps.algebra.printing import format_polynomial, format_product
+from kahanmaps.algebra.work import Budget
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
@@ -348,13 +348,13 @@ def search_cofactors(
     known: Sequence[DarbouxSpace],
     wanted: int,
     max_degree: int,
-    deadline: float = inf,
+    budget: Budget,
 ) -> CofactorSearch:
     """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are known.
 
     A space is new if the integrals of `known` and of those found before do not account for its own. The cofactors are
     products of the `cofactors`, or of the `denominators`. Last come the `cofactors` times any numbers, where they are
-    known up to numbers. The search ends where it is too much work, or at the `deadline`, a value of time.monotonic().
+    known up to numbers. The search ends where it is too much work, or the `budget` is spent.
 
     Where P/Q = c on an orbit, P - c Q is a relation along this orbit: so unknown are only the coordinates of P - c Q in
     a basis of its relations. And Q is, up to a factor, the difference of the relations along two orbits, which tells
@@ -395,7 +395,7 @@ def search_cofactors(
             if independent >= wanted:
                 break
             work += count**2
-            if work > _MAX_WORK or time.monotonic() > deadline:
+            if work > _MAX_WORK or budget.is_spent:
                 return found
             equations = [
                 [b * v - a * u for u, v in zip(before, after, strict=True)]
@@ -424,7 +424,7 @@ def search_cofactors(
         if product.weight > degree + 1:
             continue
         work += 3 * points_needed(dim, degree) ** 2
-        if work > 2 * _MAX_WORK or time.monotonic() > deadline:
+        if work > 2 * _MAX_WORK or budget.is_spent:
             break
         product = replace(product, powers=(*product.powers, *[0] * len(denominators)))
         some = [space for _, space in cofactor_spaces(sample, product, degree) if len(space.basis) > 1]

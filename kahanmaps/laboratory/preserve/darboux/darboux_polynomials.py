@@ -6,7 +6,6 @@ of such P is listed unless products of elements of spaces listed before span it.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import comb
@@ -18,10 +17,12 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_rational_function
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, product_of
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
@@ -96,7 +97,7 @@ def darboux_polynomials(
     eps: Any = None,
     time_step: Any = None,
     flow: bool = False,
-    seconds: float = 60.0,
+    effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DarbouxSearch:
@@ -111,7 +112,7 @@ def darboux_polynomials(
         eps: an exact number, or None for formulas that contain eps.
         time_step: 2 eps, in its place.
         flow: ask for those of the differential equation instead, P' = K P with any K but 0 (flow_polynomials.py).
-        seconds: the time that the search may take, about.
+        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
         seed: of everything random.
         progress: is told what is being tried.
 
@@ -133,11 +134,15 @@ def darboux_polynomials(
     degree = integer(degree, "degree")
     file, eps = as_file(system), resolve_eps(eps, time_step)
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
-    deadline, cofactors, spaces = time.monotonic() + seconds, laboratory.cofactors(), list[DarbouxPolynomials]()
+    budget, cofactors, spaces = (
+        budget_for("Darboux polynomials", effort),
+        laboratory.cofactors(),
+        list[DarbouxPolynomials](),
+    )
     reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0
     if flow:
         assert laboratory.field is not None
-        settled = flow_polynomials(laboratory.field, degree, seconds, laboratory.seed)
+        settled = flow_polynomials(laboratory.field, degree, budget, laboratory.seed)
         for P in settled.functions:
             K = darboux_cofactor(laboratory.field, P)
             assert K is not None  # or it would not have been listed
@@ -160,8 +165,8 @@ def darboux_polynomials(
     try:
         sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
         for product in candidates:
-            if time.monotonic() > deadline:
-                reason = "the time was over before all products of cofactors were tried"
+            if budget.is_spent:
+                reason = "the budget was spent before all products of cofactors were tried (--effort)"
                 break
             progress(f"cofactor {product.text(cofactors)}")
             found |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
@@ -177,7 +182,7 @@ def darboux_polynomials(
             if space not in listed:
                 listed.append(space)
                 others = [one for other, one in found.items() if other[0] == law[0] and other != law]
-                written = _written(laboratory, cofactors, law[0], [found[law], *others], deadline)
+                written = _written(laboratory, cofactors, law[0], [found[law], *others], budget)
                 if isinstance(written, str):
                     reason = written
                 else:
@@ -205,7 +210,7 @@ def _written(
     cofactors: Sequence[Cofactor],
     product: CofactorProduct,
     spaces: Sequence[DarbouxSpace],
-    deadline: float,
+    budget: Budget,
 ) -> DarbouxPolynomials | str:
     """The first of spaces in closed form, or why there is none; the cofactors of the others differ by numbers."""
     text, bases, reason = product.text(cofactors), list[list[fmpq_mpoly]](), ""
@@ -213,7 +218,7 @@ def _written(
     for together in [spaces, spaces[:1]][len(spaces) == 1 :]:
         step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
         search = SpaceSearch([step], [list(together)], cofactors)
-        bases, reason = bases_of(laboratory, laboratory.primes[0], search, deadline)
+        bases, reason = bases_of(laboratory, laboratory.primes[0], search, budget)
         if bases:
             break
     else:

@@ -21,12 +21,11 @@ no integral is homogeneous in every grading. So the monomials of each weight are
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
-from math import comb, inf, lcm
+from functools import reduce
+from math import comb, lcm
 from operator import mul
 
 from flint import fmpq_mat, fmpq_mpoly, fmpz_mat, fmpz_poly, nmod_mat, nmod_poly
@@ -37,6 +36,7 @@ from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.modular_matrices import combine, echelon, matrix, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.modular_points import Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
@@ -70,9 +70,8 @@ class FlowPolynomials:
     reason: str = ""
 
 
-@lru_cache(maxsize=16)
 def flow_polynomials(
-    field: PolynomialField, max_degree: int | None = None, seconds: float = inf, seed: int = 0
+    field: PolynomialField, max_degree: int | None = None, budget: Budget | None = None, seed: int = 0
 ) -> FlowPolynomials:
     """The Darboux polynomials of a field, up to a degree.
 
@@ -80,7 +79,7 @@ def flow_polynomials(
         field: x' = f(x), exact. A symbol s counts as a variable with s' = 0.
         max_degree: of the polynomials in variables and symbols; by default up to 4, as long as there are at most 21
             monomials (of one weight, where the field has gradings).
-        seconds: the time that the search may take, about.
+        budget: of the search; None for as long as it takes.
         seed: of the random lines and primes.
 
     Returns:
@@ -93,7 +92,7 @@ def flow_polynomials(
     if field.symbols:
         context = field.rhs[0].context()
         wider = PolynomialField((*field.rhs, *[context.constant(0)] * len(field.symbols)))
-        known = flow_polynomials(wider, max_degree, seconds, seed)
+        known = flow_polynomials(wider, max_degree, budget, seed)
         return replace(known, functions=tuple(P for P in known.functions if degree_in(P, field.dim)))
     n, top = field.dim, 0
     asked, most = (4, _MOST_MONOMIALS) if max_degree is None else (max_degree, _MOST_EVER)
@@ -103,7 +102,7 @@ def flow_polynomials(
         if sum(len(support) ** 3 for support in _supports(n, top + 1, weights)) > most**3:
             break
         top += 1
-    deadline = time.monotonic() + seconds
+    budget = budget or Budget()
     rng = random.Random(f"flow polynomials {seed_for(seed, field.rhs)}")
     found: dict[str, fmpq_mpoly] = {}
     # Where all right-hand sides have a factor nothing moves; and of infinitely many, as with x' = x, y' = y, these are
@@ -115,7 +114,7 @@ def flow_polynomials(
     primes = [random_prime(rng) for _ in range(_PRIMES)]
     while done < top and not reason:
         for support in _supports(n, done + 1, weights):
-            reason = _Search(field, done + 1, support, rng, found).run(primes, deadline)
+            reason = _Search(field, done + 1, support, rng, found).run(primes, budget)
             if reason:
                 break
         else:
@@ -173,7 +172,7 @@ class _Search:
         exponents = exponents_up_to(field.dim, degree)
         self.monomials = [exponents[k] for k in support]
 
-    def run(self, primes: list[int], deadline: float) -> str:
+    def run(self, primes: list[int], budget: Budget) -> str:
         """Adds the polynomials to those found; why there may be others, "" where there are none.
 
         The prime that settles it comes first for the next search: factors over extensions of Q that have no residues
@@ -182,13 +181,13 @@ class _Search:
         reason = "lines modulo primes leave others possible"
         joined: list[tuple[list[int], int]] = []  # residues of what is not lifted yet, and their moduli
         for prime in list(primes):
-            if time.monotonic() > deadline:
+            if budget.is_spent:
                 return "the time was over"
             try:
                 flow = ModularFlow(self.field, prime, (), self.rng.getrandbits(64))
             except BadPrime:
                 continue
-            vectors, are_all = self._modulo(flow, deadline)
+            vectors, are_all = self._modulo(flow, budget)
             missing = list[list[int]]()
             for vector in vectors:
                 if not self._lifts(vector, prime):  # a higher power shows it, or that it has conjugate ones
@@ -214,7 +213,7 @@ class _Search:
             )
         return reason
 
-    def _modulo(self, flow: ModularFlow, deadline: float) -> tuple[Vectors, bool]:
+    def _modulo(self, flow: ModularFlow, budget: Budget) -> tuple[Vectors, bool]:
         """The coefficients of polynomials modulo the prime of a flow, the first being 1, and whether these are all."""
         common: list[Vectors] = []
         for k in range(_LINES):
@@ -227,7 +226,7 @@ class _Search:
             common = here
             if all(len(space) == 1 for space in common):
                 return [_monic(vector, flow.prime) for [vector] in common], True
-            if time.monotonic() > deadline:
+            if budget.is_spent:
                 break
         return [_monic(space[0], flow.prime) for space in common if len(space) == 1], False
 

@@ -24,8 +24,10 @@ from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import KahanmapsError, counted
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
@@ -183,7 +185,7 @@ def flow_and_map(
     flow: IntegralSearch | None = None,
     *,
     known: int = 0,
-    seconds: float = 10.0,
+    effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> FlowAndMap | None:
     """What a Kahan map, or a polarised one, makes of the integrals of its differential equation.
@@ -195,7 +197,7 @@ def flow_and_map(
         flow: the integrals of the flow; by default they are sought, up to a low degree, where the limits of those of
             the map are not all there can be.
         known: how many integrals the map is known to have, if that is more than `search` tells.
-        seconds: for the search, about.
+        effort: 1, or more: each more doubles the work of the search, each less halves it.
         progress: is told what is being tried.
 
     Returns:
@@ -212,6 +214,7 @@ def flow_and_map(
     if search.eps is not None or not (is_kahan or (isinstance(given, ImplicitMap) and given.of_field is not None)):
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
+    budget = budget_for("limits", effort)
     limits = _limits(search, laboratory) if is_kahan else _limits_on_solutions(search, laboratory)
     independent, dim = Independent(laboratory.maps[0], [one.leading for one in limits]), laboratory.map.dim
     if flow is None and len(limits) < dim - 1:
@@ -220,7 +223,7 @@ def flow_and_map(
             symbols=search.symbols,
             flow=True,
             max_degree=_TOP.get(dim, 3),
-            seconds=seconds,
+            effort=budget,
             seed=search.seed,
             progress=progress,
         )
@@ -232,7 +235,7 @@ def flow_and_map(
     progress("Darboux polynomials of the flow")
     sought = laboratory.flow_polynomials()
     found = find_densities(
-        laboratory.file, symbols=laboratory.symbols, flow=True, max_degree=_DENSITY_DEGREE, seconds=seconds
+        laboratory.file, symbols=laboratory.symbols, flow=True, max_degree=_DENSITY_DEGREE, effort=budget
     )
     density = next(iter(found.densities), None)
     functions += [] if density is None else [density.function]

@@ -19,6 +19,7 @@ from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, ring
 from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.algebra.residues import rational_vector
+from kahanmaps.algebra.work import Budget
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, slopes
@@ -33,7 +34,7 @@ _SPARE = 4
 
 
 def casimir_candidates(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[tuple[str, RationalFunction]]:
     """Functions of the integrals that may be Casimirs, as text in their names and written out.
 
@@ -41,7 +42,7 @@ def casimir_candidates(
         laboratory: the maps.
         tensor: one that the map preserves.
         integrals: known ones, by their names.
-        deadline: for the coefficients of polynomials, a value of time.monotonic().
+        budget: for the coefficients of polynomials.
 
     Yields:
         Products of powers, polynomials of degree 2 at most, then quotients of affine functions: right modulo a prime.
@@ -56,8 +57,8 @@ def casimir_candidates(
     try:
         found = [
             *_products(laboratory.maps[0], tensor, integrals, context),
-            *_polynomials(laboratory, tensor, integrals, deadline),
-            *_fractions(laboratory, tensor, integrals, deadline),
+            *_polynomials(laboratory, tensor, integrals, budget),
+            *_fractions(laboratory, tensor, integrals, budget),
         ]
     except NoPoint:
         return
@@ -98,7 +99,7 @@ def _products(
 
 
 def _polynomials(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
     """A basis of the polynomials of degree at most 2 in the integrals whose gradients the tensor kills."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MOST_TERMS else 1
@@ -116,13 +117,13 @@ def _polynomials(
             found.append([sum(w * v for w, v in zip(weights, row, strict=True)) for row in zip(*moved, strict=True)])
         return found
 
-    for P in _forms(laboratory, tensor, integrals, powers, columns, deadline):
+    for P in _forms(laboratory, tensor, integrals, powers, columns, budget):
         if degree_in(P, len(integrals)) > 1 or len(P) > 1:
             yield RationalFunction(P, P.context().constant(1))
 
 
 def _fractions(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
     """Quotients of affine functions of the integrals whose gradients the tensor kills.
 
@@ -139,7 +140,7 @@ def _fractions(
         J, P = [1, *values], [[0] * len(moved[0]), *moved]
         return [[J[a] * y - J[b] * x for x, y in zip(P[a], P[b], strict=True)] for a, b in pairs]
 
-    for form in _forms(laboratory, tensor, integrals, powers, columns, deadline):
+    for form in _forms(laboratory, tensor, integrals, powers, columns, budget):
         letters, zero = [form.context().constant(1), *form.context().gens()[:count]], form.context().constant(0)
         w = dict.fromkeys(pairs, zero)
         for monomial, value in form.terms():
@@ -160,7 +161,7 @@ def _forms(
     integrals: Sequence[FoundIntegral],
     powers: Sequence[tuple[int, ...]],
     columns: Callable[[list[int], list[list[int]], int], list[list[int]]],
-    deadline: float,
+    budget: Budget,
 ) -> Sequence[fmpq_mpoly]:
     """The relations among columns, one for each of the monomials `powers` in the integrals, as combinations of these.
 
@@ -187,7 +188,7 @@ def _forms(
         return ()
     eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
     names = [one.name for one in integrals]
-    forms = laboratory.formulas([model], lambda map_: [space(map_)], deadline, names, eps_enters)
+    forms = laboratory.formulas([model], lambda map_: [space(map_)], budget, names, eps_enters)
     return forms.bases[0] if forms.bases is not None else ()
 
 

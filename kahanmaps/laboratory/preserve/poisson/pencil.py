@@ -16,7 +16,6 @@ Nothing is said where the first of these fails, or where primes disagree.
 from __future__ import annotations
 
 import random
-import time
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -30,8 +29,10 @@ from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import BadPrime
 from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.singular.jets import modulo
 
 MAX_DEGREE = 12
@@ -108,7 +109,7 @@ class Pencil:
 
 
 def pencil_of(
-    name: str, integral: RationalFunction, eps: fmpq | None, *, seed: int = 0, seconds: float = 2.0
+    name: str, integral: RationalFunction, eps: fmpq | None, *, seed: int = 0, effort: int | Budget = 1
 ) -> Pencil | None:
     """Genus and base points of the generic curve I = c, measured modulo two primes.
 
@@ -117,7 +118,7 @@ def pencil_of(
         integral: a function that is not constant, in two variables and eps.
         eps: an exact number, or None: then a random residue stands for it.
         seed: of everything random.
-        seconds: after which it is given up.
+        effort: 1, or more: each more doubles the work after which it is given up, each less halves it.
 
     Returns:
         None where the degree is above 12, where the time was over, and where anything was not as it has to be.
@@ -132,14 +133,14 @@ def pencil_of(
     if max(degree_in(part, 2) for part in (integral.numerator, integral.denominator)) > MAX_DEGREE:
         return None
     rng = random.Random(f"pencil {seed_for(seed, integral, eps)}")
-    deadline = time.monotonic() + seconds
+    budget = budget_for("invariant curves", effort)
     found: list[Pencil] = []
     for _ in range(_TRIES):
         try:
-            _require(time.monotonic() < deadline)
+            _require(not budget.is_spent)
             field = GF(random_prime(rng, _BITS))
             residue = field.random(rng) if eps is None else field.convert(eps)
-            pencil = _Reduced(field, rng, deadline).pencil(name, integral, int(residue))
+            pencil = _Reduced(field, rng, budget).pencil(name, integral, int(residue))
         except (BadPrime, _Unclear):
             continue
         if pencil in found:
@@ -160,8 +161,8 @@ def _require(condition: bool) -> None:
 class _Reduced:
     """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, whether near)."""
 
-    def __init__(self, field: PrimeField, rng: random.Random, deadline: float) -> None:
-        self.field, self.prime, self._rng, self._deadline = field, field.prime, rng, deadline
+    def __init__(self, field: PrimeField, rng: random.Random, budget: Budget) -> None:
+        self.field, self.prime, self._rng, self._budget = field, field.prime, rng, budget
         self.ring = nmod_mpoly_ctx.get(("x", "y"), modulus=self.prime, ordering=Ordering.degrevlex)
         self.points: Counter[tuple[int, bool]] = Counter()
 
@@ -240,7 +241,7 @@ class _Reduced:
 
         The curves meet there at most `most` times, or `exact`ly so often: terms of a higher degree make no difference.
         """
-        _require(time.monotonic() < self._deadline)
+        _require(not self._budget.is_spent)
         m = min(map(sum, f), default=most + 1)
         _require(m == min(map(sum, g), default=most + 1) and m * m <= most)
         if m == 0:

@@ -11,7 +11,6 @@ each of them decides whether all their combinations do.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -26,6 +25,7 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
@@ -35,7 +35,7 @@ from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps
 from kahanmaps.invariants.poisson import GivenTensor
-from kahanmaps.laboratory.defaults import SECONDS, tensor_degree
+from kahanmaps.laboratory.defaults import budget_for, tensor_degree
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import (
     Independent,
@@ -196,7 +196,7 @@ def find_poisson(
     time_step: Any = None,
     denominator: RationalFunction | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
-    seconds: float = SECONDS["Poisson tensors"],
+    effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> PoissonSearch:
@@ -211,7 +211,7 @@ def find_poisson(
         denominator: a function of the variables and eps by which the entries are divided; None: where there are no
             tensors without one, the factors of a density that is a product are tried, if that is little work.
         integrals: those whose brackets are asked for; None: they are searched, if there is a tensor.
-        seconds: the time that the search may take, about.
+        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
         seed: of everything random.
         progress: is told what is being tried.
 
@@ -230,10 +230,10 @@ def find_poisson(
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
     degree = tensor_degree(file.dim) if degree is None else integer(degree, "degree")
-    if degree < 0 or not seconds > 0:
-        raise InputError(f"found the degree {degree} and {seconds} seconds, expected at least 0 and a time above 0")
+    if degree < 0:
+        raise InputError(f"found the degree {degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)
-    deadline = time.monotonic() + seconds
+    budget = budget_for("Poisson tensors", effort)
     dim, asked = file.dim, degree
     pairs = dim * (dim - 1) // 2
     if denominator is not None:
@@ -256,10 +256,10 @@ def find_poisson(
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
     if not reason:
         progress(f"tensors of degree up to {degree}")
-        forms, reason = _tensors(laboratory, degree, denominator, deadline)
+        forms, reason = _tensors(laboratory, degree, denominator, budget)
         if not forms and degree < 2 <= asked and dim <= _MOST_LOGARITHMIC and denominator is None:
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
-            forms, _ = _tensors(laboratory, 2, None, deadline, log_canonical(dim))
+            forms, _ = _tensors(laboratory, 2, None, budget, log_canonical(dim))
         if not forms and denominator is None:
             # Over the factors of a known density, each once, with numerators as much higher in degree.
             density = None
@@ -270,7 +270,7 @@ def find_poisson(
             if factors and pairs * comb(dim + higher, dim) <= _MAX_UNKNOWNS // 2:
                 psi = reduce(lambda a, b: a * b, factors)
                 over = RationalFunction(psi, psi.context().constant(1))
-                forms, _ = _tensors(laboratory, higher, over, deadline)
+                forms, _ = _tensors(laboratory, higher, over, budget)
                 denominator = over if forms else None
                 more = f", and none of degree at most {higher} over {format_rational_function(over)}"
                 reason = "" if forms else reason + more
@@ -278,10 +278,10 @@ def find_poisson(
             progress(f"verifying tensor {k} of {len(forms)}")
             law = transformation_identity(laboratory.map, tensor, laboratory.eps)
             # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
-            verdict, evidence = _verdict(laboratory, law, deadline if dim <= MAX_DIMENSION else 0.0)
+            verdict, evidence = _verdict(laboratory, law, budget if dim <= MAX_DIMENSION else Budget(0))
             if not verdict.holds:
                 continue
-            jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, laboratory.eps), deadline)
+            jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, laboratory.eps), budget)
             P = _at(tensor, laboratory.maps[0], laboratory.maps[0].random_point())
             rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], laboratory.maps[0].prime)
             found.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
@@ -296,22 +296,22 @@ def find_poisson(
     pencil = None
     if 1 < len(found) <= _LARGEST_PENCIL and all(one.jacobi.holds for one in found):
         identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
-        pencil, _ = _verdict(laboratory, identity, deadline)
+        pencil, _ = _verdict(laboratory, identity, budget)
     search = PoissonSearch(*laboratory.asked, tuple(found), (), degree, denominator, pencil, reason)
     if found and integrals is None:
         progress("integrals, for their brackets")
-        left = max(1.0, (deadline - time.monotonic()) / 2)
+        half = budget.part(0.5)
         with suppress(KahanmapsError):  # of maps without a search
-            integrals = find_integrals(file, symbols=symbols, eps=laboratory.eps, seconds=left, seed=seed).integrals
-    return with_brackets(search, integrals or (), max(0.0, deadline - time.monotonic()))
+            integrals = find_integrals(file, symbols=symbols, eps=laboratory.eps, effort=half, seed=seed).integrals
+    return with_brackets(search, integrals or (), budget)
 
 
-def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], seconds: float) -> PoissonSearch:
+def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], budget: Budget) -> PoissonSearch:
     """The tensors with what is known of their brackets with integrals: Casimirs, and integrals in involution."""
-    tensors, deadline = found.tensors, time.monotonic() + seconds
+    tensors = found.tensors
     if tensors and integrals:
         laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed)
-        tensors = tuple(_with_brackets(laboratory, one, integrals, deadline) for one in tensors)
+        tensors = tuple(_with_brackets(laboratory, one, integrals, budget) for one in tensors)
     return replace(found, tensors=tensors, integrals=tuple(integrals))
 
 
@@ -319,7 +319,7 @@ def _tensors(
     laboratory: Laboratory,
     degree: int,
     denominator: RationalFunction | None,
-    deadline: float,
+    budget: Budget,
     monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[GivenTensor], str]:
     """A basis of the tensors over the denominator in closed form, of these monomials, or a reason why there is none."""
@@ -337,9 +337,7 @@ def _tensors(
     while any(name.startswith(prefix) for name in variables):
         prefix += "_"
     names = (*variables, *(prefix + name for name in variables))  # the latter for the directions
-    forms = laboratory.formulas(
-        [model], lambda map_: [tensor_space(map_, degree, denominator, support)], deadline, names
-    )
+    forms = laboratory.formulas([model], lambda map_: [tensor_space(map_, degree, denominator, support)], budget, names)
     if forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
     # Left out is what products of an integral and a tensor span together with the elements before.
@@ -439,7 +437,7 @@ def _at(tensor: GivenTensor, map_: ModularMap, x: Sequence[int]) -> Any:
 
 
 def _with_brackets(
-    laboratory: Laboratory, found: FoundTensor, integrals: Sequence[FoundIntegral], deadline: float
+    laboratory: Laboratory, found: FoundTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> FoundTensor:
     """The tensor with its Casimirs, and with the integrals that are in involution."""
     tensor, map_ = found.tensor, laboratory.maps[0]
@@ -450,15 +448,15 @@ def _with_brackets(
 
     def add_casimir(name: str, function: RationalFunction, row: list[int]) -> None:
         is_killed = all(entry == 0 for entry in (P * field.column(row)).entries())
-        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), deadline)[0].holds:
+        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), budget)[0].holds:
             casimirs.append(name)
             there.add(row)
 
     for one, row in zip(integrals, rows, strict=True):
         add_casimir(one.name, one.function, row)
     most = min(tensor.dim - found.rank, rank(rows, map_.prime))
-    if len(there.rows) < most and len(integrals) <= _MOST_INTEGRALS and time.monotonic() < deadline:
-        for name, function in casimir_candidates(laboratory, tensor, integrals, deadline):
+    if len(there.rows) < most and len(integrals) <= _MOST_INTEGRALS and not budget.is_spent:
+        for name, function in casimir_candidates(laboratory, tensor, integrals, budget):
             row = there.gradient(function)
             if len(there.rows) < most and there.adds(row):
                 add_casimir(name, function, row)
@@ -472,14 +470,14 @@ def _with_brackets(
     involution = None
     if chosen:
         functions = [one.function for one in chosen]
-        involution, _ = _verdict(laboratory, _brackets(laboratory, tensor, functions, False), deadline)
+        involution, _ = _verdict(laboratory, _brackets(laboratory, tensor, functions, False), budget)
     names = tuple(one.name for one in chosen)
     return replace(found, casimirs=tuple(casimirs), in_involution=names, involution=involution)
 
 
-def _verdict(laboratory: Laboratory, identity: Identity, deadline: float) -> tuple[Verdict, Evidence]:
+def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Verdict, Evidence]:
     """The verdict on an identity, which is not multiplied out when the time is over."""
-    return judged(identity, laboratory.seed, expands=time.monotonic() < deadline)
+    return judged(identity, laboratory.seed, expands=not budget.is_spent)
 
 
 def _brackets(

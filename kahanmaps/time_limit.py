@@ -1,0 +1,48 @@
+"""A hard stop by the clock: what is being done then is given up, and nothing else is ever decided by a clock."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import isfinite
+from typing import Any
+
+from kahanmaps.errors import InputError
+
+
+class TimeLimit(KeyboardInterrupt):
+    """The time of a `time_limit` is over. Like Ctrl-C, it ends what is being done wherever that is."""
+
+
+@contextmanager
+def time_limit(seconds: float | None) -> Iterator[None]:
+    """Raise TimeLimit in what is done within the block, once so many seconds are over; never for None.
+
+    What had been completed before stays as it is; what was in flight is lost. Only in the main thread of a process, and
+    not on Windows. Raises InputError elsewhere, and for a time that is not positive.
+
+    >>> import time
+    >>> with time_limit(60):
+    ...     print("enough time")
+    enough time
+    """
+    if seconds is None:
+        yield
+        return
+    if not (isfinite(seconds) and seconds > 0):
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        raise InputError("found a time limit in another thread or on Windows, expected the main thread: give effort=")
+
+    def stop(*_: Any) -> None:
+        raise TimeLimit(f"the time limit of {seconds:g} s is over")
+
+    previous = signal.signal(signal.SIGALRM, stop)
+    outer, interval = signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, outer, interval)
+        signal.signal(signal.SIGALRM, previous)
