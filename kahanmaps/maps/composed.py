@@ -20,7 +20,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import BirationalMap, ComposedMapOver, ImplicitMap, MapOver, nonzero_eps
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, MapOver, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
 _BUDGET = 20_000_000  # products of terms
@@ -63,7 +63,7 @@ class ComposedMap(BirationalMap):
 
     def __init__(self, variables: tuple[str, ...], parts: Sequence[MapFactor], symbols: tuple[str, ...]) -> None:
         self.variables, self.parts, self._symbols = variables, tuple(parts), symbols
-        self._last: tuple[Field, Any, ComposedMapOver] | None = None
+        self._last: tuple[Field, Any, MapOver] | None = None
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -99,12 +99,12 @@ class ComposedMap(BirationalMap):
     def digits(self) -> int:
         return sum(part.map.digits for part in self.parts)
 
-    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ComposedMapOver:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> MapOver:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where a part has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         if self._last is None or values or self._last[0] is not over or self._last[1] is not element:
             parts = [part.at(element, over, values) for part in self.parts]
-            self._last = (over, None if values else element, ComposedMapOver(parts, element, self.variables))
+            self._last = (over, None if values else element, MapOver(parts, element, self.variables))
         return self._last[2]
 
     @cached_property

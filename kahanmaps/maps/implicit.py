@@ -5,8 +5,8 @@ by rational functions has for M the diagonal of their denominators; discretizati
 have it as they stand. Three values say it all, and everything else asks them:
 
 * `BirationalMap` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
-* `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is made of factors
-  (composed.py), most maps of one: a `StepOver`, that has an equation.
+* `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is made of factors, most
+  maps of one: a `StepOver`, that has an equation.
 * `Equation` has the coefficients of M and r over that field (equation.py). The evaluators go from factor to factor and
   start from their equations; the generic one, over any field, is here.
 
@@ -42,28 +42,42 @@ from kahanmaps.maps.orbits.integer_steps import IntegerSteps
 from kahanmaps.systems.polynomial import PolynomialField
 
 
-class MapOver(ABC):
-    """A birational map over a field, at one eps (an element of the field).
-
-    A map has to give its `inverse` and its `factors`: the maps with an equation whose steps, one after the other, are a
-    step of it. Most have one factor, themselves. Evaluators go through the factors.
-    """
+class MapOver:
+    """Birational maps over a field, one after the other; `eps` is that of all, or None where they differ."""
 
     field: Field
     eps: Any
     dim: int
     variables: tuple[str, ...] = ()
-    flow: tuple[Any, Any] | None = None  # that it approximates, where it does: of which field, and for which time
 
-    @property
-    @abstractmethod
+    def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
+        self.parts, self.eps, self.variables = tuple(parts), eps, variables
+        self.field, self.dim = parts[0].field, parts[0].dim
+
+    @cached_property
     def factors(self) -> tuple[StepOver, ...]:
-        """The maps of which this one takes a step of each, the first one first."""
+        """The maps with an equation of which this one takes a step of each, the first one first: evaluators do so."""
+        return tuple(one for part in self.parts for one in part.factors)
 
-    @property
-    @abstractmethod
+    @cached_property
     def inverse(self) -> MapOver:
         """The inverse map. Raises InputError where it is not known."""
+        return MapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
+
+    @cached_property
+    def flow(self) -> tuple[Any, Any] | None:
+        """The flow that it approximates, where that is one: of which field, and for which time."""
+        flows = [part.flow for part in self.parts]
+        known = [flow for flow in flows if flow is not None]
+        if len(known) < len(flows) or any(field != known[0][0] for field, _ in known):
+            return None
+        with self.field.working():
+            return known[0][0], sum((time for _, time in known), self.field.zero)
+
+    def __repr__(self) -> str:
+        eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
+        step = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
+        return f"MapOver({', '.join(self.variables)}; {eps}{step}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
         """What it is, as plain data for records: eps is None where it differs, the time step where there is no flow."""
@@ -108,19 +122,18 @@ class MapOver(ABC):
         if (self.field, self.dim) != (other.field, other.dim):
             raise InputError(f"found maps {self!r} and {other!r}, expected one field and one dimension")
         eps = self.eps if self.eps == other.eps else None
-        return ComposedMapOver([other, self], eps, self.variables)
+        return MapOver([other, self], eps, self.variables)
 
     def __pow__(self, power: int) -> MapOver:
         """So many steps as one map, of the inverse for a negative number, the identity for 0."""
         power = integer(power, "the power")
         if power:
-            return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
+            return MapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
         n, one = self.dim, self.field.one
         units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
         rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # 1 x~ - x
-        identity = StepOver(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, variables=self.variables)
-        identity.flow = self.flow and (self.flow[0], self.field.zero)
-        return identity
+        flow = self.flow and (self.flow[0], self.field.zero)
+        return StepOver(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, None, self.variables, flow)
 
     def __eq__(self, other: object) -> bool:
         """Whether the equations of the steps are the same, one after the other."""
@@ -202,43 +215,11 @@ class MapOver(ABC):
         )
 
 
-class ComposedMapOver(MapOver):
-    """Maps over one field, one after the other; `eps` is that of all, or None where they differ."""
-
-    def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
-        self.parts, self.eps, self.variables = tuple(parts), eps, variables
-        self.field, self.dim = parts[0].field, parts[0].dim
-
-    @cached_property
-    def factors(self) -> tuple[StepOver, ...]:
-        return tuple(one for part in self.parts for one in part.factors)
-
-    @cached_property
-    def inverse(self) -> ComposedMapOver:
-        """The inverses in the opposite order."""
-        return ComposedMapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
-
-    @cached_property
-    def flow(self) -> tuple[Any, Any] | None:  # type: ignore[override]  # nobody writes it
-        """That of the parts for the sum of their times, where it is one."""
-        flows = [part.flow for part in self.parts]
-        known = [flow for flow in flows if flow is not None]
-        if len(known) < len(flows) or any(field != known[0][0] for field, _ in known):
-            return None
-        with self.field.working():
-            return known[0][0], sum((time for _, time in known), self.field.zero)
-
-    def __repr__(self) -> str:
-        eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
-        step = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
-        return f"ComposedMapOver({', '.join(self.variables)}; {eps}{step}, over {self.field})"
-
-
 class StepOver(MapOver):
     """The map of an equation M(x) x~ = r(x) over a field; `backward` gives the equation of its inverse when asked for.
 
     Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse. A map that knows
-    a faster way to its matrices (KahanMapOver) overrides them.
+    a faster way to its matrices (KahanMap) overrides them.
     """
 
     def __init__(
@@ -247,13 +228,20 @@ class StepOver(MapOver):
         eps: Any,
         backward: Callable[[], Equation] | None = None,
         variables: tuple[str, ...] = (),
+        flow: tuple[Any, Any] | None = None,
     ) -> None:
         self.field, self.dim, self.eps, self.variables = equation.over, equation.dim, eps, variables
-        self._equation, self._backward = equation, backward
+        self._equation, self._backward, self._flow = equation, backward, flow
 
     @property
-    def factors(self) -> tuple[StepOver, ...]:
+    def factors(self) -> tuple[StepOver, ...]:  # type: ignore[override]  # nobody writes it
+        """The map itself."""
         return (self,)
+
+    @property
+    def flow(self) -> tuple[Any, Any] | None:  # type: ignore[override]  # nor this
+        """The flow that it approximates, where it is known: of which field, and for which time."""
+        return self._flow
 
     @property
     def equation(self) -> Equation:
@@ -318,7 +306,8 @@ class StepOver(MapOver):
         return IntegerSteps(equation.exponents, equation.terms)
 
     def __repr__(self) -> str:
-        return f"StepOver({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
+        name, eps = type(self).__name__, self.field.format(self.eps)
+        return f"{name}({', '.join(self.variables)}; eps={eps}, over {self.field})"
 
 
 def det_of(name: str) -> str:

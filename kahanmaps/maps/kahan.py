@@ -49,25 +49,57 @@ SystemLike: TypeAlias = (
 )
 
 
-class KahanMapOver(StepOver):
-    """The map Phi(., eps) of a system that is given over any field, with eps an element of it; time step 2 eps.
+class KahanMap(DisplayedAsFormula, StepOver):
+    """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
+
+    `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
+    It is put in where it stands in the coefficients of the system as well, as `values`, elements of the field, are for
+    the other symbols. Over QQ and GF(p) everything is exact, over RR(bits) it is enclosed. A system that is given over a
+    field, a `SystemOver`, has a map with any element for eps.
 
     M and r are computed from the tensor f'', which over most fields is faster than to go by the equation.
+
+    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
+    >>> phi = KahanMap(system, "1/2")
+    >>> phi.step(["1", "1/3"])
+    (7/8, -13/24)
+    >>> phi.inverse_step(phi.step(["1", "1/3"]))
+    (1, 1/3)
     """
 
-    def __init__(self, local: SystemOver, eps: Any) -> None:
-        self.field, self.dim = local.field, local.dim
-        self.eps = eps
-        self.local = local
+    def __init__(
+        self,
+        system: QuadraticSystem | SystemOver,
+        eps: Any,
+        field: Field = QQ,
+        values: Sequence[Any] = (),
+        inside: Any = None,
+    ) -> None:
+        """`inside` is put in for eps in the coefficients where that is not the step: for inverse maps."""
+        if isinstance(system, SystemOver):
+            self.local, self.eps = system, eps
+            self._given: tuple[Any, ...] = (system,)
+        elif isinstance(system, QuadraticSystem):
+            self.system, self.values, self.variables = system, tuple(values), system.variables
+            self.eps = nonzero_eps(eps, field)
+            self._inside = self.eps if inside is None else inside
+            rest = iter(self.values)
+            self.local = system.over(field, [self._inside if x == "eps" else next(rest) for x in system.symbols])
+            self._given = (system, field, self.values, self._inside)
+        else:
+            raise InputError(
+                f"found a {type(system).__name__}, expected a quadratic system: km.load(...).system is one"
+            )
+        self.field, self.dim = self.local.field, self.local.dim
 
     def denominator_name(self, backward: bool) -> str:
         return f"I {'+' if backward else '-'} eps f'(x)"
 
     @cached_property
-    def inverse(self) -> KahanMapOver:
-        """The inverse map, Phi(., -eps)."""
+    def inverse(self) -> KahanMap:
+        """The inverse map, Phi(., -eps) for the same vector field, whatever eps is in its coefficients."""
         with self.field.working():  # or -eps would be a ball of FLINT's default precision
-            return KahanMapOver(self.local, -self.eps)
+            return KahanMap(self._given[0], -self.eps, *self._given[1:])
 
     def denominator_matrix(self, point: Sequence[Any]) -> Any:
         """The matrix I - eps f'(x)."""
@@ -112,63 +144,20 @@ class KahanMapOver(StepOver):
                 terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*left, right)))
         return Equation(field, exponents, tuple(terms))
 
-    def vector_field(self, point: Sequence[Any]) -> tuple[Any, ...]:
-        """f(x)."""
-        with self.field.working():
-            return self.local.value(self.point(point))
-
-
-class KahanMap(DisplayedAsFormula, KahanMapOver):
-    """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
-
-    `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
-    It is put in where it stands in the coefficients of the system as well, as `values`, elements of the field, are for
-    the other symbols. Over QQ and GF(p) everything is exact, over
-    RR(bits) it is enclosed.
-
-    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
-    >>> phi = KahanMap(system, "1/2")
-    >>> phi.step(["1", "1/3"])
-    (7/8, -13/24)
-    >>> phi.inverse_step(phi.step(["1", "1/3"]))
-    (1, 1/3)
-    """
-
-    def __init__(
-        self, system: QuadraticSystem, eps: Any, field: Field = QQ, values: Sequence[Any] = (), inside: Any = None
-    ) -> None:
-        """`inside` is put in for eps in the coefficients where that is not the step: for inverse maps."""
-        if not isinstance(system, QuadraticSystem):
-            raise InputError(
-                f"found a {type(system).__name__}, expected a quadratic system: km.load(...).system is one"
-            )
-        self.system, self.values = system, tuple(values)
-        self.variables = system.variables
-        element = nonzero_eps(eps, field)
-        self._inside = element if inside is None else inside
-        rest = iter(self.values)
-        super().__init__(
-            system.over(field, [self._inside if name == "eps" else next(rest) for name in system.symbols]), element
-        )
-
-    @cached_property
-    def inverse(self) -> KahanMap:
-        """The inverse map, Phi(., -eps) for the same vector field, whatever eps is in its coefficients."""
-        with self.field.working():
-            return KahanMap(self.system, -self.eps, self.field, self.values, self._inside)
-
     @property
-    def flow(self) -> tuple[Any, Any]:  # type: ignore[override]  # nobody writes it
+    def flow(self) -> tuple[Any, Any] | None:  # type: ignore[override]  # nobody writes it
         """That of the system, with the values of its symbols, for the time step."""
+        if isinstance(self._given[0], SystemOver):
+            return None
         symbols = self._inside if "eps" in self.system.symbols else None, *self.values
         with self.field.working():
             return (str(self.system), symbols), time_step(self.eps)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return KahanMap, (self.system, self.eps, self.field, self.values, self._inside)
+        return KahanMap, (self._given[0], self.eps, *self._given[1:])
 
-    def __repr__(self) -> str:
-        return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
+
+KahanMapOver = KahanMap  # its name in laboratory/
 
 
 class Kahan(BirationalMap):

@@ -19,7 +19,7 @@ from flint import fmpq
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.matrices import det, rank, solve, trace
-from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver
 
@@ -208,13 +208,13 @@ class PaperObjects:
         eps = self.step_eps * self.number(times)
         if self.method == "euler":
             return x + self.value(f, x) * (eps * self.number(2))
-        return self.K.column(KahanMapOver(f, eps).step(x.entries()))
+        return self.K.column(KahanMap(f, eps).step(x.entries()))
 
     def jacobian_of_step(self, f: SystemOver, x: Any) -> Any:
         """dPhi_f(x, eps)."""
         if self.method == "euler":
             return self.I + self.jac(f, x) * (self.step_eps * self.number(2))
-        return KahanMapOver(f, self.step_eps).jacobian(x.entries())
+        return KahanMap(f, self.step_eps).jacobian(x.entries())
 
     @remembered
     def minus_eps_jac(self, f: SystemOver, x: Any) -> Any:

@@ -23,7 +23,7 @@ from kahanmaps.family.tensor import (
     over_algebra,
     tensor_structure,
 )
-from kahanmaps.maps.kahan import KahanMap, KahanMapOver
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
@@ -48,7 +48,7 @@ def test_over_nilpotent_elements_the_map_is_that_of_curves():
     x, v = [fmpq(1, 3), fmpq(2)], [fmpq(1), fmpq(-1, 2)]
     split = [x[0], v[0], x[1], v[1]]
     found = KahanMap(over_algebra(PLANAR, t**2), fmpq(1, 7), QQ).step(split)
-    along = (KahanMapOver(PLANAR.over(QQ), fmpq(1, 7)).jacobian(x) * fmpq_mat([[v[0]], [v[1]]])).entries()
+    along = (KahanMap(PLANAR.over(QQ), fmpq(1, 7)).jacobian(x) * fmpq_mat([[v[0]], [v[1]]])).entries()
     assert list(found) == [value for pair in zip(map_.step(x), along, strict=True) for value in pair]
 
 
@@ -63,7 +63,7 @@ def test_integrals_and_densities_are_inherited(chi):
     for integral in file.integrals.values():
         assert integral.value(QQ, [*image, eps]) == integral.value(QQ, [*point, eps])
     before, after = (file.density.value(QQ, [*x, eps]) for x in (point, image))
-    assert KahanMapOver(file.system.over(QQ), eps).jacobian(point).det() == after / before
+    assert KahanMap(file.system.over(QQ), eps).jacobian(point).det() == after / before
 
 
 def test_the_components_of_another_function_are_not_conserved():

@@ -36,7 +36,7 @@ from kahanmaps.maps.floats.straight_line import (
     solve_two,
 )
 from kahanmaps.maps.implicit import StepOver
-from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.maps.kahan import KahanMap
 
 IntArray = NDArray[np.int64]
 
@@ -188,7 +188,7 @@ def float_equation(map_over: StepOver) -> FloatEquation:
     all_constants, all_terms = [], []
     for row in equation.terms:
         largest = max((abs(c) for entry in row[:n] for _, c in entry), default=fmpq(1))
-        scale = fmpq(1) if isinstance(map_over, KahanMapOver) else 1 / largest
+        scale = fmpq(1) if isinstance(map_over, KahanMap) else 1 / largest
         constants, terms = [0.0] * (n + 1), []
         for j, entry in enumerate(row):
             found = []
