@@ -54,8 +54,8 @@ class KahanMap(DisplayedAsFormula, StepOver):
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
     It is put in where it stands in the coefficients of the system as well, as `values`, elements of the field, are for
-    the other symbols. Over QQ and GF(p) everything is exact, over RR(bits) it is enclosed. A system that is given over a
-    field, a `SystemOver`, has a map with any element for eps.
+    the other symbols. Over QQ and GF(p) everything is exact, over RR(bits) it is enclosed. A system that is given over
+    a field, a `SystemOver`, has a map with any element for eps.
 
     M and r are computed from the tensor f'', which over most fields is faster than to go by the equation.
 

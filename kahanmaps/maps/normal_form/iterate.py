@@ -66,40 +66,34 @@ class NthIterate:
             found = []
             for plane, triple in zip(self.splitting.planes, self.splitting.triples(x), strict=True):
                 found.append(self._in_plane(plane.block, triple, n))
-            for _, _, W in found:
-                if self.field.is_zero(W):
+                if self.field.is_zero(found[-1][2]):
                     raise SingularStep(f"the map has a pole: its iterate {n} has no value at the start")
             return self.splitting.point(found)
 
     def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
+        """P_n over a field other than Q."""
         from kahanmaps.maps.normal_form import translation
+        from kahanmaps.maps.normal_form.planar_block import same_point
+        from kahanmaps.maps.normal_form.rational_iterate import stepped_over
 
         if block.is_zero or (start[0] == 0 and start[1] == 0):
             return start
-        small = isinstance(self.field, PrimeField) and self.field.prime < 5
-        if not small:
+        balls = isinstance(self.field, BallField)
+        if not (isinstance(self.field, PrimeField) and self.field.prime < 5):
             try:
-                balls = isinstance(self.field, BallField)
                 return translation.iterate(block, start, n, self.field.is_zero, inexact=balls)
             except translation.NoTranslation:
-                if isinstance(self.field, BallField):
+                if balls:
                     raise PrecisionLost("the orbit meets special positions that balls cannot decide") from None
-        return _around_cycle(block, start, n)
-
-
-def _around_cycle(block: PlanarBlock, start: Triple, n: int) -> Triple:
-    """P_n over a small finite field, where orbits soon come back or meet a pole. Raises SingularStep."""
-    from kahanmaps.maps.normal_form.planar_block import same_point
-    from kahanmaps.maps.normal_form.rational_iterate import stepped_over
-
-    point = start
-    for k in range(1, n + 1):
-        if k > _CYCLE:
-            raise InputError(f"the iterate {n} cannot be reached directly here: take fewer steps or another prime")
-        point = stepped_over(block, point, 1)
-        if same_point(point, start):
-            return stepped_over(block, start, n % k)
-    return point
+        # Over a small finite field orbits soon come back or meet a pole.
+        point = start
+        for k in range(1, n + 1):
+            if k > _CYCLE:
+                raise InputError(f"the iterate {n} cannot be reached directly here: take fewer steps or another prime")
+            point = stepped_over(block, point, 1)
+            if same_point(point, start):
+                return stepped_over(block, start, n % k)
+        return point
 
 
 def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:

@@ -21,7 +21,7 @@ from enum import StrEnum
 from math import lcm
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
+from flint import fmpq, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
 
 from kahanmaps.algebra.fields import GF, QQ, integer
 from kahanmaps.algebra.printing import all_fields
@@ -193,18 +193,37 @@ def plane_period(
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
     if kind is PeriodKind.ADDITIVE:
-        return PlanePeriod(name, q, kind, "periodic", prime, _parabolic_meets_pole(block, point, prime))
+        # One step takes 1 from W/s, where s^2 = -D: is W/s an element of GF(p)?
+        a, b, c = block.D
+        (U, V, W), meets_pole = point, False
+        if (D := a * U * U + b * U * V + c * V * V) != 0:
+            square = -W * W / D
+            meets_pole = bool(square ** ((prime - 1) // 2) == square * 0 + 1)
+        return PlanePeriod(name, q, kind, "periodic", prime, meets_pole)
     at_infinity = poles(block, prime, context)
     if kind is PeriodKind.TRIANGLE:
-        period = 3 * _multiplicative_order(-8, prime)
-        meets_pole = _walk_meets_pole(block, point, period) if at_infinity else False
-        return PlanePeriod(name, q, kind, "periodic", period, meets_pole)
+        order = prime - 1  # that of -8, when it is freed of what it can do without
+        for factor, exponent in fmpz(order).factor():
+            for _ in range(exponent):
+                if pow(-8, order // int(factor), prime) != 1:
+                    break
+                order //= int(factor)
+        met = _walk_meets_pole(block, point, 3 * order) if at_infinity else False
+        return PlanePeriod(name, q, kind, "periodic", 3 * order, met)
     if q > largest:
         size, most = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
         reason = f"its field has {size} elements, more than {most}"
         return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
     order = translation_order(gamma, q, context)
-    return PlanePeriod(name, q, kind, "periodic", order, _smooth_meets_pole(block, point, order, q, at_infinity))
+    # With a pole as zero of the group, T is its image, and the question is whether the point is a multiple.
+    answers: list[bool | None] = []
+    for pole in at_infinity:
+        answers.append(LevelCubic(block, *block.level(point), pole).is_multiple(point, block.image(pole), order, q))
+        if answers[-1]:
+            break
+    else:
+        answers.append(_walk_meets_pole(block, point, order) if None in answers else False)
+    return PlanePeriod(name, q, kind, "periodic", order, answers[-1])
 
 
 def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
@@ -227,16 +246,6 @@ def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
         vertex = any(entry != 0 for entry in image) and same_point(image, point)
         return (PeriodKind.VERTEX if vertex else PeriodKind.TRIANGLE), None
     return PeriodKind.SMOOTH, gamma
-
-
-def _multiplicative_order(number: int, prime: int) -> int:
-    order = prime - 1
-    for factor, exponent in fmpz(order).factor():
-        for _ in range(exponent):
-            if pow(number, order // int(factor), prime) != 1:
-                break
-            order //= int(factor)
-    return order
 
 
 # Poles.
@@ -262,31 +271,8 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     return found + [(nought + (int(root) if context is None else root), one, nought) for root in roots]
 
 
-def _smooth_meets_pole(block: PlanarBlock, point: Triple, order: int, q: int, at_infinity: list[Triple]) -> bool | None:
-    """Whether one of the poles is an image of the point, on a smooth level where Psi has this order."""
-    above, below = block.level(point)
-    # With a pole as zero of the group, T is its image, and the question is whether the point is a multiple.
-    answers: list[bool | None] = []
-    for pole in at_infinity:
-        answers.append(LevelCubic(block, above, below, pole).is_multiple(point, block.image(pole), order, q))
-        if answers[-1]:
-            return True
-    return _walk_meets_pole(block, point, order) if None in answers else False
-
-
-def _parabolic_meets_pole(block: PlanarBlock, point: Triple, prime: int) -> bool:
-    """On a level with delta = 0 one step takes 1 from W/s, where s^2 = -D: is W/s an element of GF(p)?"""
-    p, q, r = block.D
-    U, V, W = point
-    D = p * U * U + q * U * V + r * V * V
-    if D == 0:
-        return False
-    square = -W * W / D
-    return bool(square ** ((prime - 1) // 2) == square * 0 + 1)
-
-
 def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
-    """The same by walking, if the period is not long."""
+    """Whether an orbit meets a pole, by walking if the period is not long."""
     image = point
     for _ in range(min(period, _WALK)):
         image = block.image(image)

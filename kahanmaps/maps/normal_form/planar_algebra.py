@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache, reduce
 from itertools import combinations, product
 from typing import Any
 
-from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod, nmod_poly
+from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_one, radical, taken_apart, without
@@ -207,7 +207,10 @@ class ShortElements:
         integers = [(entry * below).p for entry in value.coefficients]
         residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
         part = self._power.gcd(self._algebra.norm(residue).p % self._power)
-        lengths = self._lengths(integers)
+        # About the absolute values at the roots.
+        smallest = max(abs(entry) for entry in integers) * _LEAST
+        sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
+        lengths = [max(smallest, abs(value).mid()) for value in sums]
         if below == 1 and part < _SHORT and max(lengths) < _SHORT * min(lengths):
             return None
         # All b with b value = 0 modulo `part`.
@@ -220,7 +223,7 @@ class ShortElements:
             [
                 (s * x).mid().floor().unique_fmpz()
                 for p, s in zip(self._powers, scale, strict=True)
-                for x in _parts(p, k)
+                for x in ([p[k].real] if p[1].imag == 0 else [p[k].real, p[k].imag])
             ]
             for k in range(degree)
         ]
@@ -233,12 +236,6 @@ class ShortElements:
                 return short * fmpq(below, part)
         return None if below == 1 else self._algebra.convert(below)
 
-    def _lengths(self, integers: Sequence[fmpz]) -> list[arb]:
-        """About the absolute values at the roots."""
-        smallest = max(abs(entry) for entry in integers) * _LEAST
-        sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
-        return [max(smallest, abs(value).mid()) for value in sums]
-
 
 @lru_cache
 def _signs(count: int) -> list[tuple[int, ...]]:
@@ -250,11 +247,6 @@ def _signs(count: int) -> list[tuple[int, ...]]:
                 chosen = dict(zip(places, (1, *signs), strict=True))
                 found.append(tuple(chosen.get(k, 0) for k in range(count)))
     return found
-
-
-def _parts(powers: Sequence[acb], k: int) -> list[arb]:
-    """The k-th power of a root, as real and imaginary part unless the root is real."""
-    return [powers[k].real] if powers[1].imag == 0 else [powers[k].real, powers[k].imag]
 
 
 def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:

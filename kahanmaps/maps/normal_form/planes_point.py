@@ -45,20 +45,34 @@ class Assembly:
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
         self.dim = len(matrices[0])
-        self.rows = [
-            _row(
-                blocks,
-                [[entry / block.scale for entry in matrix[r]] for block, matrix in zip(blocks, matrices, strict=True)],
-            )
-            for r in range(self.dim)
-        ]
+        self.rows: list[_Row] = []
+        for r in range(self.dim):
+            forms = [[entry / one.scale for entry in table[r]] for one, table in zip(blocks, matrices, strict=True)]
+            support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
+            _, below = over_one(chain(*forms))
+            integers = [tuple((entry * below).p for entry in forms[i]) for i in support]
+            factors, dividing = [below], []
+            for i, form in zip(support, integers, strict=True):
+                block = blocks[i]
+                if block.is_constant:
+                    factors.append(block.fraction(block.start)[1])
+                    continue
+                factors.append(content(form))
+                if block.level is not None:
+                    factors += block.primes
+                value = None if block.level is None else block.fixed(form)
+                if value is None:
+                    dividing.append(i)
+                else:
+                    factors.append(value)
+            self.rows.append(_Row(support, tuple(integers), below, radical(*factors), tuple(dividing)))
         self.fixed = radical(*(row.fixed for row in self.rows))
         # The numbers of the rows with the same support, and the integers of their forms.
         self.by_support: dict[tuple[int, ...], tuple[list[int], fmpz_mat]] = {}
         for support in dict.fromkeys(row.support for row in self.rows):
             numbers = [k for k, row in enumerate(self.rows) if row.support == support]
-            forms = [list(chain(*self.rows[k].forms)) for k in numbers]
-            self.by_support[support] = numbers, fmpz_mat(len(forms), len(forms[0]), list(chain(*forms)))
+            table = [list(chain(*self.rows[k].forms)) for k in numbers]
+            self.by_support[support] = numbers, fmpz_mat(len(table), len(table[0]), list(chain(*table)))
         self.below = reduce(fmpz.lcm, (row.below for row in self.rows), fmpz(1))
         zeros = [[fmpz(0)] * len(matrix[0]) for matrix in matrices]
         whole = []
@@ -70,28 +84,6 @@ class Assembly:
         largest = max(map(abs, whole))
         self.excess = int(max(self.below.bit_length(), (self.dim * largest).bit_length()))
         self.excess += sum(block.slack for block in blocks)
-
-
-def _row(blocks: Sequence[Block], forms: Sequence[Sequence[fmpq]]) -> _Row:
-    support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
-    _, below = over_one(chain(*forms))
-    integers, factors, dividing = [], [below], []
-    for i in support:
-        form = tuple((entry * below).p for entry in forms[i])
-        integers.append(form)
-        block = blocks[i]
-        if block.is_constant:
-            factors.append(block.fraction(block.start)[1])
-            continue
-        factors.append(content(form))
-        if block.level is not None:
-            factors += block.primes
-        value = None if block.level is None else block.fixed(form)
-        if value is None:
-            dividing.append(i)
-        else:
-            factors.append(value)
-    return _Row(support, tuple(integers), below, radical(*factors), tuple(dividing))
 
 
 class PlanesPoint:
@@ -155,7 +147,7 @@ class PlanesPoint:
         modulus = (self._assembly.fixed * suspects) ** _POWER
         residues = [([entry % modulus for entry in above], W % modulus) for above, W in planes]
         whole, small = self._fractions_of(planes), self._fractions_of(residues)
-        divisors: dict[tuple[int, ...], fmpz] = {}
+        divisors: dict[tuple[int, ...], fmpz] = {}  # one gcd for all rows with the same form
         pairs = []
         for row, (above, below), rest in zip(self._assembly.rows, whole, small, strict=True):
             if above == 0:
@@ -163,8 +155,12 @@ class PlanesPoint:
                 continue
             common = fmpz(1)
             for i, form in zip(row.support, row.forms, strict=True):
-                if i in row.dividing:
-                    common = common * self._divisor(i, form, divisors)
+                if i in row.dividing:  # gcd(alpha U + beta V, W) but for fixed primes, where the form divides h
+                    factor = content(form)
+                    key = (i, *(int(entry // factor) for entry in form))
+                    if key not in divisors:
+                        divisors[key] = sum(map(mul, map(fmpz, key[1:]), planes[i][0]), fmpz(0)).gcd(planes[i][1])
+                    common = common * divisors[key]
             if common != 1:
                 above, below = divide_exactly((above, below), common)
                 common = _common_part(above, below, modulus)
@@ -189,16 +185,6 @@ class PlanesPoint:
             above = (forms * column).entries()
             found |= {k: (entry, rows[k].below * product) for k, entry in zip(numbers, above, strict=True)}
         return [found[k] for k in range(len(rows))]
-
-    def _divisor(self, i: int, form: Sequence[fmpz], known: dict[tuple[int, ...], fmpz]) -> fmpz:
-        """gcd(alpha U + beta V, W) but for fixed primes, where alpha U + beta V divides h: one gcd for all rows."""
-        common = content(form)
-        primitive = [entry // common for entry in form]
-        key = (i, *map(int, primitive))
-        if key not in known:
-            above, below, _ = self._fractions[i]
-            known[key] = sum(map(mul, primitive, above), fmpz(0)).gcd(below)
-        return known[key]
 
     def rationals(self) -> tuple[fmpq, ...]:
         """The coordinates as fmpq (whose constructor runs a gcd of its own)."""

@@ -67,10 +67,10 @@ def iterate(
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
             found = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
-            if found is not None:
-                return found
-        elif n - base >= 8 and (small := _small_values(block, points[base - 3 : base + 4], is_zero)) is not None:
-            return _doubled(small, gamma, n - base)
+        else:
+            found = _doubled(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
+        if found is not None:
+            return found
     raise NoTranslation
 
 
@@ -232,13 +232,10 @@ def _digits(n: int) -> list[tuple[int, int]]:
     return found[::-1]
 
 
-def _small_values(
-    block: PlanarBlock, points: Sequence[Triple], is_zero: Callable[[Any], bool]
-) -> tuple[dict[int, Any], Sequence[Triple]] | None:
-    """chi_{-2}, ..., chi_2 around the fourth of seven consecutive points, and the three in the middle, natural lifts.
-
-    None where a value is zero that would have to be divided by.
-    """
+def _doubled(
+    block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
+) -> Triple | None:
+    """P_n relative to the fourth of seven consecutive points, n >= 8; None where a value is zero that divides."""
     # Lifts that are natural around this base point: the first two of them decide the rest.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
@@ -248,12 +245,6 @@ def _small_values(
     chi = first_chi(P, range(-2, 3))
     if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
         return None
-    return chi, (P[-1], P[0], P[1])
-
-
-def _doubled(small: tuple[dict[int, Any], Sequence[Triple]], gamma: Any, n: int) -> Triple:
-    """P_n relative to the base point, n >= 8."""
-    chi, (minus, zero, plus) = small
     one = gamma / gamma
     half = one / 2
     inverse = {k: one / chi[k] for k in (-2, -1, 0, 1)}
@@ -261,43 +252,32 @@ def _doubled(small: tuple[dict[int, Any], Sequence[Triple]], gamma: Any, n: int)
     window = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
     middle, centre = [chi[k] for k in range(3)], 1
     for digit in f"{n:b}"[1:]:
-        odd = int(digit)
-        window, middle = _next(window, middle, centre, odd, gamma, half, inverse)
-        centre = 2 * centre + odd
+        # The windows around 2 centre + digit from those around `centre`.
+        first = centre - 3
+        squares = [value * value for value in window]
+        neighbours = [None, *(window[k + 1] * window[k - 1] for k in range(1, 7)), None]
+        # Squares for a partner whose index is, or is not, divisible by 3.
+        special = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
+        shift = 2 * centre + int(digit) - 3
+        window = []
+        for m in range(shift, shift + 8):
+            k = m // 2 - first
+            a, b = (k + 1, k) if m % 2 else (k + 1, k - 1)
+            # Of two indices at distance 1 or 2 at most one is divisible by 3, so `special` is right for both.
+            value = neighbours[a] * special[b] - neighbours[b] * special[a]
+            window.append(value if m % 2 else value * half)
+        around, square = middle[0] * middle[2], middle[1] * middle[1]
+        by_three, middle = centre % 3 == 0, []
+        for m in (shift + 2, shift + 3, shift + 4):
+            b = m - centre
+            k = b - first
+            if by_three and b % 3 == 0:
+                value = around * squares[k] - neighbours[k] * square
+            else:
+                value = around * special[k] - neighbours[k] * (gamma * square if by_three else square)
+            middle.append(value * inverse[centre - b])
+        centre = 2 * centre + int(digit)
     before, here, after = window[2:5]
-    A = -2 * (before * after * middle[1])
-    B = here * after * middle[0]
-    C = before * here * middle[2]
-    U, V, W = (A * p + B * q + C * r for p, q, r in zip(zero, plus, minus, strict=True))
+    A, B, C = -2 * (before * after * middle[1]), here * after * middle[0], before * here * middle[2]
+    U, V, W = (A * p + B * q + C * r for p, q, r in zip(P[0], P[1], P[-1], strict=True))
     return U, V, W
-
-
-def _next(
-    window: list[Any], middle: list[Any], centre: int, odd: int, gamma: Any, half: Any, inverse: dict[int, Any]
-) -> tuple[list[Any], list[Any]]:
-    """The windows around 2 centre + odd from those around `centre`."""
-    first = centre - 3
-    squares = [value * value for value in window]
-    neighbours = [None, *(window[k + 1] * window[k - 1] for k in range(1, 7)), None]
-    # Squares for a partner whose index is, or is not, divisible by 3.
-    special = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
-    shift = 2 * centre + odd - 3
-    new = []
-    for n in range(shift, shift + 8):
-        k = n // 2 - first
-        a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
-        # Of two indices at distance 1 or 2 at most one is divisible by 3, so `special` is right for both.
-        value = neighbours[a] * special[b] - neighbours[b] * special[a]
-        new.append(value if n % 2 else value * half)
-    around, square = middle[0] * middle[2], middle[1] * middle[1]
-    by_three = centre % 3 == 0
-    values = []
-    for n in (shift + 2, shift + 3, shift + 4):
-        b = n - centre
-        k = b - first
-        if by_three and b % 3 == 0:
-            value = around * squares[k] - neighbours[k] * square
-        else:
-            value = around * special[k] - neighbours[k] * (gamma * square if by_three else square)
-        values.append(value * inverse[centre - b])
-    return new, values

@@ -14,27 +14,11 @@ _PRIME = 2**61 - 1
 def solve_fraction_free(matrix: fmpz_mat, right: fmpz_mat, candidate: fmpz) -> IntegerPoint | None:
     """The solution of matrix x = right; powers of the integer `candidate` may divide the minors. None if in doubt.
 
-    The elimination assumes that certain divisions are exact; what it finds is tried in the equation.
-    """
-    found = _eliminate(matrix, right, candidate)
-    return found if found is not None and is_the_solution(found, matrix, right) else None
-
-
-def is_the_solution(found: IntegerPoint, matrix: fmpz_mat, right: fmpz_mat) -> bool:
-    """Whether matrix x = right has this solution and no other; False also if det is 0 modulo a certain prime only."""
-    if not int(nmod_mat(matrix, _PRIME).det()):
-        return False
-    return bool(matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator)
-
-
-def _eliminate(matrix: fmpz_mat, right: fmpz_mat, candidate: fmpz) -> IntegerPoint | None:
-    """Fraction-free elimination, two columns at a time, that also removes what the minors share with `candidate`.
-
-    For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the denominator W, so that
-    minors of order k share the (k - 2)-th power of W up to small primes. Taken out once, at order 3, this keeps all
-    later entries at twice the size of W instead of up to n times: the exact divisions by the previous pivot then
-    take out the higher powers by themselves. Where nothing is shared this is Bareiss' two-step algorithm. The
-    caller has to verify the result; None where a pivot vanishes.
+    Two columns at a time. For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the
+    denominator W, so that minors of order k share the (k - 2)-th power of W up to small primes. Taken out once, at
+    order 3, this keeps all later entries at twice the size of W instead of up to n times: the exact divisions by the
+    previous pivot then take out the higher powers by themselves. Where nothing is shared this is Bareiss' two-step
+    algorithm. That divisions are exact is assumed; what is found is tried in the equation.
     """
     n = matrix.nrows()
     rows = [[*row, right[i, 0]] for i, row in enumerate(matrix.tolist())]
@@ -59,14 +43,9 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, candidate: fmpz) -> IntegerPoi
             row[k + 2 :] = entries if divisor == 1 else [entry // divisor for entry in entries]
         b[k + 1 :] = [pivot, *((a[k] * b[j] - b[k] * a[j]) // previous for j in range(k + 2, n + 1))]
         previous = pivot
-    return _substitute_back(rows)
-
-
-def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
-    """The solution of a triangular system [U | r], one gcd of large numbers in all."""
-    n = len(rows)
     if any(rows[i][i] == 0 for i in range(n)):
         return None
+    # The triangular system, with one gcd of large numbers in all.
     numerator, denominator = rows[-1][n], rows[-1][n - 1]
     content = numerator.gcd(denominator)
     solution = [numerator // content]
@@ -85,7 +64,15 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
         solution.insert(0, quotient)
     # In lowest terms already: each new numerator is coprime to the factor that all others have just received.
     sign = 1 if denominator > 0 else -1
-    return IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
+    found = IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
+    return found if is_the_solution(found, matrix, right) else None
+
+
+def is_the_solution(found: IntegerPoint, matrix: fmpz_mat, right: fmpz_mat) -> bool:
+    """Whether matrix x = right has this solution and no other; False also if det is 0 modulo a certain prime only."""
+    if not int(nmod_mat(matrix, _PRIME).det()):
+        return False
+    return bool(matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator)
 
 
 def _shared(candidate: fmpz, values: list[fmpz]) -> fmpz:

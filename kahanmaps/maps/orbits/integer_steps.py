@@ -51,7 +51,16 @@ class IntegerSteps:
         self._modular: nmod_mat | None = None  # the forms modulo the last prime
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
         self._substitution = forward_substitution(exponents, self._forms, n)
-        self._constant = None if self._substitution else self._constant_rows()
+        self._constant: ConstantRows | None = None
+        if not self._substitution and n > _SMALL_DIMENSION:
+            # Rows without x to the left, taken out unless they make the equation singular.
+            forms = self._forms.tolist()
+            alone = [k for k, exponent in enumerate(exponents) if not any(exponent[:-1])]
+            others = [k for k in range(len(exponents)) if k not in alone]
+            fixed = [i for i in range(n) if not any(forms[i * (n + 1) + j][k] for j in range(n) for k in others)]
+            if fixed and alone:
+                A = fmpq_mat([[fmpq(forms[i * (n + 1) + j][alone[0]]) for j in range(n)] for i in fixed])
+                self._constant = ConstantRows(fixed, A) if A.rank() == len(fixed) else None
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
@@ -75,17 +84,6 @@ class IntegerSteps:
     def is_triangular(self) -> bool:
         """Whether the equation gives one coordinate after the other, so that points are fractions."""
         return self._substitution is not None
-
-    def _constant_rows(self) -> ConstantRows | None:
-        """The rows without x to the left; None where there are none or they do not pay, and for a singular equation."""
-        n, forms = self.dim, self._forms.tolist()
-        alone = [k for k, exponent in enumerate(self._exponents) if not any(exponent[:-1])]
-        others = [k for k in range(len(self._exponents)) if k not in alone]
-        rows = [i for i in range(n) if not any(forms[i * (n + 1) + j][k] for j in range(n) for k in others)]
-        if not rows or not alone or n <= _SMALL_DIMENSION:
-            return None
-        A = fmpq_mat([[fmpq(forms[i * (n + 1) + j][alone[0]]) for j in range(n)] for i in rows])
-        return ConstantRows(rows, A) if A.rank() == len(rows) else None
 
     def determinant(self, point: IntegerPoint) -> fmpq:
         """det M(x)."""

@@ -53,17 +53,17 @@ class _Row:
         return above // common, denominator * (below // common)
 
 
+@dataclass(frozen=True)
 class ForwardSubstitution:
     """The rows in the order in which they are solved."""
 
-    def __init__(self, rows: Sequence[_Row]) -> None:
-        self._rows = rows
+    rows: Sequence[_Row]
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
         here = point.lowest_terms()
         image = list(here)
-        for row in self._rows:
+        for row in self.rows:
             value = row.solved(here, image)
             if value is None:
                 return None
@@ -87,23 +87,20 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
         if i is None:
             return None
         unknown = next(j for j in used[i] if j not in known)
-        solved.append(_row(rows[i], unknown, tuple(j for j in used[i] if j in known), exponents))
+        others = tuple(j for j in used[i] if j in known)
+        entries = [rows[i][j] for j in (unknown, *others, n)]
+        terms = [k for k in range(len(exponents)) if any(entry[k] for entry in entries)]
+        least = [min(exponents[k][x] for k in terms) for x in range(n)]
+        shifted = [[exponents[k][x] - least[x] for x in range(n)] for k in terms]
+        most = [max(powers[x] for powers in shifted) for x in range(n)]
+        on_left = [k for k in terms if any(entry[k] for entry in entries[:-1])]
+        row = _Row(
+            unknown,
+            others,
+            tuple(tuple((x, e, most[x] - e) for x, e in enumerate(powers) if most[x]) for powers in shifted),
+            fmpz_mat([[entry[k] for k in terms] for entry in entries]),
+            tuple(x for x in range(n) if min(exponents[k][x] for k in on_left) > 0),
+        )
+        solved.append(row)
         left.remove(i)
     return ForwardSubstitution(solved)
-
-
-def _row(row: Sequence[Sequence[fmpz]], unknown: int, known: tuple[int, ...], exponents: Exponents) -> _Row:
-    n = len(row) - 1
-    entries = [row[j] for j in (unknown, *known, n)]
-    used = [k for k in range(len(exponents)) if any(entry[k] for entry in entries)]
-    least = [min(exponents[k][x] for k in used) for x in range(n)]
-    shifted = [[exponents[k][x] - least[x] for x in range(n)] for k in used]
-    most = [max(powers[x] for powers in shifted) for x in range(n)]
-    on_left = [k for k in used if any(entry[k] for entry in entries[:-1])]
-    return _Row(
-        unknown,
-        known,
-        tuple(tuple((x, e, most[x] - e) for x, e in enumerate(powers) if most[x]) for powers in shifted),
-        fmpz_mat([[entry[k] for k in used] for entry in entries]),
-        tuple(x for x in range(n) if min(exponents[k][x] for k in on_left) > 0),
-    )

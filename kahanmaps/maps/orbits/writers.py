@@ -186,7 +186,8 @@ class Npz(Writer):
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:
             if any(None in row for row in self._values):  # at a pole, which residues and text have no number for
-                self._values = [[_bytes(value) for value in row] for row in self._values]
+                filled = [["" if x is None else x for x in row] for row in self._values]
+                self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled]
             arrays["integrals"] = np.array(self._values).reshape(n, len(self.integrals))
         save: Any = np.savez_compressed
         held = io.BytesIO()  # a zip archive needs a stream that can seek
@@ -243,7 +244,3 @@ def title(header: Mapping[str, Any]) -> str:
         + (f" ({header['kernel']})" if "kernel" in header else "")
         + (", backward" if header["direction"] == "backward" else "")
     )
-
-
-def _bytes(value: Any) -> bytes:
-    return b"" if value is None else value if isinstance(value, bytes) else str(value).encode()

@@ -29,7 +29,6 @@ from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
-Rows = list[list[int]]
 Pairs = Sequence[tuple[int, int]]  # i and j of products of coordinates
 
 _MOST_PRIMES = 50  # for the coefficients
@@ -75,80 +74,58 @@ def bilinear_forms(map_over: MapOver, point: IntegerPoint) -> BilinearForms | No
     """The forms along the orbit of a point, with lag 1 if there are such; None where none are found."""
     if len(map_over.factors) > 1 or map_over.dim > _MOST_DIMENSION:
         return None
-    found = (_Search(map_over.factors[0].integer_steps, point, lag).found() for lag in (1, 2))
-    return next((forms for forms in found if forms is not None), None)
+    steps = map_over.factors[0].integer_steps
+    for lag in (1, 2):
+        search = _Search(steps, point, lag)
+        if (numbers := from_residues(search.modulo, _MOST_PRIMES)) is not None:
+            rows = fmpz_mat(steps.dim + 1, len(search.products), primitive_integers(numbers[0]))
+            return BilinearForms(steps, lag, search.products, rows)
+    return None
 
 
 class _Search:
-    """The forms along the orbit of a point: modulo primes, then over Q."""
+    """The forms along the orbit of a point modulo primes, the first of which says what may be left out."""
 
     def __init__(self, steps: IntegerSteps, point: IntegerPoint, lag: int) -> None:
         self._steps, self._point, self._lag = steps, point, lag
         size = steps.dim + 1
-        self._products = [(i, j) for i in range(size) for j in range(size) if lag > 1 or i <= j]
+        self.products = [(i, j) for i in range(size) for j in range(size) if lag > 1 or i <= j]
         self._used: list[int] | None = None  # which unknowns for f_n are not 0; fewer are sought after the first prime
 
-    def found(self) -> BilinearForms | None:
-        """The forms; None where there are none, or their coefficients are too long."""
-        numbers = from_residues(self._modulo, _MOST_PRIMES)
-        if numbers is None:
-            return None
-        rows = fmpz_mat(self._steps.dim + 1, len(self._products), primitive_integers(numbers[0]))
-        return BilinearForms(self._steps, self._lag, self._products, rows)
-
-    def _modulo(self, prime: int) -> list[list[int]] | None:
-        """The coefficients of the forms modulo a prime."""
-        lag, unknowns = self._lag, len(self._products)
+    def modulo(self, prime: int) -> list[list[int]] | None:
+        """The coefficients of the forms modulo a prime; None where there are none, or several."""
+        lag, unknowns = self._lag, len(self.products)
         length = (3 * unknowns // 2 if self._used is None else max(unknowns, len(self._used) // 2)) + _SPARE
         points = self._steps.residues(self._point, prime, length + 1 + lag)
         if points is None:
             return None
         ahead, here, before, behind = (points[k : k + length] for k in (lag + 1, lag, 1, 0))
-        values = [[x[i] * y[j] % prime for i, j in self._products] for x, y in zip(here, before, strict=True)]
+        values = [[x[i] * y[j] % prime for i, j in self.products] for x, y in zip(here, before, strict=True)]
         if self._used is None:
             chosen = pivots(echelon(values, prime))
-            self._products = [self._products[k] for k in chosen]
+            self.products = [self.products[k] for k in chosen]
             values = [[row[k] for k in chosen] for row in values]
-        found = _factors(values, ahead, behind, self._used, prime)
-        if found is None:
+        # f_n for points with last coordinate 1: f and g(X(n + 1)) f and g(X(n - lag)) f are in the span of the columns,
+        # where g is a combination of coordinates that has no zeros in common with the last one along a whole divisor.
+        unknowns = len(values[0])
+        zeros, rows = [0] * unknowns, []
+        for row, *ends in zip(values, ahead, behind, strict=True):
+            g, h = (sum((k * k + 2) * entry for k, entry in enumerate(end)) for end in ends)
+            rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
+            rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
+        used = list(range(3 * unknowns)) if self._used is None else self._used
+        relations = kernel(*matrix([[row[k] for k in used] for row in rows], prime).rref())
+        if len(relations) != 1:
             return None
-        factors, self._used = found
+        weights = dict(zip(used, relations[0], strict=True))
+        self._used = [k for k, weight in weights.items() if weight]
+        factors = [sum(weights.get(2 * unknowns + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
+        # The combinations of the columns that are f_n times the coordinates ahead.
         sides = [[f * x % prime for x in one] for f, one in zip(factors, ahead, strict=True)]
-        columns = _solved(values, sides, prime)
-        return None if columns is None else [[entry for column in columns for entry in column]]
-
-
-def _factors(
-    values: Rows, ahead: Rows, behind: Rows, used: list[int] | None, prime: int
-) -> tuple[list[int], list[int]] | None:
-    """f_n for points with last coordinate 1, and which unknowns are not 0; None where there are none, or several.
-
-    f and g(X(n + 1)) f and g(X(n - lag)) f are in the span of the columns, where g is a combination of coordinates that
-    has no zeros in common with the last one along a whole divisor.
-    """
-    unknowns = len(values[0])
-    zeros = [0] * unknowns
-    rows = []
-    for row, *points in zip(values, ahead, behind, strict=True):
-        g, h = (sum((k * k + 2) * entry for k, entry in enumerate(point)) for point in points)
-        rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
-        rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
-    used = list(range(3 * unknowns)) if used is None else used
-    relations = kernel(*matrix([[row[k] for k in used] for row in rows], prime).rref())
-    if len(relations) != 1:
-        return None
-    weights = dict(zip(used, relations[0], strict=True))
-    factors = [sum(weights.get(2 * unknowns + k, 0) * entry for k, entry in enumerate(row)) % prime for row in values]
-    return factors, [k for k, weight in weights.items() if weight]
-
-
-def _solved(values: Rows, sides: Rows, prime: int) -> Rows | None:
-    """The combinations of the columns of the first that are the columns of the second; None if one of them is not."""
-    unknowns = len(values[0])
-    try:
-        found = matrix(values[:unknowns], prime).solve(matrix(sides[:unknowns], prime))
-    except ZeroDivisionError:
-        return None
-    if matrix(values, prime) * found != matrix(sides, prime):
-        return None
-    return integers(found.transpose())
+        try:
+            found = matrix(values[:unknowns], prime).solve(matrix(sides[:unknowns], prime))
+        except ZeroDivisionError:
+            return None
+        if matrix(values, prime) * found != matrix(sides, prime):
+            return None
+        return [[entry for column in integers(found.transpose()) for entry in column]]

@@ -16,6 +16,7 @@ and multiples of T are different as long as W(n) is not 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle, islice
 from typing import NamedTuple
 
 from flint import fmpq, fmpz, fmpz_mat
@@ -139,17 +140,21 @@ class _Search:
     def _modulo(self, prime: int) -> list[list[int]] | None:
         size, known = len(self.groups[0]), self.sections
         for needed in [max(one.points_used for one in known.values())] if known else points_needed(size):
-            points = self._residues(prime, self.stride * needed)
-            if points is None:
-                return None
+            points: Rows = []  # from the start on, one for each step of a factor
+            point = self._start.residues(prime)
+            for one in islice(cycle(self.factors), self.stride * needed):
+                if point is None:
+                    return None
+                points.append(point)
+                point = one.integer_steps.image_modulo(point, prime)
             curves: dict[tuple[int, int], Curve] = {}
             try:
                 for k, g in self.new:
                     chosen = [[*(point[i] for i in self.groups[g]), 1] for point in points[k :: self.stride]]
-                    one = curve(chosen, prime, known.get((k, g)))
-                    if one is None:
+                    found = curve(chosen, prime, known.get((k, g)))
+                    if found is None:
                         break
-                    curves[k, g] = one
+                    curves[k, g] = found
                 else:
                     self.sections = {place: one.sections for place, one in curves.items()}
                     return [group for one in curves.values() for group in one.numbers]
@@ -157,15 +162,6 @@ class _Search:
                 if known or needed == points_needed(size)[-1]:
                     raise
         return None
-
-    def _residues(self, prime: int, length: int) -> Rows | None:
-        """So many points from the start on modulo a prime, one for each step of a factor."""
-        point = self._start.residues(prime)
-        points: Rows = []
-        while point is not None and len(points) < length:
-            points.append(point)
-            point = self.factors[(len(points) - 1) % len(self.factors)].integer_steps.image_modulo(point, prime)
-        return points if len(points) == length else None
 
 
 def _copies(equation: Equation) -> list[int | None]:

@@ -147,6 +147,7 @@ def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]
 
 
 def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list[list[int]] | None:
+    """Those of `Curve`; None where there is no pencil or sequence, or the coordinates are no sections."""
     degree, first = sections.degree, (sections.points - 1) * sections.lag
     pencil = null_space(values[: degree - 2], degree, prime)
     if len(pencil) != 2:
@@ -164,8 +165,17 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
     length = (sections.degree * len(points[0])) // (len(points[0]) - 1) + _SPARE
     multiples, others = first_terms(H, y[2], y[3])
     W, U = around(multiples, length + 2), around(others, length + 2, multiples)
-    coefficients = _coefficients(points, [forms(degree, W, U, n) for n in range(2, length)], prime)
-    return None if coefficients is None else [[int(H)], [int(y[2])], [int(y[3])], coefficients]
+    # The rows of coefficients of the coordinates, up to one factor.
+    last, rows = len(points[0]) - 1, []
+    for n, point in zip(range(2, length), points[2:], strict=False):
+        value = [int(entry) for entry in forms(degree, W, U, n)]
+        for i in range(last):
+            row = [0] * ((last + 1) * degree)
+            row[i * degree : (i + 1) * degree] = value
+            row[last * degree :] = [-point[i] * entry % prime for entry in value]
+            rows.append(row)
+    kernel = null_space(rows, (last + 1) * degree, prime)
+    return [[int(H)], [int(y[2])], [int(y[3])], kernel[0]] if len(kernel) == 1 else None
 
 
 def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | None:
@@ -194,18 +204,3 @@ def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | N
     if any(y[m - 1] * y[m] * (1 - y[m]) * y[m + 1] != H for m in run[1:-1]):
         return None
     return H, {m: y[m] for m in run}
-
-
-def _coefficients(points: Rows, values: list[list[nmod]], prime: int) -> list[int] | None:
-    """The rows of coefficients of the coordinates, up to one factor; None where the coordinates are no sections."""
-    last, degree = len(points[0]) - 1, len(values[0])
-    rows = []
-    for point, entries in zip(points[2:], values, strict=False):
-        value = [int(entry) for entry in entries]
-        for i in range(last):
-            row = [0] * ((last + 1) * degree)
-            row[i * degree : (i + 1) * degree] = value
-            row[last * degree :] = [-point[i] * entry % prime for entry in value]
-            rows.append(row)
-    kernel = null_space(rows, (last + 1) * degree, prime)
-    return kernel[0] if len(kernel) == 1 else None

@@ -64,9 +64,12 @@ class RationalOrbit:
         too_late = inf if self.max_bits is None else self.max_bits / 2  # few steps are left then: bits grow like n^2
         yield self.start
         for number in count(1):
-            if self._skips(number, reached, last[-1]):
-                yield None
-                continue
+            if self.relations is not None and self._wanted is not None and not self._wanted(number):
+                # Left out is a point that is not wanted, unless it may have too many bits.
+                is_short = self.max_bits is None or 2 * last[-1].bits * number**2 < self.max_bits * reached**2
+                if is_short and self.relations.skip(number):
+                    yield None
+                    continue
             image = None if self.relations is None else self.relations.step(last, number)
             # Near the end a factor on the way may have too many bits, which single steps see.
             if image is None or (
@@ -77,7 +80,11 @@ class RationalOrbit:
                     if before is not None:
                         last.append(before)
                         reached = number - 1
-                image = self._stepped(last[-1], number - reached)
+                image = last[-1]
+                for _ in range(number - reached):
+                    if image is None or (self.max_bits is not None and image.exceeding(self.max_bits)):
+                        break
+                    image = self.map.integer_step(image, self.max_bits)
             if image is None:
                 return
             yield image
@@ -93,22 +100,6 @@ class RationalOrbit:
                 except TooLongRelation:
                     long = _AGAIN * image.bits
                 self.since = None if self.relations is None else number + 1
-
-    def _skips(self, number: int, reached: int, last: IntegerPoint) -> bool:
-        """Whether a point is left out, which it is not where it may have too many bits."""
-        if self.relations is None or self._wanted is None or self._wanted(number):
-            return False
-        is_short = self.max_bits is None or 2 * last.bits * number**2 < self.max_bits * reached**2
-        return is_short and self.relations.skip(number)
-
-    def _stepped(self, point: IntegerPoint, steps: int) -> IntegerPoint | None:
-        """The point so many single steps later, or the first one with too many bits."""
-        image: IntegerPoint | None = point
-        for _ in range(steps):
-            if image is None or (self.max_bits is not None and image.exceeding(self.max_bits)):
-                break
-            image = self.map.integer_step(image, self.max_bits)
-        return image
 
 
 def relations(map_over: MapOver, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
