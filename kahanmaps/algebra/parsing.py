@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, cast
 
 from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
@@ -231,7 +231,7 @@ def parse_polynomial(
     """
     _check_expression(text, variables, constants)
     work = _Arithmetic(text, ring(variables), constants, limits, quotients=False)
-    return work.polynomial(_parse(work)).value
+    return work.polynomial(_parse(work).above)
 
 
 def parse_rational_function(
@@ -251,12 +251,11 @@ def parse_rational_function(
     """
     _check_expression(text, variables, constants)
     work = _Arithmetic(text, ring(variables), constants, limits, quotients=True)
-    value = _parse(work)
-    if isinstance(value, fmpq) or value.below is None or value.above.value.is_zero():
-        return RationalFunction(work.polynomial(value).value, work.one.value)
+    above, below = _parse(work)
+    if below is None or not above.value:
+        return RationalFunction(work.polynomial(above), work.ring.constant(1))
     # Integer coefficients below, or bringing it to normal form would cost one lcm for each of them.
-    scale = value.below.scale
-    return RationalFunction(value.above.value * scale, value.below.value * scale)
+    return RationalFunction(work.polynomial(above) * below.scale, below.value * below.scale)
 
 
 def parse_constant(
@@ -269,7 +268,7 @@ def parse_constant(
     """
     _check_expression(text, (), constants)
     # There are no variables, hence no quotients of polynomials.
-    return cast(fmpq, _parse(_Arithmetic(text, None, constants, limits, quotients=False)))
+    return cast(fmpq, _constant(_parse(_Arithmetic(text, ring(()), constants, limits, quotients=False))))
 
 
 def _check_expression(text: object, variables: Sequence[str], constants: Mapping[str, fmpq]) -> None:
@@ -308,14 +307,17 @@ _BRACKET = re.compile(r"[()]")
 
 
 class _Polynomial(NamedTuple):
-    """A polynomial of known size: `scale` times it has integer coefficients, of size at most 2**bits.
+    """A polynomial, or a number, of known size: `scale` times it has integer coefficients, of size at most 2**bits.
 
-    FLINT keeps one common denominator for all coefficients, so this is also the size that FLINT works with.
+    FLINT keeps one common denominator for all coefficients, so this is also the size that FLINT works with. Numbers are
+    fmpq, which is much faster than constant polynomials.
     """
 
-    value: fmpq_mpoly
+    value: Any
     scale: fmpz
     bits: int
+    terms: int = 1
+    degree: int = 0
 
 
 class _Quotient(NamedTuple):
@@ -323,10 +325,6 @@ class _Quotient(NamedTuple):
 
     above: _Polynomial
     below: _Polynomial | None
-
-
-_Value = fmpq | _Quotient
-_T = TypeVar("_T")
 
 
 class Token(str):
@@ -360,7 +358,7 @@ def _tokens(text: str) -> Iterator[Token]:
     yield Token("", _END, len(text))
 
 
-def _parse(work: _Arithmetic) -> _Value:
+def _parse(work: _Arithmetic) -> _Quotient:
     """The value of the text, or `ExpressionError`."""
     _check_shape(work.text, work.limits)
     reader = _Reader(work)
@@ -386,19 +384,19 @@ class _Reader:
         token, self.next = self.next, next(self.tokens, self.next)
         return token
 
-    def sum(self) -> _Value:
+    def sum(self) -> _Quotient:
         pieces: list[Any] = [self.product()]
         while self.next.kind in ("+", "-"):
             pieces += [self.take(), self.product()]
-        return self.work.sum(pieces) if len(pieces) > 1 else cast(_Value, pieces[0])
+        return self.work.sum(pieces) if len(pieces) > 1 else pieces[0]
 
-    def product(self) -> _Value:
+    def product(self) -> _Quotient:
         pieces: list[Any] = [self.power()]
         while self.next.kind in ("*", "/"):
             pieces += [self.take(), self.power()]
-        return self.work.product(pieces) if len(pieces) > 1 else cast(_Value, pieces[0])
+        return self.work.product(pieces) if len(pieces) > 1 else pieces[0]
 
-    def power(self) -> _Value:
+    def power(self) -> _Quotient:
         bases = []
         signs, value = self.signs(), self.atom()
         while self.next.kind in ("^", "**"):
@@ -415,7 +413,7 @@ class _Reader:
             found.append(self.take())
         return found
 
-    def atom(self) -> _Value:
+    def atom(self) -> _Quotient:
         token = self.take()
         if token.kind == "(":
             value = self.sum()
@@ -481,7 +479,7 @@ class _Arithmetic:
     def __init__(
         self,
         text: str,
-        ring: fmpq_mpoly_ctx | None,
+        ring: fmpq_mpoly_ctx,
         constants: Mapping[str, fmpq],
         limits: ExpressionLimits,
         quotients: bool,
@@ -492,100 +490,84 @@ class _Arithmetic:
         self.quotients = quotients
         self.words_left = limits.words
         self.max_bits = limits.digits * 3322 // 1000 + 1
-        self.names: dict[str, _Value] = dict(constants)
-        if ring is not None:
-            self.one = self.polynomial(fmpq(1))
-            for name, variable in zip(ring.names(), ring.gens(), strict=True):
-                self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0), None)
+        self.names = {name: self.constant(number) for name, number in constants.items()}
+        self.one = self.constant(fmpq(1)).above
+        for name, variable in zip(ring.names(), ring.gens(), strict=True):
+            self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0, 1, 1), None)
 
-    def number(self, token: Token) -> _Value:
+    def constant(self, number: fmpq) -> _Quotient:
+        return _Quotient(_Polynomial(number, number.q, _bits(number.p)), None)
+
+    def number(self, token: Token) -> _Quotient:
         start = token.start_pos
         value = number_in(self.text, start, start + len(token), self.limits.digits, self.limits)
         self.spend(1, value.height_bits(), start)
-        return value
+        return self.constant(value)
 
-    def name(self, token: Token) -> _Value:
+    def name(self, token: Token) -> _Quotient:
         value = self.names.get(token)
         if value is None:
             raise self.unknown(str(token), token.start_pos)
-        return self.checked(value, token.start_pos) if isinstance(value, fmpq) else value
+        self.check_bits(max(value.above.bits, _bits(value.above.scale)), token.start_pos)
+        return value
 
-    def sum(self, pieces: list[Any]) -> _Value:
+    def sum(self, pieces: list[Any]) -> _Quotient:
         column = pieces[1].start_pos
-        numbers: list[fmpq] = []
         polynomials: list[_Polynomial] = []
         # Terms over one denominator come together before anything is multiplied out: a/d + b/d = (a + b)/d.
         fractions: list[tuple[_Polynomial, list[_Polynomial]]] = []
         for i in range(0, len(pieces), 2):
-            value: _Value = pieces[i]
+            value: _Quotient = pieces[i]
             if i and pieces[i - 1] == "-":
                 value = self.negative(value, pieces[i - 1].start_pos)
-            if isinstance(value, fmpq):
-                numbers.append(value)
-            elif value.below is None:
+            if value.below is None:
                 polynomials.append(value.above)
+                continue
+            for below, terms in fractions:
+                if below.value == value.below.value:
+                    terms.append(value.above)
+                    break
             else:
-                for below, terms in fractions:
-                    if below.value == value.below.value:
-                        terms.append(value.above)
-                        break
-                else:
-                    fractions.append((value.below, [value.above]))
-                    degree = sum(int(below.value.total_degree()) for below, _ in fractions)
-                    self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
+                fractions.append((value.below, [value.above]))
+                degree = sum(below.degree for below, _ in fractions)
+                self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
 
-        def add(left: _Polynomial, right: _Polynomial) -> _Polynomial:
-            return self.add(left, right, column)
+        def total(values: list[_Polynomial]) -> _Polynomial:
+            """The sum, by halves: adding one by one would copy the growing sum once for each term."""
+            while len(values) > 1:
+                odd = values[-1:] if len(values) % 2 else []
+                pairs = zip(values[::2], values[1::2], strict=False)
+                values = [self.add(left, right, column) for left, right in pairs] + odd
+            return values[0]
 
-        def add_numbers(left: fmpq, right: fmpq) -> fmpq:
-            self.spend(1, max(left.height_bits(), right.height_bits()), column)
-            return self.checked(left + right, column)
-
-        number = _total(numbers, add_numbers) if numbers else fmpq(0)
-        if not polynomials and not fractions:
-            return number
-        if number != 0:
-            polynomials.append(self.polynomial(number))
         if not fractions:
-            return _Quotient(_total(polynomials, add), None)
-        common, above = fractions[0][0], _total(fractions[0][1], add)
+            return _Quotient(total(polynomials), None)
+        common, above = fractions[0][0], total(fractions[0][1])
         for below, terms in fractions[1:]:
-            crossed = self.times(_total(terms, add), common, column)
-            above = add(self.times(above, below, column), crossed)
+            crossed = self.times(total(terms), common, column)
+            above = self.add(self.times(above, below, column), crossed, column)
             common = self.times(common, below, column)
         if polynomials:
-            above = add(above, self.times(_total(polynomials, add), common, column))
+            above = self.add(above, self.times(total(polynomials), common, column), column)
         return _Quotient(above, common)
 
-    def product(self, pieces: list[Any]) -> _Value:
-        numbers: list[fmpq] = []
-        above: _Polynomial | None = None
-        below: _Polynomial | None = None
+    def product(self, pieces: list[Any]) -> _Quotient:
+        above, below = self.one, None
         for i in range(0, len(pieces), 2):
-            value: _Value = pieces[i]
+            value: _Quotient = pieces[i]
             column = pieces[max(i - 1, 1)].start_pos
             if i and pieces[i - 1] == "/":
                 value = self.reciprocal(value, column)
-            if isinstance(value, fmpq):
-                numbers.append(value)
-                continue
-            above = value.above if above is None else self.times(above, value.above, column)
+            above = self.times(value.above, above, column)
             if value.below is not None:
                 below = value.below if below is None else self.times(below, value.below, column)
-        column = pieces[1].start_pos
+        return _Quotient(above, below)
 
-        def times_numbers(left: fmpq, right: fmpq) -> fmpq:
-            self.spend(1, left.height_bits() + right.height_bits(), column)
-            return self.checked(left * right, column)
-
-        number = _total(numbers, times_numbers) if numbers else fmpq(1)
-        return number if above is None else _Quotient(self.scaled(above, number, column), below)
-
-    def negated(self, signs: list[Token], value: _Value) -> _Value:
+    def negated(self, signs: list[Token], value: _Quotient) -> _Quotient:
         minus = sum(sign == "-" for sign in signs) % 2
         return self.negative(value, signs[0].start_pos) if minus else value
 
-    def power(self, base: _Value, operator: Token, power: _Value) -> _Value:
+    def power(self, base: _Quotient, operator: Token, power: _Quotient) -> _Quotient:
         column = operator.start_pos
         exponent = _constant(power)
         if exponent is None:
@@ -595,52 +577,34 @@ class _Arithmetic:
             found = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
             raise self.refusal(f"{found}, expected an integer of size at most {self.limits.exponent}", column)
         n = int(exponent.p)
-        number = _constant(base)
         if n < 0:
             base, n = self.reciprocal(base, column), -n
-            number = _constant(base)
-        if number is not None:
-            bits = number.height_bits() * n
-            self.check_bits(bits, column)
-            self.spend(1, bits, column)
-            return number**n
         if n == 0:
-            return fmpq(1)
-        above, below = cast(_Quotient, base)
+            return self.constant(fmpq(1))
+        above, below = base
         return _Quotient(self.repeated(above, n, column), None if below is None else self.repeated(below, n, column))
 
-    def reciprocal(self, value: _Value, column: int) -> _Value:
-        number = _constant(value)
+    def reciprocal(self, value: _Quotient, column: int) -> _Quotient:
+        above, below = value.above, value.below or self.one
+        if not above.value:
+            raise self.refusal("found a division by 0", column)
+        number = _constant(_Quotient(above, None))
         if number is not None:
-            if number == 0:
-                raise self.refusal("found a division by 0", column)
-            return 1 / number
-        above, below = cast(_Quotient, value)
+            return _Quotient(self.scaled(below, 1 / number, column), None)
         if not self.quotients:
             raise self.refusal("found a division by something with variables in it, expected a polynomial", column)
-        below = below or self.one
         leading = above.value.leading_coefficient()
-        if above.value.is_constant():
-            return _Quotient(self.scaled(below, 1 / leading, column), None)
         if leading == 1:
             return _Quotient(below, above)
         # Leading coefficient 1, so that denominators which differ by a constant are seen to be the same.
-        self.spend(len(above.value), above.bits, column)
-        monic = _Polynomial(above.value / leading, abs((leading * above.scale).p), above.bits)
+        self.spend(above.terms, above.bits, column)
+        monic = above._replace(value=above.value / leading, scale=abs((leading * above.scale).p))
         return _Quotient(self.scaled(below, 1 / leading, column), monic)
 
-    def negative(self, value: _Value, column: int) -> _Value:
-        if isinstance(value, fmpq):
-            return -value
+    def negative(self, value: _Quotient, column: int) -> _Quotient:
         return _Quotient(self.scaled(value.above, fmpq(-1), column), value.below)
 
     # Arithmetic of numbers and polynomials: estimate, refuse or compute.
-
-    def polynomial(self, value: _Value) -> _Polynomial:
-        """The numerator of a value, as a polynomial even if it is a number."""
-        if isinstance(value, _Quotient):
-            return value.above
-        return _Polynomial(cast(fmpq_mpoly_ctx, self.ring).constant(value), value.q, _bits(value.p))
 
     def add(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
         scale = left.scale
@@ -651,19 +615,19 @@ class _Arithmetic:
             bits = 2 + max(side.bits + size - side.scale.bit_length() for side in (left, right))
             self.check_bits(size, column)
         self.check_bits(bits, column)
-        self.spend(len(left.value) + len(right.value), bits, column)
+        self.spend(left.terms + right.terms, bits, column)
         return self.counted(left.value + right.value, scale, bits, column)
 
     def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
         if right is self.one:
             return left
-        self.check_degree(int(left.value.total_degree()) + int(right.value.total_degree()), "a product", column)
-        pairs = len(left.value) * len(right.value)
-        bits = left.bits + right.bits + (max(1, min(len(left.value), len(right.value))) - 1).bit_length()
+        self.check_degree(left.degree + right.degree, "a product", column)
+        pairs = left.terms * right.terms
+        bits = left.bits + right.bits + (max(1, min(left.terms, right.terms)) - 1).bit_length()
         self.check_bits(max(bits, _bits(left.scale) + _bits(right.scale)), column)
         bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
-            found = f"found a product of polynomials with {len(left.value)} and {len(right.value)} terms"
+            found = f"found a product of polynomials with {left.terms} and {right.terms} terms"
             raise self.refusal(f"{found}, which is too large to expand", column)
         self.spend(pairs, bits_of_pair, column)
         return self.counted(left.value * right.value, left.scale * right.scale, bits, column)
@@ -673,17 +637,17 @@ class _Arithmetic:
             return value
         bits = value.bits + _bits(number.p)
         self.check_bits(max(bits, _bits(value.scale) + _bits(number.q)), column)
-        self.spend(len(value.value), bits, column)
-        return _Polynomial(value.value * number, value.scale * number.q, bits)
+        self.spend(value.terms, bits, column)
+        return value._replace(value=value.value * number, scale=value.scale * number.q, bits=bits)
 
     def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
         """The n-th power by squaring, each product checked; n is positive."""
-        self.check_degree(int(value.value.total_degree()) * n, "a power", column)
-        if len(value.value) == 1:
+        self.check_degree(value.degree * n, "a power", column)
+        if value.terms == 1:
             bits = value.bits * n
             self.check_bits(max(bits, _bits(value.scale) * n), column)
             self.spend(1, bits, column)
-            return _Polynomial(value.value**n, value.scale**n, bits)
+            return _Polynomial(value.value**n, value.scale**n, bits, 1, value.degree * n)
         result = value
         for digit in f"{n:b}"[1:]:
             result = self.times(result, result, column)
@@ -693,15 +657,17 @@ class _Arithmetic:
 
     # Refusals
 
-    def checked(self, number: fmpq, column: int) -> fmpq:
-        self.check_bits(number.height_bits(), column)
-        return number
-
-    def counted(self, value: fmpq_mpoly, scale: fmpz, bits: int, column: int) -> _Polynomial:
+    def counted(self, value: Any, scale: fmpz, bits: int, column: int) -> _Polynomial:
+        if isinstance(value, fmpq):
+            return self.constant(value).above
         if len(value) > self.limits.terms:
             found = f"found a polynomial of {len(value)} terms"
             raise self.refusal(f"{found}, expected at most {self.limits.terms}", column)
-        return _Polynomial(value, scale, bits)
+        return _Polynomial(value, scale, bits, len(value), int(value.total_degree()))
+
+    def polynomial(self, value: _Polynomial) -> fmpq_mpoly:
+        """The value as a polynomial even if it is a number."""
+        return self.ring.constant(value.value) if isinstance(value.value, fmpq) else value.value
 
     def check_bits(self, bits: int, column: int) -> None:
         if bits > self.max_bits:
@@ -738,23 +704,14 @@ class _Arithmetic:
         return UnknownName(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
 
 
-def _total(values: list[_T], add: Callable[[_T, _T], _T]) -> _T:
-    """The sum, by halves: adding one by one would copy the growing sum once for each term."""
-    while len(values) > 1:
-        odd = values[-1:] if len(values) % 2 else []
-        values = [add(left, right) for left, right in zip(values[::2], values[1::2], strict=False)] + odd
-    return values[0]
-
-
-def _constant(value: _Value) -> fmpq | None:
+def _constant(value: _Quotient) -> fmpq | None:
     """The number that a value is, or None where variables are left in it."""
-    if isinstance(value, fmpq):
-        return value
-    if value.above.value.is_zero():
+    above = value.above.value
+    if not above:
         return fmpq(0)
-    if value.below is None and value.above.value.is_constant():
-        return value.above.value.leading_coefficient()
-    return None
+    if value.below is not None or value.above.degree > 0:
+        return None
+    return above if isinstance(above, fmpq) else above.leading_coefficient()
 
 
 def _bits(integer: fmpz) -> int:

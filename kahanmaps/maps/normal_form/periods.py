@@ -130,35 +130,7 @@ def orbit_period(
     >>> found.period, found.meets_pole
     (85400488827489215, True)
     """
-    return _orbit_period(form, None, eps, start, prime, largest)
-
-
-def _orbit_period(
-    form: NormalForm,
-    T: fmpq_mat | None,
-    eps: Any,
-    start: Sequence[Any],
-    prime: int | None,
-    largest: int = LARGEST_FIELD,
-) -> OrbitPeriod:
-    """The period of a start in the coordinates x = T y, modulo a prime or over Q."""
-    field = QQ if prime is None else GF(prime)
-    splitting = Splitting(form, field, eps, T)
-    planes = []
-    for plane, triple in zip(splitting.planes, splitting.triples([field.convert(x) for x in start]), strict=True):
-        if prime is None:
-            planes.append(plane_period_over_rationals(plane.block, triple, name=plane.name))
-        else:
-            planes.append(plane_period(plane.block, triple, prime, plane.context, name=plane.name, largest=largest))
-    # Of the planes, the worst speaks.
-    statuses, poles_met = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
-    worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
-    return OrbitPeriod(
-        lcm(*(plane.period or 1 for plane in planes)) if worst == "periodic" else None,
-        worst,
-        True if True in poles_met else None if None in poles_met else False,
-        tuple(planes),
-    )
+    return period_of(form, eps, start, prime, largest=largest)
 
 
 # Of the kinds for which neither depends on the field: status, period, and whether a pole is met.
@@ -297,11 +269,18 @@ def _by_walking(block: PlanarBlock, point: Triple, q: int, name: str) -> PlanePe
 # Over the rationals.
 
 
-def period_of(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], prime: int | None = None) -> OrbitPeriod:
+def period_of(
+    normal_form: SystemNormalForm | NormalForm,
+    eps: Any,
+    start: Sequence[Any],
+    prime: int | None = None,
+    *,
+    largest: int = LARGEST_FIELD,
+) -> OrbitPeriod:
     """The period of the orbit of `start`, in the system's own coordinates, modulo a prime or (None) over Q.
 
-    `normal_form` is that of the system (family.system_normal_form); otherwise like `orbit_period` and
-    `period_over_rationals`.
+    `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member;
+    otherwise like `orbit_period` and `period_over_rationals`.
 
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
@@ -309,7 +288,24 @@ def period_of(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any], pri
     >>> period_of(normal_form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
-    return _orbit_period(normal_form.form, normal_form.T, eps, start, prime)
+    form, T = getattr(normal_form, "form", normal_form), getattr(normal_form, "T", None)
+    field = QQ if prime is None else GF(prime)
+    splitting = Splitting(form, field, eps, T)
+    planes = []
+    for plane, triple in zip(splitting.planes, splitting.triples([field.convert(x) for x in start]), strict=True):
+        if prime is None:
+            planes.append(plane_period_over_rationals(plane.block, triple, name=plane.name))
+        else:
+            planes.append(plane_period(plane.block, triple, prime, plane.context, name=plane.name, largest=largest))
+    # Of the planes, the worst speaks.
+    statuses, poles_met = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
+    worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
+    return OrbitPeriod(
+        lcm(*(plane.period or 1 for plane in planes)) if worst == "periodic" else None,
+        worst,
+        True if True in poles_met else None if None in poles_met else False,
+        tuple(planes),
+    )
 
 
 def period(
@@ -342,7 +338,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     >>> period_over_rationals(form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
-    return _orbit_period(form, None, eps, start, None)
+    return period_of(form, eps, start)
 
 
 def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str = "the plane") -> PlanePeriod:
