@@ -59,9 +59,14 @@ def rational(value: Any) -> fmpq:
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
     if isinstance(value, float | complex) or kind:
+        example = str(value)  # unless it spells no number, as nan, inf and 1j
+        try:
+            parse_number(example)
+        except InputError:
+            example = "1/10"
         raise InexactNumber(
             f"found the machine number {value!s}, expected an exact one: "
-            f'write an integer, p/q or a decimal as text, e.g. "{_example(str(value))}"'
+            f'write an integer, p/q or a decimal as text, e.g. "{example}"'
         )
     raise InputError(f"found {value!r} of type {type(value).__name__}, expected an exact number")
 
@@ -505,12 +510,3 @@ def CC(bits: int) -> ComplexBallField:
 def _check_bits(bits: int) -> None:
     if isinstance(bits, bool) or not isinstance(bits, int) or not 2 <= bits <= MAX_BALL_BITS:
         raise InputError(f"found the precision {bits!r}, expected an integer from 2 to {MAX_BALL_BITS} bits")
-
-
-def _example(text: str) -> str:
-    """The text if it spells a number (that of nan, inf or 1j does not), or another that does."""
-    try:
-        parse_number(text)
-    except InputError:
-        return "1/10"
-    return text

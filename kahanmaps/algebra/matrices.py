@@ -61,14 +61,22 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
     [(-2, 1)]
     """
     columns = matrix.ncols()
-    reduced, pivots = _reduced_echelon(field, matrix)
+    rows: Any = None
+    if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
+        rows, pivots = _eliminate(field, matrix)
+    elif isinstance(matrix, fmpq_mat):
+        integers, below, rank_found = _integer_rows(matrix).rref()
+        pivots = split_columns(integers, rank_found)[0]
+    else:
+        reduced, rank_found = matrix.rref()
+        rows, pivots = reduced.tolist(), split_columns(reduced, rank_found)[0]
     basis = []
     with field.working():
         for free in (j for j in range(columns) if j not in set(pivots)):
             vector = [field.zero] * columns
             vector[free] = field.one
             for i, pivot in enumerate(pivots):
-                vector[pivot] = -reduced(i, free)
+                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], below)
             basis.append(tuple(vector))
     return basis
 
@@ -194,18 +202,6 @@ def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 
 
-def _reduced_echelon(field: Field, matrix: Any) -> tuple[Any, list[int]]:
-    """Entries (as a function of row and column) of the reduced echelon form, and its pivot columns."""
-    if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
-        rows, pivots = _eliminate(field, matrix)
-        return (lambda i, j: rows[i][j]), pivots
-    if isinstance(matrix, fmpq_mat):
-        reduced, below, rank_found = _integer_rows(matrix).rref()
-        return (lambda i, j: fmpq(reduced[i, j], below)), split_columns(reduced, rank_found)[0]
-    reduced, rank_found = matrix.rref()
-    return (lambda i, j: reduced[i, j]), split_columns(reduced, rank_found)[0]
-
-
 def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
     """Gauss-Jordan, where FLINT has no echelon form: balls, and entries of our own."""
     with field.working():
@@ -213,10 +209,14 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
         pivots: list[int] = []
         for column in range(matrix.ncols()):
             top = len(pivots)
-            best = _pivot([row[column] for row in rows[top:]])
-            if best is None:
+            others = [k for k in range(top, len(rows)) if not _is_zero(rows[k][column])]
+            if not others:
                 continue
-            best += top
+            best = others[0]
+            if hasattr(rows[best][column], "abs_lower"):  # of balls the one farthest from zero
+                best = max(others, key=lambda k: rows[k][column].abs_lower())
+                if rows[best][column].contains(0):
+                    raise PrecisionLost("the rank cannot be decided with balls this wide: ask for more bits")
             rows[top], rows[best] = rows[best], rows[top]
             lead = rows[top][column]
             rows[top] = [entry / lead for entry in rows[top]]
@@ -233,14 +233,3 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
 def _is_zero(entry: Any) -> bool:
     """Whether an entry is certainly zero; a ball that holds 0 and more is neither equal to 0 nor different from it."""
     return bool(entry == 0)
-
-
-def _pivot(entries: Sequence[Any]) -> int | None:
-    """The place of an entry that is not zero, of balls that farthest from zero; none where all are certainly zero."""
-    found = [k for k, entry in enumerate(entries) if not _is_zero(entry)]
-    if not found or not hasattr(entries[0], "abs_lower"):
-        return min(found, default=None)
-    best = max(found, key=lambda k: entries[k].abs_lower())
-    if entries[best].contains(0):
-        raise PrecisionLost("the rank cannot be decided with balls this wide: ask for more bits")
-    return best

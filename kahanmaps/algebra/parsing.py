@@ -303,7 +303,6 @@ _WRITE = {
 }
 
 _OPERAND = "expected a number, a name or '('"
-_BRACKET = re.compile(r"[()]")
 
 
 class _Polynomial(NamedTuple):
@@ -360,7 +359,25 @@ def _tokens(text: str) -> Iterator[Token]:
 
 def _parse(work: _Arithmetic) -> _Quotient:
     """The value of the text, or `ExpressionError`."""
-    _check_shape(work.text, work.limits)
+    # Length and brackets, before anything else looks at the text.
+    text, limits = work.text, work.limits
+    if len(text) > limits.characters:
+        raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
+    if not text.strip(BLANKS):
+        raise ExpressionError("found nothing, expected an expression such as x^2/2 - y", text)
+    opened: list[int] = []
+    for match in re.finditer(r"[()]", text):
+        column = match.start()
+        if match[0] == "(":
+            opened.append(column)
+            if len(opened) > limits.depth:
+                raise ExpressionError(f"found brackets nested more than {limits.depth} deep: simplify", text, column)
+        elif opened:
+            opened.pop()
+        else:
+            raise ExpressionError("found ')' without its '(', expected brackets in pairs", text, column)
+    if opened:
+        raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, opened[-1])
     reader = _Reader(work)
     value = reader.sum()
     if reader.next.kind != _END:
@@ -426,27 +443,6 @@ class _Reader:
         if self.next.kind in ("number", "name", "("):  # before the name is looked up: sin(x) is a call
             raise _syntax_error(self.next, self.work)
         return self.work.number(token) if token.kind == "number" else self.work.name(token)
-
-
-def _check_shape(text: str, limits: ExpressionLimits) -> None:
-    """Length and brackets, before anything else looks at the text."""
-    if len(text) > limits.characters:
-        raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
-    if not text.strip(BLANKS):
-        raise ExpressionError("found nothing, expected an expression such as x^2/2 - y", text)
-    opened: list[int] = []
-    for match in _BRACKET.finditer(text):
-        column = match.start()
-        if match[0] == ")":
-            if not opened:
-                raise ExpressionError("found ')' without its '(', expected brackets in pairs", text, column)
-            opened.pop()
-        else:
-            opened.append(column)
-            if len(opened) > limits.depth:
-                raise ExpressionError(f"found brackets nested more than {limits.depth} deep: simplify", text, column)
-    if opened:
-        raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, opened[-1])
 
 
 def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:

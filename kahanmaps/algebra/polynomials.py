@@ -144,11 +144,25 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     Raises `BadPrime` where the field is GF(p) and p divides the denominator of a coefficient.
     """
     if all(isinstance(entry, fmpq) for entry in point):
-        return _evaluate_rational(polynomial, point)
+        # In integers over one denominator: a gcd for the result, none for each term.
+        top = degree(polynomial)
+        if top <= 0:
+            return polynomial.leading_coefficient() if top == 0 else fmpq(0)
+        X, W = over_one(point)
+        below = common_denominator(polynomial)
+        powers: list[list[Any]] = [*([fmpz(1), entry] for entry in X), [fmpz(1), W]]
+        total: Any = fmpz(0)
+        for monomial, coefficient in polynomial.terms():
+            term: Any = coefficient.p * (below // coefficient.q)
+            for table, exponent in zip(powers, (*monomial, top - int(sum(monomial))), strict=True):
+                if exponent:
+                    term = term * _power(table, exponent)
+            total += term
+        return fmpq(total, below * _power(powers[-1], top))
     own = field.value(polynomial, point)
     if own is not None:
         return own
-    powers: list[list[Any]] = [[field.one, entry] for entry in point]
+    powers = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():
         for monomial, coefficient in polynomial.terms():
@@ -158,27 +172,6 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
                     term = term * _power(powers[i], exponent)
             total = total + term
     return total
-
-
-def _evaluate_rational(polynomial: fmpq_mpoly, point: Sequence[fmpq]) -> fmpq:
-    """The value at a rational point, in integers over one denominator: a gcd for the result, none for each term."""
-    top = degree(polynomial)
-    if top <= 0:
-        return polynomial.leading_coefficient() if top == 0 else fmpq(0)
-    X, W = over_one(point)
-    below = common_denominator(polynomial)
-    powers = [[fmpz(1), entry] for entry in X]
-    powers_of_W = [fmpz(1), W]
-    total = fmpz(0)
-    for monomial, coefficient in polynomial.terms():
-        term = coefficient.p * (below // coefficient.q)
-        missing = top
-        for i, exponent in enumerate(monomial):
-            if exponent:
-                term = term * _power(powers[i], exponent)
-                missing -= int(exponent)
-        total += term * _power(powers_of_W, missing) if missing else term
-    return fmpq(total, below * _power(powers_of_W, top))
 
 
 def _power(table: list[Any], exponent: int) -> Any:

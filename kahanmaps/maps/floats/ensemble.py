@@ -110,7 +110,18 @@ class FloatEnsemble:
         if sampled < 1:
             raise InputError(f"found a sample every {sampled} steps, expected at least 1")
         self.system = as_map(system)
-        self._starts = _points(starts, self.system)
+        if isinstance(starts, np.ndarray) and starts.dtype.kind in "fiu":
+            self._starts = np.array(starts, dtype=np.float64, order="C")
+        else:
+            self._starts = np.array([to_floats(start) for start in starts], dtype=np.float64)
+        shape = self._starts.shape
+        if len(shape) != 2 or shape[1] != self.system.dim or not shape[0]:
+            raise InputError(
+                f"found starts of shape {shape}, expected (n, {self.system.dim}): one row for each start, with columns "
+                f"{', '.join(self.system.variables)}"
+            )
+        if not np.isfinite(self._starts).all():
+            raise InputError("found a start that is no finite number")
         if to_float(epsilon) == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
         compiled = choose_kernel(kernel, long=True) == "numba" and has_llvm()
@@ -373,21 +384,6 @@ def require_every(every: int) -> None:
     """Raises InputError unless every >= 1."""
     if every < 1:
         raise InputError(f"found a record every {every} steps, expected at least 1")
-
-
-def _points(starts: Any, system: QuadraticSystem | BirationalMap) -> FloatArray:
-    if isinstance(starts, np.ndarray) and starts.dtype.kind in "fiu":
-        points = np.array(starts, dtype=np.float64, order="C")
-    else:
-        points = np.array([to_floats(start) for start in starts], dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != system.dim or not len(points):
-        raise InputError(
-            f"found starts of shape {points.shape}, expected (n, {system.dim}): one row for each start, with columns "
-            f"{', '.join(system.variables)}"
-        )
-    if not np.isfinite(points).all():
-        raise InputError("found a start that is no finite number")
-    return points
 
 
 def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:

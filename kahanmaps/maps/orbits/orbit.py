@@ -110,7 +110,15 @@ def orbit(
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
-    start = _numbers(start, arithmetic)
+    if isinstance(start, str):
+        start = parse_point(start)
+    if not hasattr(start, "__len__"):
+        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
+    if arithmetic.kind == "float":  # which floats may start, exactly these
+        for x in start:
+            if isinstance(x, float) and not math.isfinite(x):
+                raise InputError(f"found {x} in the start, expected finite numbers")
+        start = [fmpq(*x.as_integer_ratio()) if isinstance(x, float) else x for x in start]
     if not isinstance(at, Iterable | None):
         raise InputError(f"found at = {at!r}, expected a sequence of steps, at=[{at}]")
     wanted = None if at is None else frozenset(integer(step, "a step of at") for step in at)
@@ -391,7 +399,19 @@ class Trajectory:
                 f'found {self.arithmetic} arithmetic, expected numbers: take arithmetic="float", or dtype=object'
             )
         if kind.kind in "iu":
-            return np.array([[_held(x, kind, np.iinfo(kind)) for x in row] for row in rows], dtype=kind)
+            limits = np.iinfo(kind)
+            for row in rows:
+                for k, x in enumerate(row):
+                    number = fmpq(*x.as_integer_ratio()) if isinstance(x, float) and math.isfinite(x) else x
+                    row[k] = int(number.p) if isinstance(number, fmpq) and number.q == 1 else number
+                    if not (isinstance(row[k], int) and limits.min <= row[k] <= limits.max):
+                        text = str(x)
+                        raise InputError(
+                            f"found the coordinate {text if len(text) < 50 else text[:40] + '...'}, expected integers "
+                            f"from {limits.min} to {limits.max} for {kind}: take dtype=object, which has all numbers "
+                            "as they are, or dtype=float"
+                        )
+            return np.array(rows, dtype=kind)
         if kind.kind not in "fc":
             raise InputError(f"found the dtype {kind}, expected one of floats or integers, or object")
         if prime > 2 ** (np.finfo(kind).nmant + 1):
@@ -452,34 +472,6 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, told: Callable[[st
             return bits
         bits *= 2
     raise NotAccurate(f"not even balls of {bits // 2} bits give {digits} digits at every point")
-
-
-def _held(x: Any, kind: Any, limits: Any) -> int:
-    """A coordinate as an integer that the kind of an array holds. Raises InputError for others."""
-    number = fmpq(*x.as_integer_ratio()) if isinstance(x, float) and math.isfinite(x) else x
-    whole = int(number.p) if isinstance(number, fmpq) and number.q == 1 else number
-    if isinstance(whole, int) and limits.min <= whole <= limits.max:
-        return whole
-    text = str(x)
-    raise InputError(
-        f"found the coordinate {text if len(text) < 50 else text[:40] + '...'}, expected integers from {limits.min} "
-        f"to {limits.max} for {kind}: take dtype=object, which has all numbers as they are, or dtype=float"
-    )
-
-
-def _numbers(start: Any, arithmetic: Arithmetic) -> Sequence[Any]:
-    """The entries of a start: of text its numbers, and of floats, for float orbits, exactly these."""
-    if isinstance(start, str):
-        start = parse_point(start)
-    if not hasattr(start, "__len__"):
-        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
-    if arithmetic.kind == "float":
-        for x in start:
-            if isinstance(x, float) and not math.isfinite(x):
-                raise InputError(f"found {x} in the start, expected finite numbers")
-        start = [fmpq(*x.as_integer_ratio()) if isinstance(x, float) else x for x in start]
-    numbers: Sequence[Any] = start
-    return numbers
 
 
 def _orbit_at_one_eps(request: OrbitRequest, numbers: Any) -> Trajectory:
