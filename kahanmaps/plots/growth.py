@@ -155,33 +155,30 @@ def draw_heights(
         _step_axis(axes, scale, longest)
         axes.set_yscale("linear" if scale == "linear" else "log")
         for k, eps in enumerate(every_eps):
-            _draw_heights_of(axes, [curve for curve in curves if curve.eps == eps], k, scale == "loglog")
+            some, from_one = [curve for curve in curves if curve.eps == eps], scale == "loglog"
+            size = 3.2 if len(some) <= 3 and max(len(curve.steps) for curve in some) <= 80 else 2
+            line: dict[str, Any] = {"color": COLOURS[k], "linestyle": LINES[k], "linewidth": 0.7}
+            # Hollow marks, through which the line of the fit is seen.
+            mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
+            for curve in some:
+                rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
+                if len(rows) > _MARKS:  # as many marks as stand apart along the axis, the first and the last among them
+                    steps = curve.steps[rows].astype(np.float64)
+                    spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
+                    rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
+                points = curve.steps[rows], curve.bits[rows]
+                axes.plot(*points, color=COLOURS[k], linestyle="none", markersize=size, **mark)
+                if (fit := fit_of(curve)) is not None:
+                    last = curve.steps[-1]
+                    n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
+                    axes.plot(n, fit(n), zorder=1.5, **line)
+            axes.plot([], [], label=_height_label(some), markersize=3.2, **line, **mark)
         if scale == "linear":
             axes.set_ylim(bottom=0)
         axes.set_xlabel("step $n$")
         axes.set_ylabel("height $h_n$ (bits)")
         legend_above(figure, *axes.get_legend_handles_labels(), style, most=1)
     return figure
-
-
-def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one: bool) -> None:
-    size = 3.2 if len(curves) <= 3 and max(len(curve.steps) for curve in curves) <= 80 else 2
-    line: dict[str, Any] = {"color": COLOURS[k], "linestyle": LINES[k], "linewidth": 0.7}
-    # Hollow marks, through which the line of the fit is seen.
-    mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
-    for curve in curves:
-        rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
-        if len(rows) > _MARKS:  # as many marks as stand apart along the axis, the first and the last among them
-            steps = curve.steps[rows].astype(np.float64)
-            spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
-            rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
-        points = curve.steps[rows], curve.bits[rows]
-        axes.plot(*points, color=COLOURS[k], linestyle="none", markersize=size, **mark)
-        if (fit := fit_of(curve)) is not None:
-            last = curve.steps[-1]
-            n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
-            axes.plot(n, fit(n), zorder=1.5, **line)
-    axes.plot([], [], label=_height_label(curves), markersize=3.2, **line, **mark)
 
 
 def _height_label(curves: Sequence[HeightCurve]) -> str:

@@ -152,7 +152,16 @@ def find_invariant_curves(
                 curves.append(_cubic(frame, first, epsilon) if frame.is_real else None)
             orbits = [(u[:length], v[:length]) for u, v in orbits]
             runs.append([PlaneOrbit(u, v, cubic) for (u, v), cubic in zip(orbits, curves, strict=True)])
-            originals.append(_in_variables(frames, orbits, splitting))
+            original = np.zeros(
+                (length, splitting.dim)
+            )  # the orbit in the variables of the system, a row for each step
+            for frame, (u, v) in zip(frames, orbits, strict=True):
+                f, g, m, n = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
+                old = [f * u + g * v, m * u + n * v]
+                columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
+                parts = [part for z in old for part in ((z.real, z.imag) if frame.root.imag else (z.real,))]
+                original += np.stack(parts, axis=1) @ columns.T
+            originals.append(original)
             poles.append(pole)
     planes = tuple(replace(frame, orbits=found) for frame, found in zip(frames, zip(*runs, strict=True), strict=True))
     return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), normal_form.text)
@@ -227,20 +236,6 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
             f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the start, the system or eps"
         )
     return cubic
-
-
-def _in_variables(
-    frames: Sequence[InvariantPlane], orbits: Sequence[tuple[Numbers, Numbers]], splitting: Splitting
-) -> Numbers:
-    """The orbit in the variables of the system, a row for each step."""
-    total = np.zeros((len(orbits[0][0]), splitting.dim))
-    for frame, (u, v) in zip(frames, orbits, strict=True):
-        f, g, k, l = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
-        old = [f * u + g * v, k * u + l * v]
-        columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
-        parts = [old[0].real, old[0].imag, old[1].real, old[1].imag] if frame.root.imag else [old[0].real, old[1].real]
-        total += np.stack(parts, axis=1) @ columns.T
-    return total
 
 
 def _machine(value: Any) -> Any:

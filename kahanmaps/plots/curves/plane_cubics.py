@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock
+
 Floats = NDArray[np.float64]
 
 
@@ -36,13 +38,12 @@ class PlaneCubic:
     @property
     def D(self) -> tuple[float, float, float]:
         """The coefficients of D = h_uu h_vv - h_uv^2, of u^2, uv and v^2."""
-        a, b, c, d = self.h
-        return 12 * a * c - 4 * b * b, 36 * a * d - 4 * b * c, 12 * b * d - 4 * c * c
+        p, q, r = PlanarBlock(*self.h).D
+        return 4 * p, 4 * q, 4 * r
 
     def h_at(self, u: Any, v: Any) -> Any:
         """The value of h."""
-        a, b, c, d = self.h
-        return a * u**3 + b * u * u * v + c * u * v * v + d * v**3
+        return PlanarBlock(*self.h).h(u, v)
 
     def D_at(self, u: Any, v: Any) -> Any:
         """The value of D."""

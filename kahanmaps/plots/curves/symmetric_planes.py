@@ -33,35 +33,17 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
     if block.discriminant.contains(arb(0)):
         return REPEATED, one
     if block.discriminant > 0:
-        return THREE_LINES, _three_lines(block)
-    return ONE_LINE, _one_line(block)
-
-
-def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
-    """The coefficients of the cubic in new coordinates, the matrix (of determinant 1) times the old ones."""
-    f, g, k, l = matrix.entries()
-    # u = l u' - g v', v = -k u' + f v'
-    a, b, c, d = block.a, block.b, block.c, block.d
-    slope_u, slope_v = 3 * a * l * l - 2 * b * l * k + c * k * k, b * l * l - 2 * c * l * k + 3 * d * k * k
-    other_u, other_v = 3 * a * g * g - 2 * b * g * f + c * f * f, b * g * g - 2 * c * g * f + 3 * d * f * f
-    return block.h(l, -k), -g * slope_u + f * slope_v, l * other_u - k * other_v, block.h(-g, f)
-
-
-def _three_lines(block: PlanarBlock) -> Matrix:
-    """D is negative definite: it is made -(u^2 + v^2) times a number, and the plane is turned."""
-    p, q, r = (-entry for entry in block.D)
-    size = (p * r - q * q / 4).sqrt()
-    stretch = (p / size).sqrt()
-    upright = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
-    # Now h is the real part of (a - i b/3) (u + i v)^3.
-    a, b, _, _ = transformed(block, upright)
-    # atan2 of a ball across its cut would be all of -pi ... pi, so it is turned away from there.
-    angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
-    return arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * upright
-
-
-def _one_line(block: PlanarBlock) -> Matrix:
-    """D is a product of two real forms L and M, and h = s L^3 + t M^3, which are scaled alike and turned."""
+        # D is negative definite: it is made -(u^2 + v^2) times a number, and the plane is turned.
+        p, q, r = (-entry for entry in block.D)
+        size = (p * r - q * q / 4).sqrt()
+        stretch = (p / size).sqrt()
+        upright = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
+        # Now h is the real part of (a - i b/3) (u + i v)^3.
+        a, b, _, _ = transformed(block, upright)
+        # atan2 of a ball across its cut would be all of -pi ... pi, so it is turned away from there.
+        angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
+        return THREE_LINES, arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * upright
+    # D is a product of two real forms L and M, and h = s L^3 + t M^3, which are scaled alike and turned.
     p, q, r = block.D
     root = (q * q - 4 * p * r).sqrt()
     slope = -(q + root) / 2 if not q < 0 else -(q - root) / 2
@@ -76,4 +58,14 @@ def _one_line(block: PlanarBlock) -> Matrix:
         scale = -scale
     half = arb(1) / arb(2).sqrt()
     forms = arb_mat([[entry * scale for entry in L], [entry * scale * ratio for entry in M]])
-    return arb_mat([[half, half], [-half, half]]) * forms
+    return ONE_LINE, arb_mat([[half, half], [-half, half]]) * forms
+
+
+def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
+    """The coefficients of the cubic in new coordinates, the matrix (of determinant 1) times the old ones."""
+    f, g, k, l = matrix.entries()
+    # u = l u' - g v', v = -k u' + f v'
+    a, b, c, d = block.a, block.b, block.c, block.d
+    slope_u, slope_v = 3 * a * l * l - 2 * b * l * k + c * k * k, b * l * l - 2 * c * l * k + 3 * d * k * k
+    other_u, other_v = 3 * a * g * g - 2 * b * g * f + c * f * f, b * g * g - 2 * c * g * f + 3 * d * f * f
+    return block.h(l, -k), -g * slope_u + f * slope_v, l * other_u - k * other_v, block.h(-g, f)

@@ -21,7 +21,6 @@ from kahanmaps.plots.figures import (
 from kahanmaps.plots.style import COLOURS, LINES, Style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SCALES = ("loglog", "semilog")
@@ -56,7 +55,27 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
         room = 0.75 / rows * 72 * style.inches(aspect)[1]  # for what stands beside a panel, in points
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for axes, name in zip(panels, survey.labels, strict=False):
-            _draw_panel(axes, survey, name, scale)
+            curves = [curve for curve in survey.curves if curve.function == name]
+            errors = np.concatenate([curve.errors for curve in curves]) if curves else np.array([])
+            limit = clipped_from(survey, name)
+            positive = np.minimum(errors[errors > 0], limit)
+            least, largest = (positive.min(), positive.max()) if len(positive) else _NO_VALUES
+            zero = log_scale_with_zero(axes, float(least), float(largest), len(positive) < len(errors))
+            if scale == "loglog":
+                axes.set_xscale("log")
+                axes.set_xlim(1 if survey.steps > 9 else 0.9, max(survey.steps, 2))
+            else:
+                axes.set_xlim(0, survey.steps)
+            for curve in curves:
+                look = _look(curve.method)
+                heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
+                axes.plot(curve.steps, heights, linewidth=0.9, marker="o" if len(heights) == 1 else None, **look)
+                end = {"color": look["color"], "markersize": 5, "clip_on": False}
+                beyond = np.flatnonzero(heights > limit)
+                if len(beyond):
+                    axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
+                elif len(heights) and not survey.ends[curve.method].is_whole:
+                    axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)
             label = f"{'relative' if survey.relative[name] else 'absolute'} error of {survey.labels[name]}"
             axes.set_ylabel(label if label.endswith("$") else wrapped(label, room, style.font_size, most=2))
         for k, axes in enumerate(panels):
@@ -83,27 +102,3 @@ def clipped_from(survey: DriftSurvey, name: str) -> float:
 def _look(method: str) -> dict[str, Any]:
     k = list(METHODS).index(method)
     return {"color": COLOURS[k], "linestyle": LINES[k]}
-
-
-def _draw_panel(axes: Axes, survey: DriftSurvey, name: str, scale: str) -> None:
-    curves = [curve for curve in survey.curves if curve.function == name]
-    errors = np.concatenate([curve.errors for curve in curves]) if curves else np.array([])
-    limit = clipped_from(survey, name)
-    positive = np.minimum(errors[errors > 0], limit)
-    least, largest = (positive.min(), positive.max()) if len(positive) else _NO_VALUES
-    zero = log_scale_with_zero(axes, float(least), float(largest), len(positive) < len(errors))
-    if scale == "loglog":
-        axes.set_xscale("log")
-        axes.set_xlim(1 if survey.steps > 9 else 0.9, max(survey.steps, 2))
-    else:
-        axes.set_xlim(0, survey.steps)
-    for curve in curves:
-        look = _look(curve.method)
-        heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
-        axes.plot(curve.steps, heights, linewidth=0.9, marker="o" if len(heights) == 1 else None, **look)
-        end = {"color": look["color"], "markersize": 5, "clip_on": False}
-        beyond = np.flatnonzero(heights > limit)
-        if len(beyond):
-            axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
-        elif len(heights) and not survey.ends[curve.method].is_whole:
-            axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)

@@ -11,7 +11,7 @@ import numpy as np
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, legend_above, new_figure, points
-from kahanmaps.plots.portraits.flow import CENTRE, DEGENERATE, FOCUS, NODE, SADDLE, Flow
+from kahanmaps.plots.portraits.flow import CENTRE, DEGENERATE, FOCUS, NODE, SADDLE
 from kahanmaps.plots.portraits.portrait import Portrait
 from kahanmaps.plots.portraits.windows import Window, inside, main_range
 from kahanmaps.plots.style import COLOUR_MAP, COLOURS, MARKS, Style
@@ -64,7 +64,19 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
             mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
         if found.flow is not None:
-            _draw_flow(figure, axes, found.flow, found.window if in_space else None, style)
+            # What is drawn of the differential equation below the orbits, its equilibria above them, and a legend.
+            flow, handles = found.flow, dict[str, Any]()
+            if len(flow.places):
+                axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
+            looks = (("separatrix", flow.separatrices, _SEPARATRIX), ("flow", flow.solutions, _SOLUTION))
+            for word, curve, look in ((word, curve, look) for word, curves, look in looks for curve in curves):
+                seen = _inside(curve[:, None], found.window)[:, 0] if in_space else curve
+                (handles[word],) = axes.plot(*seen.T, zorder=1.2, **look)
+            for kind, point in flow.equilibria:
+                how = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
+                (handles[kind],) = axes.plot(*point[:, None], **how)
+            if handles:
+                legend_above(figure, list(handles.values()), list(handles), style)
         if found.levels is not None:
             pieces = [piece for pieces in found.levels for piece in pieces]
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
@@ -100,21 +112,6 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         elif equal:
             axes.set_aspect("equal", adjustable="box")
     return figure
-
-
-def _draw_flow(figure: Figure, axes: Any, flow: Flow, window: Window | None, style: Style) -> None:
-    """What is drawn of the differential equation below the orbits, its equilibria above them, and a legend for it."""
-    handles: dict[str, Any] = {}
-    if len(flow.places):
-        axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
-    for word, curves, look in (("separatrix", flow.separatrices, _SEPARATRIX), ("flow", flow.solutions, _SOLUTION)):
-        for curve in curves:
-            shown = curve if window is None else _inside(curve[:, None], window)[:, 0]
-            (handles[word],) = axes.plot(*shown.T, zorder=1.2, **look)
-    for kind, point in flow.equilibria:
-        (handles[kind],) = axes.plot(*point[:, None], linestyle="none", zorder=4, clip_on=False, **_EQUILIBRIA[kind])
-    if handles:
-        legend_above(figure, list(handles.values()), list(handles), style)
 
 
 def _draw_few(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
