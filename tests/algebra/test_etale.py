@@ -108,23 +108,6 @@ def test_a_chi_that_is_not_monic_and_squarefree_is_refused(chi, sentence):
         EtaleAlgebra(chi)
 
 
-t = SPLIT.generator
-MIXED = [  # result, its coefficients; t^2 = 1
-    (t + 1, [1, 1]),
-    (fmpq(1, 2) - t, [fmpq(1, 2), -1]),
-    (t * 3, [0, 3]),
-    (t / 2, [0, fmpq(1, 2)]),
-    (fmpq(3) / (t + 2), [2, -1]),
-    (-t, [0, -1]),
-    (t**-3, [0, 1]),
-]
-
-
-@pytest.mark.parametrize(("result", "coefficients"), MIXED)
-def test_numbers_on_either_side_are_constants(result, coefficients):
-    assert result.coefficients == coefficients
-
-
 # Matrices.
 
 

@@ -1,24 +1,29 @@
 """Float orbits: a second implementation in machine numbers, tested against the exact one.
 
 Specified here: numbers are rounded once, to the nearest double; short orbits are close to the exact ones; the method
-has order 2; and each way to end has its status. Tolerances say where they come from.
+has order 2. On disk a .npy file is complete and readable at every moment, also after the program was killed: an
+interrupted or killed run leaves what it had computed. Tolerances say where they come from.
 """
 
+import os
+import signal
+import subprocess
+import sys
+import time
 from itertools import pairwise
 from math import log2, nextafter
 
 import numpy as np
 import pytest
 from flint import fmpq
+from helpers import EULER_TOP
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.fast import FloatOrbit, to_float
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, stream_orbit, to_float
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
-
-UNIT = 2.0**-53  # the relative error of one rounding to nearest
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
 OSCILLATOR = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
@@ -72,17 +77,57 @@ def test_the_method_has_order_two():
 # Ends.
 
 
-def test_an_orbit_ends_before_one_coordinate_leaves_the_range_of_doubles():
-    # x~ = 3 x, from 1: 3^646 is the last power below 1.8e308; the other coordinate stays put
-    orbit = FloatOrbit(QuadraticSystem.from_text(["x", "y"], ["x", "0"]), "1/2", [1, 5], 1000)
-    delivered = [x for _, x in orbit]
-    assert (orbit.end.status, orbit.end.steps, len(delivered)) == ("overflow", 646, 647)
-    assert delivered[-1] == pytest.approx([float(3**646), 5.0], rel=646 * UNIT)  # one rounding a step
-
-
 def test_an_interrupted_orbit_ends_after_the_point_in_hand():
     orbit = FloatOrbit(OSCILLATOR, "1/10", [1, 0], None)
     for step, _ in orbit:
         if step == 5:
             orbit.interrupt()
     assert orbit.end == OrbitEnd("interrupted", 5, "interrupted after step 5")
+
+
+# On disk.
+
+
+START = ["1", "1/2", "1/3"]
+
+
+def test_an_interrupted_orbit_leaves_a_whole_file(tmp_path):
+    orbit = FloatOrbit(EULER_TOP, "1/10", START, None, every=100, kernel="numpy")
+    seen = []
+
+    def progress(step: int) -> None:
+        seen.append(step)
+        if len(seen) == 2:
+            orbit.interrupt()
+
+    end = stream_orbit(orbit, tmp_path / "x.npy", progress=progress)
+    assert (end.status, end.steps) == ("interrupted", seen[-1])
+    assert len(np.load(tmp_path / "x.npy")) == seen[-1] // 100 + 1
+
+
+ENDLESS = """
+from kahanmaps.maps.floats.fast import FloatOrbit, stream_orbit
+from kahanmaps.systems.quadratic import QuadraticSystem
+top = QuadraticSystem.from_text(["x1", "x2", "x3"], ["x2*x3", "-2*x3*x1", "x1*x2"])
+orbit = FloatOrbit(top, "1/10", ["1", "1/2", "1/3"], None, every=50, kernel="numpy")
+stream_orbit(orbit, {path!r}, progress=lambda step: print(step, flush=True))
+"""
+
+
+def test_a_killed_run_leaves_a_readable_file(tmp_path):
+    path = tmp_path / "x.npy"
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS.format(path=str(path))], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        told = [int(process.stdout.readline()) for _ in range(2)]
+        time.sleep(0.01)
+    finally:
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        process.stdout.close()
+    points = np.load(path)
+    assert len(points) >= told[-1] // 50 + 1  # what was told is there, and perhaps a portion more
+    steps = 50 * (len(points) - 1)
+    expected = np.concatenate(list(FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy").records(steps, 50)))
+    assert np.array_equal(points, expected[:, 0])

@@ -12,11 +12,10 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.drifts.draw_drift import clipped_from, draw_drift
-from kahanmaps.plots.drifts.drift import BINS, _Bins, _edges, small_start, survey_drift
+from kahanmaps.plots.drifts.drift import _Bins, _edges, small_start, survey_drift
 from kahanmaps.plots.drifts.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -98,14 +97,6 @@ def test_the_methods_conserve_different_things():
     assert largest["H", "generic"] > 1e-5
 
 
-def test_normal_form_and_elimination_are_both_drawn():
-    file = load("paper_m2")
-    form = system_normal_form(file.system, file.hamiltonian, file.member).form
-    found = survey(file, ["1/50", "1/70", "-1/90", "1/80"], 200, [("", "I1")], ("generic", "normal-form"), form=form)
-    assert [curve.method for curve in found.curves] == ["generic", "normal-form"]
-    assert all(curve.errors.max() < 1e-10 for curve in found.curves)
-
-
 def test_an_orbit_that_ends_early_is_no_whole_one():
     found = survey(SQUARE, [10], 100, [("E", "x")], ("rk4", "midpoint"), eps=fmpq(1, 2))
     assert {method: end.is_whole for method, end in found.ends.items()} == {"rk4": False, "midpoint": False}
@@ -154,15 +145,6 @@ def test_the_largest_of_every_bin_is_kept_however_errors_come(linear, portion):
     assert errors[curve.steps - 1].tolist() == expected
 
 
-@pytest.mark.parametrize("linear", [False, True])
-@pytest.mark.parametrize("steps", [1, 2, BINS, BINS + 1, 10**6, 10**9])
-def test_bins_cover_all_steps_and_are_few(steps, linear):
-    edges = _edges(steps, linear)
-    assert (edges[0], edges[-1]) == (0, steps)
-    assert (np.diff(edges) > 0).all()
-    assert len(edges) <= BINS + 2
-
-
 def test_a_random_start_is_the_same_for_the_same_seed_and_small_enough_for_rk4():
     first, second, other = (small_start(CIRCLE.system, EPS, seed) for seed in (0, 0, 1))
     assert first == second != other
@@ -208,8 +190,3 @@ def test_what_blows_up_is_an_arrow_and_flattens_nothing_and_an_orbit_that_ends_e
     assert any("ended at step" in text.get_text() for text in axes.figure.legends[0].get_texts())
     [axes] = drawn(survey(SQUARE, ["1"], 30, [("E", "1/x")], ("generic", "midpoint"))).axes
     assert [line.get_marker() for line in axes.lines].count("x") == 1
-
-
-@pytest.mark.parametrize(("scale", "expected"), [("loglog", "log"), ("semilog", "linear")])
-def test_the_axis_of_steps_is_as_asked_for(scale, expected):
-    assert drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")]), scale=scale).axes[0].get_xscale() == expected

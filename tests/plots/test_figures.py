@@ -19,7 +19,6 @@ from kahanmaps.plots.figures import (
     picture_bytes,
     points,
     svg_text,
-    wrapped,
 )
 from kahanmaps.plots.style import Style
 
@@ -44,12 +43,6 @@ def the_bytes(kind):
 def test_the_same_picture_is_the_same_bytes_and_another_is_not(kind):
     assert picture_bytes(a_figure(), kind, STYLE) == the_bytes(kind)
     assert kind != "svg" or picture_bytes(a_figure(11), kind, STYLE) != the_bytes(kind)
-
-
-def test_the_size_is_in_centimetres():
-    content = picture_bytes(a_figure(style=Style(width=8.6, height=5)), "svg", Style(width=8.6, height=5)).decode()
-    width, height = (float(x) for x in re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', content).groups())
-    assert (round(width / 72 * 2.54, 3), round(height / 72 * 2.54, 3)) == (8.6, 5)
 
 
 def test_many_points_are_an_image_inside_the_picture(monkeypatch):
@@ -93,12 +86,6 @@ def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
     for text, own in zip((first, second), ids, strict=True):
         assert set(re.findall(r"(?:url\(|href=\")#([^)\"]+)", text)) <= own
         assert next(ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}title")).text == "a < b"
-
-
-def test_long_texts_are_cut_into_lines_and_what_is_left_becomes_dots():
-    assert wrapped("one two three four", width=40, size=8, most=3) == "one two\nthree four"
-    assert wrapped("one two three four five six", width=40, size=8, most=2) == "one two\nthree f..."
-    assert wrapped("x" * 99, width=40, size=8) == "x" * 7 + "..."
 
 
 def test_pictures_of_more_dots_than_fit_into_memory_are_refused():

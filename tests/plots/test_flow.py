@@ -31,11 +31,6 @@ def test_eigenvalues_tell_the_kind(rhs, kind):
     assert equilibria(planar(*rhs))[0].kind == kind
 
 
-def test_equilibria_that_fill_a_line_are_not_marked():
-    assert len(equilibria(planar("x*y", "x"))) > 4
-    assert plane_flow(planar("x*y", "x"), (0, 1), BOX).equilibria == ()
-
-
 def test_arrows_have_the_direction_of_the_field_along_the_axes_as_they_are_drawn():
     found = plane_flow(planar("x", "-y"), (1, 0), BOX)  # y to the right
     to_the_right = found.places[:, 0] > 0

@@ -44,11 +44,6 @@ def test_text_is_parsed_and_nothing_else_and_eps_needs_a_value():
         point_function("eps*x", ["x"])
 
 
-@pytest.mark.parametrize(("text", "variable"), [("x", 0), ("y", 1), ("x + 0*y", 0), ("2*y", None), ("x/y", None)])
-def test_variables_are_recognised(text, variable):
-    assert point_function(text, ["x", "y"]).variable == variable
-
-
 @pytest.mark.parametrize(
     ("text", "label"), [("x1", "$x_1$"), ("x1^2*y", "$x_1^2 y$"), ("(x1-1)/y", "(x1-1)/y"), ("y+0*x1", "$y$")]
 )

@@ -1,19 +1,14 @@
 """Portraits: the numbers that are shown, and what is in the figure that shows them."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 from matplotlib.collections import PathCollection
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InputError
-from kahanmaps.plots.curves.level_sets import level_curves
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.draw_portrait import draw_portrait
 from kahanmaps.plots.portraits.portrait import neighbours, portrait_of
-from kahanmaps.plots.portraits.trajectories import MAX_POINTS, Trajectories, ensemble_for, euler_orbits, walked
+from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, euler_orbits, walked
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -54,16 +49,6 @@ def test_orbits_that_ended_are_not_called_undefined():
     assert portrait_of(found, ["step", point_function("x", "x")]).undefined == 0
 
 
-def test_wrong_numbers_of_axes_and_of_points_are_refused():
-    for count in (1, 4):
-        with pytest.raises(InputError, match=f"found {count} axes"):
-            portrait_of(orbits(1), AXES[:1] * count)
-    with pytest.raises(InputError, match="take fewer"):
-        orbits(1, MAX_POINTS)
-    with pytest.raises(InputError, match="draw dots"):
-        draw_portrait(portrait_of(trajectories(np.zeros((1_000_001, 1, 2))), AXES), STYLE, lines=True)
-
-
 def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahans_orbit_does_not():
     start, (x, y) = np.array([[1.0, 2.0]]), (1.0, 2.0)
     euler = euler_orbits(LOTKA_VOLTERRA, "1/20", start, 100).points
@@ -89,15 +74,6 @@ def test_points_outside_the_window_do_not_spoil_the_colours():
     axes = draw_portrait(shown, STYLE).axes[0]
     assert axes.collections[0].norm.vmax == 1
     assert (axes.get_xlim(), axes.get_ylim(), shown.left_out) == ((0, 2), (0, 2), 20)
-
-
-def test_level_curves_lie_below_the_points():
-    shown = portrait_of(orbits(2, 100), AXES)
-    curves = level_curves(point_function("x*y", "xy"), (0, 1), 2, [1.0, 2.0], shown.window)
-    figure = draw_portrait(replace(shown, levels=curves), STYLE)
-    (levels,) = figure.axes[0].collections
-    assert len(levels.get_segments()) == 2
-    assert all(levels.get_zorder() < line.get_zorder() for line in figure.axes[0].lines)
 
 
 def test_points_outside_the_window_are_not_drawn_in_space():

@@ -8,7 +8,6 @@ from flint import fmpq
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.maps.kahan import KahanMap
@@ -133,15 +132,6 @@ def test_axes_in_which_nothing_moves_are_not_chosen():
     assert widest_axes([squares(MapPair(f, g, ("f", "g")), [1, 1, 1, 1], "1/10")]) == (1, 3)
 
 
-def test_each_pair_is_a_panel_with_its_outcome(both):
-    figure = draw_squares(both, STYLE)
-    titles = [axes.get_title() for axes in figure.axes]
-    assert titles == [
-        "$f = f_{++}$,  $g = f_{+-}$\ncloses exactly",
-        r"$f = J \nabla H_0$,  $g = J \nabla H_1$" + f"\ngap {both[1].gap:.3g}",
-    ]
-
-
 def test_rings_hold_their_dots_exactly_where_the_maps_commute(both):
     for panel, found in zip(draw_squares(both, STYLE).axes, both, strict=True):
         rings, dots = (np.array(line.get_data()) for line in panel.lines if line.get_marker() == "o")
@@ -155,21 +145,3 @@ def test_a_small_gap_is_shown_magnified_by_a_number_without_computer_notation(bo
     assert open_.child_axes[0].texts[0].get_text().startswith(r"$\times")
     numbers = {6.08: "6.1", 183.0: "180", 0.52: "0.52", 1.26e6: r"1.3\cdot10^{6}"}
     assert {number: _in_two_digits(number) for number in numbers} == numbers
-
-
-def test_a_title_does_not_break_an_equation_at_its_sign():
-    f, g = System("S' = -2*S*I; I' = 2*S*I - I"), System("S' = I; I' = 1")
-    found = squares(pair_of_systems(f, g, "1/10"), [1, 2], "1/10")
-    figure = draw_squares([found], STYLE, captions=[f"{f.labelled('f')}, {g.labelled('g')}"])
-    first, second, *_ = figure.axes[0].get_title().splitlines()
-    assert not first.endswith("=")
-    assert "1)" in second
-
-
-def test_a_square_has_four_arrows_and_named_corners():
-    found = [squares(pair, START, "1/50") for pair in pairs_of_member(load("paper_m2"))]
-    closed, open_ = draw_squares(found, STYLE).axes
-    assert len(closed.patches) == 4
-    names = {text.get_text() for text in closed.texts}
-    assert names == {"$x$", r"$\Phi_f x$", r"$\Phi_g x$", r"$\Phi_g\Phi_f x = \Phi_f\Phi_g x$"}
-    assert r"$\Phi_g\Phi_f x \neq \Phi_f\Phi_g x$" in {text.get_text() for text in open_.texts}
