@@ -123,7 +123,16 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, l
     gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]
     is_small = bool(np.hypot(*gap) < _SEEN)
     if squares.steps == 1:
-        _label_corners(axes, one, other, squares.closes, is_small, letter)
+        corners = [(one[0, 0], "$x$", ""), (one[1, 0], r"$\Phi_f x$", ""), (one[0, 1], r"$\Phi_g x$", "")]
+        if squares.closes or (squares.closes is False and is_small):
+            sign = "=" if squares.closes else r"\neq"
+            corners.append((one[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$", ""))
+        else:  # the names of the last two corners stand side by side
+            sides = ("right", "left") if one[1, 1, 0] < other[1, 1, 0] else ("left", "right")
+            corners += [(one[1, 1], r"$\Phi_g\Phi_f x$", sides[0]), (other[1, 1], r"$\Phi_f\Phi_g x$", sides[1])]
+        middle = np.nanmean(np.stack([point for point, _, _ in corners]), axis=0)
+        for point, text, side in corners:
+            _label(axes, point, text, middle, letter, side)
     else:
         _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0), letter)
     if squares.closes is False and is_small and np.any(gap != 0):
@@ -183,21 +192,6 @@ def _in_two_digits(number: float) -> str:
     """A positive number for a formula: 6.1, 180, or with a power of ten."""
     digits, power = f"{number:.1e}".split("e")
     return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
-
-
-def _label_corners(axes: Axes, one: Floats, other: Floats, closes: bool | None, small: bool, letter: float) -> None:
-    corners = [(one[0, 0], "$x$"), (one[1, 0], r"$\Phi_f x$"), (one[0, 1], r"$\Phi_g x$")]
-    if closes or (closes is False and small):
-        sign = "=" if closes else r"\neq"
-        corners.append((one[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$"))
-    else:
-        corners += [(one[1, 1], r"$\Phi_g\Phi_f x$"), (other[1, 1], r"$\Phi_f\Phi_g x$")]
-    middle = np.nanmean(np.stack([point for point, _ in corners]), axis=0)
-    sides = ["", "", "", ""]
-    if len(corners) == 5:  # the names of the last two corners stand side by side
-        sides[3:] = ("right", "left") if one[1, 1, 0] < other[1, 1, 0] else ("left", "right")
-    for (point, text), side in zip(corners, sides, strict=True):
-        _label(axes, point, text, middle, letter, side)
 
 
 def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:

@@ -172,33 +172,27 @@ def draw_heights(
                     last = curve.steps[-1]
                     n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
                     axes.plot(n, fit(n), zorder=1.5, **line)
-            axes.plot([], [], label=_height_label(some), markersize=3.2, **line, **mark)
+            # The legend: eps, the time step, and what kinds of growth were found.
+            label = rf"$\varepsilon = {label_number(eps)}$, $2\varepsilon = {label_number(2 * eps)}$"
+            label = label if some[0].has_eps else "heights"
+            several = list(dict.fromkeys(curve.kind for curve in some))
+            constants = [c for c in (curve.constant for curve in some) if c is not None]
+            ratios = [r for r in (curve.ratio for curve in some) if r is not None]
+            if len(several) > 1:
+                label += ": " + ", ".join(f"{sum(curve.kind is kind for curve in some)} {kind}" for kind in several)
+            elif several[0] in (Growth.QUADRATIC, Growth.LINEAR) and constants:
+                power = "n^2" if several[0] is Growth.QUADRATIC else "n"
+                label += rf": $c\,{power}$, $c$ = {_range_of(constants)}"
+            else:
+                is_known = several[0] is Growth.EXPONENTIAL and ratios
+                label += f": exponential, factor {_range_of(ratios)}" if is_known else f": {several[0]}"
+            axes.plot([], [], label=label, markersize=3.2, **line, **mark)
         if scale == "linear":
             axes.set_ylim(bottom=0)
         axes.set_xlabel("step $n$")
         axes.set_ylabel("height $h_n$ (bits)")
         legend_above(figure, *axes.get_legend_handles_labels(), style, most=1)
     return figure
-
-
-def _height_label(curves: Sequence[HeightCurve]) -> str:
-    """A line of the legend: eps, the time step, and what kinds of growth were found."""
-    eps = curves[0].eps
-    head = rf"$\varepsilon = {label_number(eps)}$, $2\varepsilon = {label_number(2 * eps)}$"
-    if not curves[0].has_eps:
-        head = "heights"
-    kinds = list(dict.fromkeys(curve.kind for curve in curves))
-    if len(kinds) > 1:
-        counts = ", ".join(f"{sum(curve.kind is kind for curve in curves)} {kind}" for kind in kinds)
-        return f"{head}: {counts}"
-    constants = [c for c in (curve.constant for curve in curves) if c is not None]
-    ratios = [r for r in (curve.ratio for curve in curves) if r is not None]
-    if kinds[0] in (Growth.QUADRATIC, Growth.LINEAR) and constants:
-        power = "n^2" if kinds[0] is Growth.QUADRATIC else "n"
-        return rf"{head}: $c\,{power}$, $c$ = {_range_of(constants)}"
-    if kinds[0] is Growth.EXPONENTIAL and ratios:
-        return f"{head}: exponential, factor {_range_of(ratios)}"
-    return f"{head}: {kinds[0]}"
 
 
 def _range_of(values: Sequence[float]) -> str:

@@ -142,7 +142,78 @@ class MachineCode:
     """A step as machine code for vectors of `width` orbits, which takes ranges of orbits through steps."""
 
     def __init__(self, step: FloatStep, width: int) -> None:
-        self._engine, self._call = _compiled(_text(step, width))
+        if step.fast_code is None or step.careful_code is None:
+            raise ValueError("a step that is not written out has no machine code")
+        rows = range(step.rows)
+
+        def splat(kind: str, value: Any) -> str:
+            return "<" + ", ".join([f"{kind} {value}"] * width) + ">"
+
+        def number(x: Any) -> str:
+            if isinstance(x, bool):
+                return splat("i1", int(x))
+            return splat("double", f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}")
+
+        def body(code: Code, prefix: str) -> tuple[str, list[str]]:
+            """The operations, and the names of the outputs."""
+
+            def name(x: Any) -> str:
+                if not isinstance(x, Value):
+                    return number(x)
+                return f"%x{x.number}" if x.number < code.inputs else f"%{prefix}{x.number}"
+
+            lines = []
+            for k, (operation, operands) in enumerate(code.operations, code.inputs):
+                x = [name(operand) for operand in operands]
+                if operation in ("max", "min"):
+                    lines.append(f"%{prefix}{k}.c = fcmp {'ogt' if operation == 'max' else 'olt'} $v {x[0]}, {x[1]}")
+                    x, operation = [f"%{prefix}{k}.c", *x], "select"
+                lines.append(f"%{prefix}{k} = {_FORMS[operation].format(*x)}")
+            return "\n".join(lines), [name(x) for x in code.outputs]
+
+        def of_rows(*lines: str) -> str:
+            """Lines for each row, with its number, and the names of its image by the fast and the careful step."""
+            return "\n".join(line.format(i=i, fast=image[i], careful=again[i]) for i in rows for line in lines)
+
+        def stored(name: str, table: str, place: str, value: str) -> str:
+            return of_rows(
+                f"%{name}{{i}}.r = mul i64 %n, {{i}}",
+                f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {place}",
+                f"%{name}{{i}}.p = getelementptr double, ptr {table}, i64 %{name}{{i}}.o",
+                f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
+            )
+
+        fast, (*image, good) = body(step.fast_code, "f")
+        careful, (*again, near, singular, overflow) = body(step.careful_code, "c")
+        parts = {
+            "load": f"%record = mul i64 %n, {step.rows}\n"
+            + of_rows(
+                "%z{i}.r = mul i64 %n, {i}",
+                "%z{i}.o = add i64 %z{i}.r, %at",
+                "%z{i}.p = getelementptr double, ptr %z, i64 %z{i}.o",
+                "%z{i} = call $v @llvm.masked.load.$s.p0(ptr %z{i}.p, i32 8, $m %there, $v zeroinitializer)",
+            ),
+            "states": of_rows("%x{i} = phi $v [%z{i}, %vector], [%y{i}, %kept1]"),
+            "fast": fast,
+            "careful": careful,
+            "choose": of_rows(
+                "%k{i} = select $m %fine, $v {fast}, $v {careful}",
+                "%e{i} = select $m %ended, $v zeroinitializer, $v %k{i}",
+            ),
+            "images": of_rows("%y{i} = phi $v [{fast}, %loop], [%e{i}, %careful]"),
+            "keep0": stored("s", "%table0", "%place0", "%y{i}"),
+            "keep1": stored("t", "%table1", "%place1", "%y{i}"),
+            "store": of_rows("%r{i} = select $m %dead.after, $v zeroinitializer, $v %y{i}")
+            + "\n"
+            + stored("u", "%z", "%at", "%r{i}"),
+        }
+        words = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
+        words |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
+        words |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
+        words |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
+        words |= {"singular": singular, "overflow": overflow}
+        text = Template(_LOOPS.safe_substitute(parts)).substitute(words)
+        self._engine, self._call = _compiled(text)
 
     def advance(self, lanes: Lanes, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
         """Take the orbits low, ..., high - 1 `steps` steps from the index `first`; there are at most two tables."""
@@ -168,78 +239,3 @@ def _compiled(text: str) -> tuple[Any, Any]:
     engine.finalize_object()
     kinds = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
     return engine, ctypes.CFUNCTYPE(None, *kinds)(engine.get_function_address("advance"))
-
-
-def _text(step: FloatStep, width: int) -> str:
-    """The module in LLVM's language."""
-    if step.fast_code is None or step.careful_code is None:
-        raise ValueError("a step that is not written out has no machine code")
-    rows = range(step.rows)
-
-    def splat(kind: str, value: Any) -> str:
-        return "<" + ", ".join([f"{kind} {value}"] * width) + ">"
-
-    def number(x: Any) -> str:
-        if isinstance(x, bool):
-            return splat("i1", int(x))
-        return splat("double", f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}")
-
-    def body(code: Code, prefix: str) -> tuple[str, list[str]]:
-        """The operations, and the names of the outputs."""
-
-        def name(x: Any) -> str:
-            if not isinstance(x, Value):
-                return number(x)
-            return f"%x{x.number}" if x.number < code.inputs else f"%{prefix}{x.number}"
-
-        lines = []
-        for k, (operation, operands) in enumerate(code.operations, code.inputs):
-            x = [name(operand) for operand in operands]
-            if operation in ("max", "min"):
-                lines.append(f"%{prefix}{k}.c = fcmp {'ogt' if operation == 'max' else 'olt'} $v {x[0]}, {x[1]}")
-                x, operation = [f"%{prefix}{k}.c", *x], "select"
-            lines.append(f"%{prefix}{k} = {_FORMS[operation].format(*x)}")
-        return "\n".join(lines), [name(x) for x in code.outputs]
-
-    def of_rows(*lines: str) -> str:
-        """Lines for each row, with its number, and the names of its image by the fast and the careful step."""
-        return "\n".join(line.format(i=i, fast=image[i], careful=again[i]) for i in rows for line in lines)
-
-    def stored(name: str, table: str, place: str, value: str) -> str:
-        return of_rows(
-            f"%{name}{{i}}.r = mul i64 %n, {{i}}",
-            f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {place}",
-            f"%{name}{{i}}.p = getelementptr double, ptr {table}, i64 %{name}{{i}}.o",
-            f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
-        )
-
-    fast, (*image, good) = body(step.fast_code, "f")
-    careful, (*again, near, singular, overflow) = body(step.careful_code, "c")
-    parts = {
-        "load": f"%record = mul i64 %n, {step.rows}\n"
-        + of_rows(
-            "%z{i}.r = mul i64 %n, {i}",
-            "%z{i}.o = add i64 %z{i}.r, %at",
-            "%z{i}.p = getelementptr double, ptr %z, i64 %z{i}.o",
-            "%z{i} = call $v @llvm.masked.load.$s.p0(ptr %z{i}.p, i32 8, $m %there, $v zeroinitializer)",
-        ),
-        "states": of_rows("%x{i} = phi $v [%z{i}, %vector], [%y{i}, %kept1]"),
-        "fast": fast,
-        "careful": careful,
-        "choose": of_rows(
-            "%k{i} = select $m %fine, $v {fast}, $v {careful}",
-            "%e{i} = select $m %ended, $v zeroinitializer, $v %k{i}",
-        ),
-        "images": of_rows("%y{i} = phi $v [{fast}, %loop], [%e{i}, %careful]"),
-        "keep0": stored("s", "%table0", "%place0", "%y{i}"),
-        "keep1": stored("t", "%table1", "%place1", "%y{i}"),
-        "store": of_rows("%r{i} = select $m %dead.after, $v zeroinitializer, $v %y{i}")
-        + "\n"
-        + stored("u", "%z", "%at", "%r{i}"),
-    }
-    words = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
-    words |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
-    words |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
-    words |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
-    words |= {"singular": singular, "overflow": overflow}
-    return Template(_LOOPS.safe_substitute(parts)).substitute(words)

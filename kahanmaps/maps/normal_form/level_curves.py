@@ -13,7 +13,7 @@ from typing import Any
 from flint import fmpz, fq_default_ctx
 
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.schoof import trace_modulo
+from kahanmaps.maps.normal_form.schoof import by_doublings, trace_modulo
 
 AffinePoint = tuple[Any, Any]
 
@@ -57,12 +57,7 @@ class Jacobian:
 
     def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
         """n P for n >= 0."""
-        total: AffinePoint | None = None
-        for bit in bin(n)[2:]:
-            total = self.add(total, total)
-            if bit == "1":
-                total = self.add(total, P)
-        return total
+        return by_doublings(self.add, None, n, P)
 
     def multiples(self, P: AffinePoint | None, length: int) -> tuple[list[AffinePoint], int | None]:
         """P, 2P, ..., `length` P and None; if one of about these is zero, some of them and the order of P."""
@@ -215,12 +210,8 @@ class LevelCubic:
 
     def multiple(self, n: int, P: Triple) -> Triple:
         """n P for n >= 0."""
-        total = self.zero
-        for bit in bin(n)[2:]:
-            total = self.add(total, total)
-            if bit == "1":
-                total = self.add(total, P)
-        return total
+        found: Triple = by_doublings(self.add, self.zero, n, P)
+        return found
 
     def is_zero(self, P: Triple) -> bool:
         """Whether P is the zero of the group."""
@@ -246,24 +237,22 @@ class LevelCubic:
                 continue
             if prime > _LARGEST_DIGIT:
                 unknown = True
-            elif not self._is_power(self.multiple(order // power, P), self.multiple(order // power, T), prime, power):
+                continue
+            # The logarithm of the part of P for that of T, whose order is `power`, digit by digit (Pohlig and Hellman).
+            part, base = self.multiple(order // power, P), self.multiple(order // power, T)
+            top, unit = self.multiple(power // prime, base), 1
+            while unit < power:
+                # The part is unit (...) and what has been taken off, so far.
+                rest, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
+                while not same_point(rest, step):
+                    digit, step = digit + 1, self.add(step, top)
+                    if digit == prime:
+                        return False
+                part = self.subtract(part, self.multiple(digit * unit, base))
+                unit *= prime
+            if not self.is_zero(part):
                 return False
         return None if unknown else True
-
-    def _is_power(self, P: Triple, T: Triple, prime: int, power: int) -> bool:
-        """Whether P is a multiple of T, which has the order `power`, a power of the prime, and power P = 0."""
-        top = self.multiple(power // prime, T)
-        unit = 1
-        while unit < power:
-            # P = unit (...) + what has been taken off, so far.
-            rest, digit, step = self.multiple(power // prime // unit, P), 0, self.zero
-            while not same_point(rest, step):
-                digit, step = digit + 1, self.add(step, top)
-                if digit == prime:
-                    return False
-            P = self.subtract(P, self.multiple(digit * unit, T))
-            unit *= prime
-        return self.is_zero(P)
 
 
 def _dot(P: Triple, Q: Triple) -> Any:

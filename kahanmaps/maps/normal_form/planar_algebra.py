@@ -65,7 +65,7 @@ class AlgebraBlock(LevelBlock):
 
     def bits(self, triple: Triple) -> tuple[int, int]:
         """About the bit lengths of numerators and denominator of `fraction`."""
-        U, V, W = (_bits(entry) for entry in triple)
+        U, V, W = (max((int(abs(c.p).bit_length()) for c in entry.polynomial.coeffs()), default=1) for entry in triple)
         if triple[2].polynomial.degree() == 0:
             below = int(sum(entry.polynomial.denom().bit_length() for entry in triple))
             return max(U, V) + below, W + below
@@ -262,7 +262,3 @@ def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:
         norm += entry * shifted.polynomial[0]
         shifted = shifted * algebra.generator
     return cofactor, norm
-
-
-def _bits(element: EtaleElement) -> int:
-    return max((int(abs(entry.p).bit_length()) for entry in element.polynomial.coeffs()), default=1)

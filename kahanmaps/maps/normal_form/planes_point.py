@@ -141,7 +141,13 @@ class PlanesPoint:
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced, denominators positive."""
         planes = [(above, W) for above, W, _ in self._fractions]
-        suspects = _shared([W for _, W in planes])
+        suspects = fmpz(1)  # with all primes that divide two of the W
+        *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest is only reduced
+        while others:
+            number = others.pop()
+            suspects = suspects * number.gcd(product % number)
+            if others:
+                product = product * number
         for _, _, primes in self._fractions:
             suspects = suspects * primes
         modulus = (self._assembly.fixed * suspects) ** _POWER
@@ -204,17 +210,3 @@ def _common_part(above: fmpz, below: fmpz, modulus: fmpz) -> fmpz:
     """What two numbers and the modulus have in common: all of it, unless one of its primes is there to a high power."""
     common = modulus.gcd(above % modulus)
     return common if common == 1 else common.gcd(below % common)
-
-
-def _shared(numbers: Sequence[fmpz]) -> fmpz:
-    """A number with all primes that divide two of these."""
-    *others, product = sorted(numbers, key=fmpz.bit_length)  # the longest one is only reduced modulo others
-    shared = fmpz(1)
-    while others:
-        number = others.pop()
-        common = number.gcd(product % number)
-        if common != 1:
-            shared = shared * common
-        if others:
-            product = product * number
-    return shared

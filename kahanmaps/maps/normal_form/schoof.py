@@ -8,6 +8,7 @@ modulo f gives a divisor of f, which serves as well. FLINT's polynomials make it
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from flint import fmpz, fq_default_ctx, fq_default_poly_ctx
@@ -53,14 +54,15 @@ class _Torsion:
         above = (slope * slope % f * self.c - X - Z) % f
         return above, (slope * (X - above) - Y) % f
 
-    def multiple(self, n: int, P: Point) -> Point:
-        """n P for n >= 0. Raises _Divisor."""
-        total: Point = None
-        for bit in bin(n)[2:]:
-            total = self.add(total, total)
-            if bit == "1":
-                total = self.add(total, P)
-        return total
+
+def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
+    """n P for n >= 0 in the group with this sum and zero."""
+    total = zero
+    for bit in bin(n)[2:]:
+        total = add(total, total)
+        if bit == "1":
+            total = add(total, P)
+    return total
 
 
 def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:
@@ -102,7 +104,7 @@ def _trace_at(prime: int, torsion: _Torsion, x: Poly, q: int) -> int:
     one = 0 * x + 1
     once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
     twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
-    wanted = torsion.add(twice, torsion.multiple(q % prime, (x % f, one)))
+    wanted = torsion.add(twice, by_doublings(torsion.add, None, q % prime, (x % f, one)))
     if wanted is None:
         return 0
     image: Point = None
