@@ -6,7 +6,6 @@ sums are wanted); the levels are smooth. See planar_block.py for the cubic E, it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isqrt
 from typing import Any
 
@@ -18,7 +17,6 @@ from kahanmaps.maps.normal_form.schoof import by_doublings, trace_modulo
 AffinePoint = tuple[Any, Any]
 
 _LARGEST_DIGIT = 2000
-_GIANTS_AT_ONCE = 2048
 _RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm, with about 2^17 steps
 
 
@@ -59,46 +57,6 @@ class Jacobian:
         """n P for n >= 0."""
         return by_doublings(self.add, None, n, P)
 
-    def multiples(self, P: AffinePoint | None, length: int) -> tuple[list[AffinePoint], int | None]:
-        """P, 2P, ..., `length` P and None; if one of about these is zero, some of them and the order of P."""
-        if P is None:
-            return [], 1
-        points = [P]
-        while (k := len(points)) < length:
-            # j P + k P for all j < k, and the double of k P.
-            X, Y = points[-1]
-            others = points[: min(k - 1, length - k)]
-            differences = [x - X for x, _ in others]
-            for j, difference in enumerate(differences, 1):
-                if difference == 0:
-                    return points, j + k
-            for (x, y), inverse in zip(others, inverses(differences), strict=True):
-                slope = (y - Y) * inverse
-                above = slope * slope - self.a2 - x - X
-                points.append((above, slope * (X - above) - Y))
-            if len(points) < length:
-                double = self.add((X, Y), (X, Y))
-                if double is None:
-                    return points, 2 * k
-                points.append(double)
-        return points, None
-
-
-def inverses(values: Sequence[Any]) -> list[Any]:
-    """The inverses of elements none of which is zero, with one division."""
-    if not values:
-        return []
-    products = [values[0]]
-    for value in values[1:]:
-        products.append(products[-1] * value)
-    inverse = 1 / products.pop()
-    found = []
-    for value, before in zip(reversed(values[1:]), reversed(products), strict=True):
-        found.append(inverse * before)
-        inverse = inverse * value
-    found.append(inverse)
-    return found[::-1]
-
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
     """The order of T over GF(q), or the field of q elements that is given; gamma is not 0 or 1.
@@ -110,8 +68,9 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
     curve = Jacobian(gamma)
     radius, middle, unit = isqrt(4 * q), q + 1, 1
     if q < 1000:
-        _, order = curve.multiples(curve.T, 2 * q + 2)
-        assert order is not None
+        point, order = curve.add(curve.T, None), 1
+        while point is not None:
+            point, order = curve.add(point, curve.T), order + 1
         return order
     if radius > _RADIUS:
         field = fq_default_ctx(q, 1) if context is None else context
@@ -132,39 +91,26 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
 
     m is sought as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
     """
-    babies, order = curve.multiples(curve.multiple(unit, curve.T), isqrt(radius) + 2)
-    if order is not None:
-        return unit * order
-    stride = (2 * len(babies) + 1) * unit
-    centre, leap = curve.multiple(middle, curve.T), curve.multiple(stride, curve.T)
-    if centre is None:
-        return middle
-    index = {x: j * unit for j, (x, _) in enumerate(babies, 1)}
-    giants, order = curve.multiples(leap, radius * unit // stride + 2)
-    if order is not None:
-        return stride * order
-    if centre[0] in index:
-        return _matched(middle, index[centre[0]], centre, babies, unit)
-    for first in range(0, len(giants), _GIANTS_AT_ONCE):
-        batch = giants[first : first + _GIANTS_AT_ONCE]
-        differences = [x - centre[0] for x, _ in batch]
-        for i, difference in enumerate(differences, first + 1):
-            if difference == 0:  # i leaps lead to the centre or to its negative
-                return abs(middle - i * stride if giants[i - 1] == centre else middle + i * stride)
-        shift = curve.a2 + centre[0]
-        for i, ((x, y), inverse) in enumerate(zip(batch, inverses(differences), strict=True), first + 1):
-            for sign, rise in ((1, y - centre[1]), (-1, -y - centre[1])):
-                slope = rise * inverse
-                above = slope * slope - shift - x
-                if above in index:
-                    point = (above, slope * (centre[0] - above) - centre[1])
-                    return _matched(middle + sign * i * stride, index[above], point, babies, unit)
+    babies, step = isqrt(radius) + 2, curve.multiple(unit, curve.T)
+    index: dict[Any, tuple[int, Any]] = {}
+    point = step
+    for j in range(1, babies + 1):
+        if point is None:
+            return unit * j
+        index.setdefault(point[0], (unit * j, point[1]))
+        point = curve.add(point, step)
+    stride = (2 * babies + 1) * unit
+    leap, up = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
+    back, down = curve.negative(leap), up
+    for i in range(radius * unit // stride + 3):
+        for k, point in ((middle + i * stride, up), (middle - i * stride, down)):
+            if point is None:
+                return abs(k)
+            if point[0] in index:
+                j, y = index[point[0]]  # k T = +-j T
+                return abs(k - j if point[1] == y else k + j)
+        up, down = curve.add(up, leap), curve.add(down, back)
     raise AssertionError("no multiple of T in the Hasse interval is zero: it would be a mistake of ours")
-
-
-def _matched(k: int, j: int, point: AffinePoint, babies: list[AffinePoint], unit: int) -> int:
-    """k - j or k + j, for k T = `point` = +-j T."""
-    return abs(k - j if point[1] == babies[j // unit - 1][1] else k + j)
 
 
 class LevelCubic:
