@@ -28,7 +28,6 @@ from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form import tau, translation
 from kahanmaps.maps.normal_form.periods import PeriodKind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import Block, PlanesPoint
 from kahanmaps.maps.normal_form.steps import NormalSteps
 
@@ -110,7 +109,7 @@ class OrbitInPlanes:
         The value is None if it was not computed, or is at a pole.
         """
         step = max(1, min(self._far, n - 1))
-        target = n if self._is_lazy or self._is_within(n, step) else _halved(n, step)
+        target = n if self._is_lazy else _halved(n, step)
         before: tuple[int, int] | None = None
         while True:
             try:
@@ -129,23 +128,6 @@ class OrbitInPlanes:
             before = here
             # Four times the size is borne, but not more: heights may grow like n^2.
             target = _halved(n, target) if 4 * here[1] <= self._limit else min(n, target + target // 2)
-
-    def _is_within(self, n: int, step: int) -> bool:
-        """Whether the n-th point surely is within the budget, from bounds that need no point; the `step` is.
-
-        It is left undecided, False, where the limit may come soon after a step on the way.
-        """
-        if not all(isinstance(block, IntegerBlock) for block in self._blocks):
-            return False
-        while True:
-            step = _halved(n, step)
-            pairs = zip(self._blocks, self._planes, strict=True)
-            bits = [tau.most_bits(block, plane.reduced(step)) for block, plane in pairs]
-            total = sum(known or 0 for known in bits) + self._assembly.excess
-            if None in bits or total > self._limit or (step < n and 4 * total > self._limit):
-                return False
-            if step == n:
-                return True
 
     def _point(self, n: int) -> PlanesPoint:
         """Phi^n(start), poles on the way passed over. Raises SingularStep at a pole."""

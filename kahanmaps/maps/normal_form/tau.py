@@ -56,24 +56,13 @@ def iterate(block: Any, n: int) -> Triple | None:
     if block.is_constant:
         at_rest: Triple = block.start
         return at_rest
-    table = _shared_table(block)
+    if block.table is None or block.table.points_taken >= _SHARED:
+        block.table = table_near(block)
+    table: TauTable | None = block.table
     if table is None or n - table.base < _FIRST:
         return None
     table.points_taken += 1
     return table.point(n - table.base)
-
-
-def most_bits(block: Any, n: int) -> int | None:
-    """A number of bits that no entry of P_n over Q has more of, from what P_n is made of; None as for `iterate`."""
-    table = None if block.is_constant else _shared_table(block)
-    return None if table is None or n - table.base < _FIRST else table.most_bits(n - table.base)
-
-
-def _shared_table(block: Any) -> TauTable | None:
-    if block.table is None or block.table.points_taken >= _SHARED:
-        block.table = table_near(block)
-    table: TauTable | None = block.table
-    return table
 
 
 def table_near(block: Any) -> TauTable | None:
@@ -147,18 +136,8 @@ class TauTable:
         self._product = n + 1, here * after
         ahead = self._product[1]
         terms = [before * after * chi.integer(n), ahead * chi.integer(n - 1), behind * chi.integer(n + 1)]
-        found: Triple = self._numbers.combined([self._one, *self._ratios(n)], terms, self._lifts, self._divisor)
+        # Scales, over that of the first term.
+        ratio = chi.ratio(n)
+        scales = [self._one, chi.part(n) / ratio, ratio / psi.part(n)]
+        found: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
         return found
-
-    def _ratios(self, n: int) -> tuple[Any, Any]:
-        """The scales of the second and of the third term over that of the first."""
-        ratio = self.chi.ratio(n)
-        return self.chi.part(n) / ratio, ratio / self.psi.part(n)
-
-    def most_bits(self, n: int) -> int:
-        """What the terms of P_n may have at most, over Q."""
-        psi, chi = ([table.integer(n + k).bit_length() for k in (-1, 0, 1)] for table in (self.psi, self.chi))
-        scales = sum(scale.p.bit_length() + scale.q.bit_length() for scale in self._ratios(n))
-        terms = max(sum(psi) - one + other for one, other in zip(psi, chi, strict=True))
-        lifts = max(entry.bit_length() for lift in self._lifts for entry in lift)
-        return int(terms + scales + lifts + 2)
