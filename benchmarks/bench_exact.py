@@ -22,8 +22,7 @@ from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 from work import Absent, Row, Work, gp_version, peer, require_equal, row, run_gp, say, table, timed, with_chi, work
 
 from kahanmaps import QQ, KahanMap, Orbit, QuadraticSystem
-from kahanmaps.maps.normal_form.planes_point import PlanesPoint
-from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.planes_point import NormalSteps, PlanesPoint
 
 Pairs = list[tuple[fmpz, fmpz]]  # the coordinates in lowest terms, denominators positive
 Runner = Callable[[Work, int], tuple[float, Pairs]]  # time and last iterate

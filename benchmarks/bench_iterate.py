@@ -24,8 +24,7 @@ from work import Absent, Row, Work, require_equal, row, run_gp, say, table, time
 from kahanmaps import Orbit, load
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.maps.normal_form.iterate import NthIterate
-from kahanmaps.maps.normal_form.planes_point import PlanesPoint
-from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.planes_point import NormalSteps, PlanesPoint
 
 OVER_Q, MODULO, BALLS = "The n-th iterate over Q", "The n-th iterate over GF(2^61 - 1)", "The n-th iterate in balls"
 CATALOGUE = "The n-th iterate on elliptic curves of the catalogue"

@@ -116,7 +116,7 @@ from .maps.normal_form.iterate import NthIterate as NthIterate
 from .maps.normal_form.periods import orbit_period as orbit_period
 from .maps.normal_form.periods import period as period
 from .maps.normal_form.periods import period_over_rationals as period_over_rationals
-from .maps.normal_form.steps import NormalSteps as NormalSteps
+from .maps.normal_form.planes_point import NormalSteps as NormalSteps
 from .maps.orbits.arithmetic import Arithmetic as Arithmetic
 from .maps.orbits.iteration import Orbit as Orbit
 from .maps.orbits.orbit import orbit as orbit

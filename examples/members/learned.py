@@ -15,7 +15,7 @@ from flint import fmpq
 import kahanmaps as km
 from kahanmaps.experiments.results.recipes import system_from
 from kahanmaps.experiments.results.records import Row
-from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.planes_point import NormalSteps
 
 
 def results(store: km.Store, *experiments: str) -> Iterator[tuple[Row, dict]]:

@@ -22,7 +22,7 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, decimal_text, height, height_growth
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
-from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.planes_point import NormalSteps
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
 

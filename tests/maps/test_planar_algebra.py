@@ -20,7 +20,7 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import tau
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
-from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.planes_point import NormalSteps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import Orbit
 

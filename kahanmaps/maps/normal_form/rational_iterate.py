@@ -28,8 +28,7 @@ from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form import tau, translation
 from kahanmaps.maps.normal_form.periods import PeriodKind, plane_period_over_rationals
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.planes_point import Block, PlanesPoint
-from kahanmaps.maps.normal_form.steps import NormalSteps
+from kahanmaps.maps.normal_form.planes_point import Block, NormalSteps, PlanesPoint
 
 _RISE = 16  # steps over which a rise of the heights is more than a fluctuation
 _WALKED = 256  # steps taken exactly at first,

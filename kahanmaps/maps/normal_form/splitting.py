@@ -58,10 +58,8 @@ class Splitting:
                 raise BadPrime(f"eps = 0 in {field}: take another prime", field.characteristic)
             self._inverse = field.convert_matrix(S.inv())
             # The planes, and for each the coefficients in K of the elements that its own coefficients stand for.
-            if field is QQ:
-                planes, lifts = _over_rationals(form)
-            elif isinstance(field, PrimeField):
-                planes, lifts = _modulo(form, field)
+            if field is QQ or isinstance(field, PrimeField):
+                planes, lifts = _by_factors(form, field)
             elif isinstance(field, BallField):
                 planes, lifts = _over_balls(form, field)
             else:
@@ -115,91 +113,77 @@ class Splitting:
             return tuple(entry / self._scale for entry in total)
 
 
-def _over_rationals(form: NormalForm) -> tuple[list[Plane], list[list[list[Any]]]]:
-    planes, lifts = [], []
-    for factor in rational_factors(form.chi):
-        degree, generator = int(factor.degree()), fmpq_poly([0, 1])
+def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
+    """The planes over Q or GF(p), one for each irreducible factor of chi."""
+    p = field.characteristic
+    if p:
+        ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
+        chi, *elements = (
+            ring([fmpz(int(field.convert(c))) for c in f.coeffs()] or [0]) for f in (form.chi, *form.coefficients)
+        )
+        if any(exponent > 1 for _, exponent in chi.factor()[1]):
+            raise BadPrime(f"chi has a repeated root modulo {p}: take another prime", p)
+        factors = sorted((f for f, _ in chi.factor()[1]), key=lambda f: (f.degree(), [int(c) for c in f.coeffs()]))
+    else:
+        chi, elements, factors = form.chi, form.coefficients, rational_factors(form.chi)
+
+    def polynomial(coefficients: Sequence[Any]) -> Any:
+        return ring([fmpz(int(c)) for c in coefficients]) if p else fmpq_poly(list(coefficients))
+
+    def planes_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
+        """The plane of a factor, and the coefficients in K of its basis: what is that there and 0 in the others."""
+        degree, generator, context = int(factor.degree()), polynomial([0, 1]), None
+        residue: Any
+        coefficients: Any
         if degree == 1:
             root = -factor[0]
+            name = f"t = {int(root)} mod {p}" if p else f"t = {root}"
 
-            def residue(z: Sequence[fmpq], root: fmpq = root) -> fmpq:
-                return fmpq_poly(list(z))(root)
+            def residue(z: Sequence[Any]) -> Any:
+                value = polynomial(z)(root)
+                return field.convert(int(value)) if p else value
 
-            plane = Plane(
-                f"t = {root}", 1, PlanarBlock(*(c(root) for c in form.coefficients)), residue, lambda value: [value]
-            )
+            def coefficients(value: Any) -> list[Any]:
+                return [value]
+
+        elif p:
+            context = fq_default_ctx(modulus=factor)
+            name = f"a factor of degree {degree} of chi mod {p}"
+
+            def residue(z: Sequence[Any]) -> Any:
+                return context([int(c) for c in (polynomial(z) % factor).coeffs()] or [0])
+
+            def coefficients(value: Any) -> list[Any]:
+                known = [field.convert(int(c)) for c in value.to_list()]
+                return known + [field.zero] * (degree - len(known))
+
         else:
             # The generator is a multiple of t that is integral.
             common = factor.denom()
             over, generator = fmpq_poly([0, fmpq(1, common)]), fmpq_poly([0, common])
-            algebra = EtaleAlgebra(factor(over) * common**degree)
+            algebra, name = EtaleAlgebra(factor(over) * common**degree), f"{format_univariate(factor)} = 0"
 
-            def residue_class(z: Sequence[fmpq], algebra: EtaleAlgebra = algebra, over: fmpq_poly = over) -> Any:
+            def residue(z: Sequence[Any]) -> Any:
                 return algebra.convert(fmpq_poly(list(z))(over))
 
-            block = PlanarBlock(*(residue_class(c.coeffs()) for c in form.coefficients))
-            plane = Plane(
-                f"{format_univariate(factor)} = 0", degree, block, residue_class, lambda value: value.coefficients
-            )
-        planes.append(plane)
-        # The element that is 1 modulo this factor and 0 modulo the others.
-        others = form.chi // factor
-        _, inverse, _ = others.xgcd(factor)
-        unit = others * inverse % form.chi
-        lifts.append([[(unit * generator**k % form.chi)[i] for i in range(form.m)] for k in range(degree)])
-    return planes, lifts
+            def coefficients(value: Any) -> Any:
+                return value.coefficients
+
+        block = PlanarBlock(*(residue(e.coeffs()) for e in elements))
+        others = chi // factor
+        unit = others * others.xgcd(factor)[1] % chi
+        powers = [unit * generator**k % chi for k in range(degree)]
+        lift = [[field.convert(int(f[i]) if p else f[i]) for i in range(form.m)] for f in powers]
+        return Plane(name, degree, block, residue, coefficients, context), lift
+
+    planes, lifts = zip(*map(planes_of, factors), strict=True)
+    return list(planes), list(lifts)
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
     """The monic irreducible factors over Q: linear ones by increasing root, then by degree and coefficients."""
     factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
-
-
-def _modulo(form: NormalForm, field: PrimeField) -> tuple[list[Plane], list[list[list[Any]]]]:
-    p = field.prime
-    ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
-
-    def polynomial(coefficients: Sequence[Any]) -> Any:
-        return ring([fmpz(int(c)) for c in coefficients])
-
-    chi = polynomial([field.convert(c) for c in form.chi.coeffs()])
-    elements = [polynomial([field.convert(c) for c in e.coeffs()] or [0]) for e in form.coefficients]
-    factors = chi.factor()[1]
-    if any(exponent > 1 for _, exponent in factors):
-        raise BadPrime(f"chi has a repeated root modulo {p}: take another prime", p)
-    planes, lifts = [], []
-    for factor, _ in sorted(factors, key=lambda pair: (pair[0].degree(), [int(c) for c in pair[0].coeffs()])):
-        degree = int(factor.degree())
-        if degree == 1:
-            root = -factor[0]
-
-            def residue(z: Sequence[Any], root: Any = root) -> Any:
-                return field.convert(int(polynomial(z)(root)))
-
-            block = PlanarBlock(*(field.convert(int(e(root))) for e in elements))
-            plane = Plane(f"t = {int(root)} mod {p}", 1, block, residue, lambda value: [value])
-        else:
-            extension = fq_default_ctx(modulus=factor)
-
-            def residue_class(z: Sequence[Any], factor: Any = factor, extension: Any = extension) -> Any:
-                return extension([int(c) for c in (polynomial(z) % factor).coeffs()] or [0])
-
-            def coefficients(value: Any, degree: int = degree) -> list[Any]:
-                known = [field.convert(int(c)) for c in value.to_list()]
-                return known + [field.zero] * (degree - len(known))
-
-            block = PlanarBlock(*(residue_class(e.coeffs()) for e in elements))
-            name = f"a factor of degree {degree} of chi mod {p}"
-            plane = Plane(name, degree, block, residue_class, coefficients, extension)
-        planes.append(plane)
-        others = chi // factor
-        _, inverse, _ = others.xgcd(factor)
-        unit = others * inverse % chi
-        t = ring([0, 1])
-        powers = [unit * t**k % chi for k in range(degree)]
-        lifts.append([[field.convert(int(power[i])) for i in range(form.m)] for power in powers])
-    return planes, lifts
 
 
 def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:

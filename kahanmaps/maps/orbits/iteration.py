@@ -243,7 +243,7 @@ class Orbit(Displayed):
         """The start and its images; ends, or raises SingularStep, where the map has no value."""
         field = self.map.field
         if self.normal_form is not None and field is QQ:
-            from kahanmaps.maps.normal_form.steps import NormalSteps
+            from kahanmaps.maps.normal_form.planes_point import NormalSteps
 
             yield from NormalSteps(self.normal_form, self.map.eps).points(self.start)
         elif self._jump is not None:
