@@ -14,7 +14,6 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.scan.conditions import beside
 from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
-from kahanmaps.laboratory.scan.sweep import Sweep
 from kahanmaps.plots.curves.level_sets import level_curves
 from kahanmaps.plots.figures import beside as write
 from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
@@ -61,7 +60,21 @@ def draw_scan(
         if modulo not in known:
             tried = ", ".join(map(str, known)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
-        return _draw(found, style, _modulo(known[modulo], kinds), ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
+        # The slow members, each with the growth of a component that it is on and has the degrees of.
+        rest = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
+        slow = []
+        for kind, some in kinds.items():
+            dots, labels = [], []
+            for one in some:
+                before = rest.get(one.degrees, [])
+                rest[one.degrees] = beside(before, [one], modulo) if before else []
+                on = sorted(set(before) - set(rest[one.degrees]))
+                dots += on
+                labels += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
+            slow.append(_Kind(kind, dots, [], labels))
+        if left := [point for points in rest.values() for point in points]:
+            slow.append(_Kind("on no component", left, [], []))
+        return _draw(found, style, slow, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
     points = {kind: [_place(one) for one in some if one.is_rational_point] for kind, some in kinds.items()}
     if window is None:
         every = [place for some in points.values() for place in some]
@@ -76,7 +89,6 @@ def draw_scan(
             function = PointFunction(one.text, RationalFunction(equation, context.constant(1)))
             if pieces := level_curves(function, (0, 1), 2, [0.0], window)[0]:
                 curves.append((one.text, pieces))
-        labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(one.text, [_place(one)]) for one in some if one.is_rational_point]
         for text, pieces in curves:  # on the longest piece, first where other curves seldom cross it: off the middle
             longest = max(pieces, key=len)
@@ -97,23 +109,6 @@ class _Kind:
     points: Sequence[tuple[float, ...]]
     curves: Sequence[np.ndarray]
     labels: Sequence[tuple[str, Sequence[tuple[float, ...]]]]
-
-
-def _modulo(sweep: Sweep, kinds: dict[str, list[Component]]) -> list[_Kind]:
-    """The slow members modulo a prime, each with the growth of a component that it is on and has the degrees of."""
-    rest = {degrees: list(points) for degrees, points in sweep.classes.items()}
-    drawn = []
-    for kind, some in kinds.items():
-        points, labels = [], []
-        for one in some:
-            before = rest.get(one.degrees, [])
-            rest[one.degrees] = beside(before, [one], sweep.prime) if before else []
-            on = sorted(set(before) - set(rest[one.degrees]))
-            points += on
-            labels += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
-        drawn.append(_Kind(kind, points, [], labels))
-    left = [point for points in rest.values() for point in points]
-    return [*drawn, _Kind("on no component", left, [], [])] if left else drawn
 
 
 def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_name: str) -> Figure:

@@ -222,13 +222,6 @@ def test_iterates_are_points_of_the_orbit(name, field, backward):
     assert iterates.end == OrbitEnd("completed", 27, "4 iterates reached directly")
 
 
-def test_iterates_stop_at_a_pole_on_the_way_over_q():
-    system, normal_form, start = side_by_side("a pole at step 3", "level 0")
-    iterates = Orbit(KahanMap(system, "1/2"), start, at=[0, 2, 30, 40], normal_form=normal_form)
-    assert [point.step for point in iterates] == [0, 2]
-    assert iterates.end == OrbitEnd("singular", 2, "step 30 cannot be reached: the map has no value at step 2")
-
-
 def test_iterates_stop_where_numbers_would_be_too_long():
     normal_form, system = structure_and_system("m = 2")
     iterates = Orbit(

@@ -89,31 +89,26 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
             continue
         f, found = divisions[prime], None
         while found is None:
+            torsion = _Torsion(f, c, A)  # which trace fits on the torsion points where f is 0?
             try:
-                found = _trace_at(prime, _Torsion(f, c, A), x, q)
+                once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
+                twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
+                wanted = torsion.add(twice, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
+                image: Point = None
+                for t in range(1, prime // 2 + 1) if wanted else ():
+                    image = torsion.add(image, once)
+                    if image is not None and wanted is not None and image[0] == wanted[0]:
+                        found = t if image[1] == wanted[1] else prime - t
+                        break
+                else:
+                    if wanted is not None:
+                        raise AssertionError("no trace of Frobenius fits: it would be a mistake of ours")
+                    found = 0
             except _Divisor as smaller:
                 f = smaller.divisor
         trace += modulus * ((found - trace) * pow(modulus, -1, prime) % prime)
         modulus *= prime
     return trace, modulus
-
-
-def _trace_at(prime: int, torsion: _Torsion, x: Poly, q: int) -> int:
-    """The trace modulo an odd prime that fits on its torsion points where f is 0. Raises _Divisor."""
-    f = torsion.f
-    one = 0 * x + 1
-    once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
-    twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
-    wanted = torsion.add(twice, by_doublings(torsion.add, None, q % prime, (x % f, one)))
-    if wanted is None:
-        return 0
-    image: Point = None
-    for trace in range(1, prime // 2 + 1):
-        image = torsion.add(image, once)
-        assert image is not None
-        if image[0] == wanted[0]:
-            return trace if image[1] == wanted[1] else prime - trace
-    raise AssertionError("no trace of Frobenius fits: it would be a mistake of ours")
 
 
 class _DivisionPolynomials:
