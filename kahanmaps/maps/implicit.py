@@ -234,12 +234,12 @@ class StepOver(MapOver):
         self._equation, self._backward, self._flow = equation, backward, flow
 
     @property
-    def factors(self) -> tuple[StepOver, ...]:  # type: ignore[override]  # nobody writes it
+    def factors(self) -> tuple[StepOver, ...]:
         """The map itself."""
         return (self,)
 
     @property
-    def flow(self) -> tuple[Any, Any] | None:  # type: ignore[override]  # nor this
+    def flow(self) -> tuple[Any, Any] | None:
         """The flow that it approximates, where it is known: of which field, and for which time."""
         return self._flow
 

@@ -145,7 +145,7 @@ class KahanMap(DisplayedAsFormula, StepOver):
         return Equation(field, exponents, tuple(terms))
 
     @property
-    def flow(self) -> tuple[Any, Any] | None:  # type: ignore[override]  # nobody writes it
+    def flow(self) -> tuple[Any, Any] | None:
         """That of the system, with the values of its symbols, for the time step."""
         if isinstance(self._given[0], SystemOver):
             return None

@@ -64,14 +64,14 @@ def draw_scan(
         rest = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
         slow = []
         for kind, some in kinds.items():
-            dots, labels = [], []
+            dots, texts = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
             for one in some:
                 before = rest.get(one.degrees, [])
                 rest[one.degrees] = beside(before, [one], modulo) if before else []
                 on = sorted(set(before) - set(rest[one.degrees]))
                 dots += on
-                labels += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
-            slow.append(_Kind(kind, dots, [], labels))
+                texts += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
+            slow.append(_Kind(kind, dots, [], texts))
         if left := [point for points in rest.values() for point in points]:
             slow.append(_Kind("on no component", left, [], []))
         return _draw(found, style, slow, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
@@ -89,6 +89,7 @@ def draw_scan(
             function = PointFunction(one.text, RationalFunction(equation, context.constant(1)))
             if pieces := level_curves(function, (0, 1), 2, [0.0], window)[0]:
                 curves.append((one.text, pieces))
+        labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(one.text, [_place(one)]) for one in some if one.is_rational_point]
         for text, pieces in curves:  # on the longest piece, first where other curves seldom cross it: off the middle
             longest = max(pieces, key=len)

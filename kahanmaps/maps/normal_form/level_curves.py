@@ -55,7 +55,8 @@ class Jacobian:
 
     def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
         """n P for n >= 0."""
-        return by_doublings(self.add, None, n, P)
+        found: AffinePoint | None = by_doublings(self.add, None, n, P)
+        return found
 
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:

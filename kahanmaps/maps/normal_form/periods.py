@@ -288,7 +288,8 @@ def period_of(
     >>> period_of(normal_form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
-    form, T = getattr(normal_form, "form", normal_form), getattr(normal_form, "T", None)
+    form: Any = getattr(normal_form, "form", normal_form)
+    T = getattr(normal_form, "T", None)
     field = QQ if prime is None else GF(prime)
     splitting = Splitting(form, field, eps, T)
     planes = []

@@ -116,6 +116,9 @@ class Splitting:
 def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
     """The planes over Q or GF(p), one for each irreducible factor of chi."""
     p = field.characteristic
+    chi: Any
+    elements: Any
+    factors: Any
     if p:
         ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
         chi, *elements = (
@@ -132,7 +135,8 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
 
     def planes_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
         """The plane of a factor, and the coefficients in K of its basis: what is that there and 0 in the others."""
-        degree, generator, context = int(factor.degree()), polynomial([0, 1]), None
+        degree, generator = int(factor.degree()), polynomial([0, 1])
+        context: Any = None
         residue: Any
         coefficients: Any
         if degree == 1:

@@ -156,8 +156,8 @@ def find_invariant_curves(
                 (length, splitting.dim)
             )  # the orbit in the variables of the system, a row for each step
             for frame, (u, v) in zip(frames, orbits, strict=True):
-                f, g, m, n = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
-                old = [f * u + g * v, m * u + n * v]
+                a, b, c, d = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
+                old = [a * u + b * v, c * u + d * v]
                 columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
                 parts = [part for z in old for part in ((z.real, z.imag) if frame.root.imag else (z.real,))]
                 original += np.stack(parts, axis=1) @ columns.T

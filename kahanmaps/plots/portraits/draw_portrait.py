@@ -73,8 +73,8 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
                 seen = _inside(curve[:, None], found.window)[:, 0] if in_space else curve
                 (handles[word],) = axes.plot(*seen.T, zorder=1.2, **look)
             for kind, point in flow.equilibria:
-                how = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
-                (handles[kind],) = axes.plot(*point[:, None], **how)
+                mark = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
+                (handles[kind],) = axes.plot(*point[:, None], **mark)
             if handles:
                 legend_above(figure, list(handles.values()), list(handles), style)
         if found.levels is not None:
