@@ -73,8 +73,6 @@ class NthIterate:
     def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
         """P_n over a field other than Q."""
         from kahanmaps.maps.normal_form import translation
-        from kahanmaps.maps.normal_form.planar_block import same_point
-        from kahanmaps.maps.normal_form.rational_iterate import stepped_over
 
         if block.is_zero or (start[0] == 0 and start[1] == 0):
             return start
@@ -85,6 +83,9 @@ class NthIterate:
             except translation.NoTranslation:
                 if balls:
                     raise PrecisionLost("the orbit meets special positions that balls cannot decide") from None
+        from kahanmaps.maps.normal_form.planar_block import same_point
+        from kahanmaps.maps.normal_form.rational_iterate import stepped_over
+
         # Over a small finite field orbits soon come back or meet a pole.
         point = start
         for k in range(1, n + 1):
