@@ -160,10 +160,7 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         solution = _solved(others, [v for v in unknowns if v != u], on_graph)
         (a, b), (c, d) = (_put_in(part, solution) for part in (-rest, slope))
         return solution | {u: _lowest(a * d, b * c)}
-    return _by_resultants(known, unknowns, on_graph)
-
-
-def _by_resultants(known: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
+    # No equation is linear in an unknown: resultants eliminate one.
     if len(unknowns) == 1:
         raise NotBirational(
             "found a map that is not birational: in general a point of its image has at least "

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -268,13 +269,29 @@ class FloatEnsemble:
         intervals = [every, 0 if self._blocks is None else self._sampled]
         for interval in filter(None, intervals):
             piece = min(piece, interval * max(1, _NUMBERS // (self.n * rows)))
+        if self._compiled and self._machine_code is None and self.step < stop:
+            from kahanmaps.maps.floats.machine_code import MachineCode
+
+            width = 1 if self.n <= _ALONE else 32 if rows <= 2 else 16 if rows <= 8 else 8
+            self._machine_code = MachineCode(self._step, width)
+        share = self.n if self._threads == 1 else -(-self.n // (self._threads * _SHARES * 64)) * 64
+        lows = range(0, self.n, share)
         while self.step < stop:
             first, count = self.step, min(piece, stop - self.step)
             tables = []
             for interval in intervals:
                 length = (first + count) // interval - first // interval if interval else 0
                 tables.append(RecordTable(interval, np.empty((length, rows, self.n))))
-            self._advance(first, count, [table for table in tables if len(table.states)])
+            wanted = [table for table in tables if len(table.states)]
+            if self._compiled:
+
+                def advance(low: int, first: int = first, count: int = count, wanted: Any = wanted) -> None:
+                    self._machine_code.advance(lanes, low, min(self.n, low + share), first, count, wanted)
+
+                with ThreadPoolExecutor(self._threads) if len(lows) > 1 else nullcontext() as pool:
+                    list(map(advance, lows) if pool is None else pool.map(advance, lows))
+            else:
+                advance_by_numpy(self._step, lanes, first, count, wanted)
             self.step = first + count
             for interval, states in tables:  # states after the end of an orbit become NaN
                 if len(states) and (lanes.status != RUNNING).any():
@@ -292,28 +309,6 @@ class FloatEnsemble:
             if self._interrupted:
                 break
         self._interrupted = False
-
-    def _advance(self, first: int, count: int, tables: list[RecordTable]) -> None:
-        if not self._compiled:
-            advance_by_numpy(self._step, self._lanes, first, count, tables)
-            return
-        if self._machine_code is None:
-            from kahanmaps.maps.floats.machine_code import MachineCode
-
-            rows = self._step.rows
-            width = 1 if self.n <= _ALONE else 32 if rows <= 2 else 16 if rows <= 8 else 8
-            self._machine_code = MachineCode(self._step, width)
-        share = self.n if self._threads == 1 else -(-self.n // (self._threads * _SHARES * 64)) * 64
-        lows = range(0, self.n, share)
-
-        def advance(low: int) -> None:
-            self._machine_code.advance(self._lanes, low, min(self.n, low + share), first, count, tables)
-
-        if len(lows) == 1:
-            advance(0)
-            return
-        with ThreadPoolExecutor(min(self._threads, len(lows))) as pool:
-            list(pool.map(advance, lows))
 
     def _points_of(self, record: FloatArray) -> FloatArray:
         """The points x (count, n, dim) of recorded states (count, rows, n)."""

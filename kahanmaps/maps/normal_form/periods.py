@@ -159,8 +159,16 @@ def plane_period(
     'the plane: period 3347 (a smooth level cubic)'
     """
     q = prime if context is None else int(context.order())
-    if prime <= 3:
-        return _by_walking(block, point, q, name)
+    if prime <= 3:  # the first return, poles passed over where the formula leads on
+        image, met, kind = point, bool(block.level(point)[1] == 0), PeriodKind.STEPPED
+        for step in range(1, min(q * q + q + 1, _WALK) + 1):
+            image = block.image(image)
+            if all(entry == 0 for entry in image):
+                return PlanePeriod(name, q, kind, "undefined", None, True, f"no value after {step} steps")
+            met = met or bool(image[2] == 0)
+            if same_point(image, point):
+                return PlanePeriod(name, q, kind, "periodic", step, met)
+        return PlanePeriod(name, q, kind, "undecided", None, met or None, "the start did not come back")
     kind, gamma = _classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
@@ -251,19 +259,6 @@ def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | N
         if image[2] == 0:
             return True
     return None if period > _WALK else False
-
-
-def _by_walking(block: PlanarBlock, point: Triple, q: int, name: str) -> PlanePeriod:
-    """In characteristics 2 and 3: the first return, poles passed over where the formula leads on."""
-    image, met = point, bool(block.level(point)[1] == 0)
-    for step in range(1, min(q * q + q + 1, _WALK) + 1):
-        image = block.image(image)
-        if all(entry == 0 for entry in image):
-            return PlanePeriod(name, q, PeriodKind.STEPPED, "undefined", None, True, f"no value after {step} steps")
-        met = met or bool(image[2] == 0)
-        if same_point(image, point):
-            return PlanePeriod(name, q, PeriodKind.STEPPED, "periodic", step, met)
-    return PlanePeriod(name, q, PeriodKind.STEPPED, "undecided", None, met or None, "the start did not come back")
 
 
 # Over the rationals.
