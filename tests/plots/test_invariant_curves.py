@@ -217,6 +217,15 @@ def test_the_disc_shows_every_dot_on_its_curve(curves):
     assert max(np.linalg.norm(vertices - point, axis=1).min() for point in np.stack([x, y], axis=1)) < 0.02
 
 
+def test_the_window_counts_what_it_leaves_out(curves):
+    plane = curves("m = 2").planes[0]
+    view, orbit = view_of(plane), plane.orbits[0]
+    (left, right), (low, high) = view.window
+    is_inside = (left <= orbit.u) & (orbit.u <= right) & (low <= orbit.v) & (orbit.v <= high)
+    assert view.outside == np.sum(~is_inside)
+    assert view.outside < 0.25 * len(orbit.u)
+
+
 def test_a_threefold_curve_is_drawn_with_equal_scales(curves):
     stretches = {plane.shape: view_of(plane).stretch for plane in curves("m = 2").planes}
     assert stretches[THREE_LINES] == 1 != stretches[ONE_LINE]
