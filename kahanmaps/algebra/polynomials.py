@@ -1,18 +1,39 @@
 """Polynomials and rational functions in named variables with exact rational coefficients.
 
 A polynomial is FLINT's `fmpq_mpoly` in a ring made by `ring`; this file adds what FLINT leaves out: values over
-any field (`evaluate`), primitive integer forms, monomials up to a degree, and quotients of two polynomials.
+any field (`evaluate`), primitive integer forms, monomials up to a degree, and quotients of two polynomials. Loading it
+teaches pickle what python-flint can pickle only as integers and rationals, so that results come back from processes.
+
+>>> import pickle
+>>> x, y = ring(["x", "y"]).gens()
+>>> pickle.loads(pickle.dumps(x + 2 * y)) == x + 2 * y
+True
 """
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
+from flint import (
+    Ordering,
+    acb,
+    arb,
+    fmpq,
+    fmpq_mat,
+    fmpq_mpoly,
+    fmpq_mpoly_ctx,
+    fmpq_poly,
+    fmpz,
+    fmpz_mat,
+    fmpz_mod,
+    fmpz_mod_ctx,
+    fmpz_poly,
+    nmod,
+)
 
-from kahanmaps.algebra import pickles  # noqa: F401  # results with polynomials come back from other processes
 from kahanmaps.algebra.integers import content, over_one
 from kahanmaps.errors import InputError, quoted
 
@@ -263,3 +284,39 @@ class RationalFunction:
         above = evaluate(self.numerator, field, point)
         with field.working():
             return above / below
+
+
+# Pickles.
+
+
+def _polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[int, ...], fmpq]) -> fmpq_mpoly:
+    return fmpq_mpoly_ctx.get(names, Ordering[ordering]).from_dict(terms)
+
+
+def _of_ball(x: arb) -> tuple[Any, ...]:
+    """Midpoint and radius are integers times powers of 2, exactly, whatever the precision in force."""
+    return arb, tuple(end.man_exp() if end.is_finite() else float(end) for end in (x.mid(), x.rad()))
+
+
+def _residue(value: int, modulus: int) -> fmpz_mod:
+    return fmpz_mod_ctx(modulus)(value)
+
+
+def _of_matrix(A: Any) -> tuple[Any, ...]:
+    return type(A), (A.nrows(), A.ncols(), A.entries())
+
+
+def _of_univariate(P: Any) -> tuple[Any, ...]:
+    return type(P), (P.coeffs(),)
+
+
+copyreg.pickle(fmpq_mat, _of_matrix)
+copyreg.pickle(fmpz_mat, _of_matrix)
+copyreg.pickle(fmpq_poly, _of_univariate)
+copyreg.pickle(fmpz_poly, _of_univariate)
+copyreg.pickle(fmpq_mpoly, lambda P: (_polynomial, (P.context().names(), P.context().ordering().name, P.to_dict())))
+copyreg.pickle(arb, _of_ball)
+copyreg.pickle(acb, lambda x: (acb, (x.real, x.imag)))
+copyreg.pickle(nmod, lambda x: (nmod, (int(x), x.modulus())))
+# The modulus of a residue: it does not say it itself.
+copyreg.pickle(fmpz_mod, lambda x: (_residue, (int(x), int(0 * x - 1) + 1)))

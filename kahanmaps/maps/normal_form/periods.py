@@ -160,15 +160,15 @@ def plane_period(
     """
     q = prime if context is None else int(context.order())
     if prime <= 3:  # the first return, poles passed over where the formula leads on
-        image, met, kind = point, bool(block.level(point)[1] == 0), PeriodKind.STEPPED
+        kind, image, passed = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
         for step in range(1, min(q * q + q + 1, _WALK) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
                 return PlanePeriod(name, q, kind, "undefined", None, True, f"no value after {step} steps")
-            met = met or bool(image[2] == 0)
+            passed = passed or bool(image[2] == 0)
             if same_point(image, point):
-                return PlanePeriod(name, q, kind, "periodic", step, met)
-        return PlanePeriod(name, q, kind, "undecided", None, met or None, "the start did not come back")
+                return PlanePeriod(name, q, kind, "periodic", step, passed)
+        return PlanePeriod(name, q, kind, "undecided", None, passed or None, "the start did not come back")
     kind, gamma = _classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
