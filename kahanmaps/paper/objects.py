@@ -24,6 +24,9 @@ from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver
 
 Method = TypeVar("Method", bound=Callable[..., Any])
+# The data that consist of elements of K: numbers, matrices, tuples of them, a system.
+_IN_K = ("A", "J", "third", "eps", "roots", "associate_matrices", "known_chi", "hessian_of_quadratic_part", "minus")
+_IN_K += ("gradient_of_linear_part", "lower_terms", "step_eps", "base", "error_of_second")
 
 
 def remembered(method: Method) -> Method:
@@ -143,21 +146,11 @@ class PaperObjects:
         """The zero matrix."""
         return self.K.matrix(rows, columns, [self.K.zero] * (rows * columns))
 
-    def solve(self, matrix: Any, right: Any) -> Any:
-        """matrix^{-1} right."""
-        return solve(matrix, right)
+    solve, det, trace = staticmethod(solve), staticmethod(det), staticmethod(trace)
 
     def inverse(self, matrix: Any) -> Any:
         """matrix^{-1}."""
         return solve(matrix, self.I)
-
-    def det(self, matrix: Any) -> Any:
-        """The determinant."""
-        return det(matrix)
-
-    def trace(self, matrix: Any) -> Any:
-        """The trace."""
-        return trace(matrix)
 
     def dot(self, left: Any, right: Any) -> Any:
         """left^T right, a number."""
@@ -174,6 +167,10 @@ class PaperObjects:
         """The matrix with these columns."""
         rows = zip(*(vector.entries() for vector in vectors), strict=True)
         return self.K.matrix(self.n, len(vectors), [entry for row in rows for entry in row])
+
+    def tensor(self, u: Any, v: Any, w: Any) -> Any:
+        """u (x) v (x) w as an n^2 x n matrix, like the third derivatives of H."""
+        return self.K.column([a * b for a in u.entries() for b in v.entries()]) * w.transpose()
 
     def rank(self, matrix: Any) -> int:
         """The rank."""
@@ -463,24 +460,24 @@ class PaperObjects:
     @remembered
     def modified(self, B: Any, x: Any) -> Any:
         """K + (2 eps/3) nabla K^T (I - eps g')^{-1} g for the associated g, a function that tends to K."""
-        g = self.g(B)
-        return self._modified(g, self.potential(B, x), B * self.grad(x), x)
+        g = self.f if B is self.I else self.g(B)
+        increment = self.solve(self.minus_eps_jac(g, x), self.value(g, x))
+        return self.potential(B, x) + self.dot(B * self.grad(x), increment) * self.eps * self.number(2, 3)
 
-    @remembered
     def modified_H(self, x: Any) -> Any:
         """H + (2 eps/3) nabla H^T (I - eps f')^{-1} f."""
-        return self._modified(self.f, self.potential(self.I, x), self.grad(x), x)
-
-    def _modified(self, g: SystemOver, value: Any, gradient: Any, x: Any) -> Any:
-        increment = self.solve(self.minus_eps_jac(g, x), self.value(g, x))
-        return value + self.dot(gradient, increment) * self.eps * self.number(2, 3)
+        return self.modified(self.I, x)
 
     def Pi(self, x: Any) -> Any:
         """The Poisson tensor J - eps^2 f'(x)^2 J."""
-        jacobian = self.jac(self.f, x)
-        return self.J - jacobian * jacobian * self.J * (self.eps * self.eps)
+        return self.J - self.square(x) * self.J * (self.eps * self.eps)
 
     # ---- f'^2 as a combination of I and the B_i -----------------------------------------------------------------
+
+    @remembered
+    def square(self, x: Any) -> Any:
+        """f'(x)^2."""
+        return self.jac(self.f, x) * self.jac(self.f, x)
 
     @remembered
     def projector(self, i: int) -> Any:
@@ -494,8 +491,7 @@ class PaperObjects:
     @remembered
     def eigenvalue_of_square(self, i: int, x: Any) -> Any:
         """The eigenvalue of f'^2 on the eigenspace of A^T for lambda_i, that is -D_i, D_i = det of the planar f'."""
-        jacobian = self.jac(self.f, x)
-        return self.trace(self.projector(i).transpose() * jacobian * jacobian) * self.number(1, 2)
+        return self.trace(self.projector(i).transpose() * self.square(x)) * self.number(1, 2)
 
     def block_determinant(self, i: int, x: Any) -> Any:
         """D_i, the determinant of the planar f'."""
@@ -504,20 +500,17 @@ class PaperObjects:
     @remembered
     def eighth_of_trace(self, x: Any) -> Any:
         """tr f'^2/8."""
-        jacobian = self.jac(self.f, x)
-        return self.trace(jacobian * jacobian) * self.number(1, 8)
+        return self.trace(self.square(x)) * self.number(1, 8)
 
     @remembered
     def p0(self, x: Any) -> Any:
         """p_0 = (4 - m)/8 tr f'^2, for m = 3 the paper's 1/8 tr f'^2."""
-        jacobian = self.jac(self.f, x)
-        return self.trace(jacobian * jacobian) * self.number(4 - self.m, 8)
+        return self.eighth_of_trace(x) * self.number(4 - self.m)
 
     @remembered
     def q(self, i: int, x: Any) -> Any:
         """q_i = 1/8 tr (B_i^T f'^2)."""
-        jacobian = self.jac(self.f, x)
-        return self.trace(self.B(i).transpose() * jacobian * jacobian) * self.number(1, 8)
+        return self.trace(self.B(i).transpose() * self.square(x)) * self.number(1, 8)
 
     @remembered
     def coefficient_of_power(self, k: int, x: Any) -> Any:
@@ -559,28 +552,17 @@ class PaperObjects:
         if "lifted" not in self._memory:
             dual = DualField(self.K)
 
-            def lift(matrix: Any) -> Any:
-                return None if matrix is None else dual.lift_matrix(matrix)
+            def lift(value: Any) -> Any:
+                if value is None:
+                    return None
+                if isinstance(value, tuple):
+                    return tuple(map(lift, value))
+                if isinstance(value, SystemOver):
+                    return SystemOver(dual, lift(value.tensor), lift(value.B), lift(value.c))
+                return dual.lift_matrix(value) if hasattr(value, "entries") else dual.convert(value)
 
-            base = self.base
-            self._memory["lifted"] = self.changed(
-                K=dual,
-                A=lift(self.A),
-                J=lift(self.J),
-                third=lift(self.third),
-                eps=dual.convert(self.eps),
-                roots=None if self.roots is None else tuple(dual.convert(root) for root in self.roots),
-                associate_matrices=self.associate_matrices and tuple(lift(B) for B in self.associate_matrices),
-                known_chi=None if self.known_chi is None else tuple(dual.convert(c) for c in self.known_chi),
-                draw=lambda name: dual.lift_matrix(self.vector(name)),
-                hessian_of_quadratic_part=lift(self.hessian_of_quadratic_part),
-                gradient_of_linear_part=lift(self.gradient_of_linear_part),
-                lower_terms=self.lower_terms and tuple(map(lift, self.lower_terms)),
-                step_eps=dual.convert(self.step_eps),
-                minus=dual.convert(self.minus),
-                base=base and SystemOver(dual, lift(base.tensor), lift(base.B), lift(base.c)),
-                error_of_second=lift(self.error_of_second),
-            )
+            data = {name: lift(getattr(self, name)) for name in _IN_K}
+            self._memory["lifted"] = self.changed(K=dual, draw=lambda name: dual.lift_matrix(self.vector(name)), **data)
         lifted: PaperObjects = self._memory["lifted"]
         return lifted
 
@@ -685,13 +667,22 @@ class PaperObjects:
         e, h = self.vector("e"), self.vector("h")
         U, V = ([self.A_to(i) * vector for i in range(m)] for vector in (e, h))
         gram = K.matrix(m, m, [self.dot(u, self.J * v) for u in U for v in V])
-        dual = self.columns(V) * solve(gram, K.identity(m))
-        entries = [self.columns(U), dual]
-        S = K.matrix(self.n, self.n, [part[i, j] for i in range(self.n) for part in entries for j in range(m)])
-        companion = [
-            -self.chi[i] if j == m - 1 else K.one if i == j + 1 else K.zero for i in range(m) for j in range(m)
-        ]
-        return S, K.matrix(m, m, companion)
+        parts = [self.columns(U), self.columns(V) * solve(gram, K.identity(m))]
+        S = K.matrix(self.n, self.n, [part[i, j] for i in range(self.n) for part in parts for j in range(m)])
+        return S, self.companion(self.chi)
+
+    def companion(self, chi: Sequence[Any]) -> Any:
+        """The companion matrix of a monic polynomial of degree m, with -chi in its last column."""
+        m, one, zero = self.m, self.K.one, self.K.zero
+        entries = [-chi[i] if j == m - 1 else one if i == j + 1 else zero for i in range(m) for j in range(m)]
+        return self.K.matrix(m, m, entries)
+
+    def doubled(self, W: Any) -> Any:
+        """diag(W, W^T) for an m x m matrix."""
+        m, zeros = self.m, [self.K.zero] * self.m
+        rows = [[W[i, j] for j in range(m)] + zeros for i in range(m)]
+        rows += [zeros + [W[j, i] for j in range(m)] for i in range(m)]
+        return self.K.matrix(self.n, self.n, [entry for row in rows for entry in row])
 
     def is_zero(self, matrix: Any) -> bool:
         """Whether all entries are zero."""

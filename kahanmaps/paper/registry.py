@@ -4,7 +4,7 @@ A claim is a function that takes the paper's objects (`PaperObjects`: A, J, H, f
 (left, right) which the paper says are equal. It knows nothing of the numbers it runs on: the same function is
 evaluated at random points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra
 Q[t]/chi, over complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in
-the file of its section.
+the file of its section, with a title and a formula as its docstring.
 
 Formulas are printed for every m where the statement makes sense; where the paper's own form is for m = 3 and reads
 differently for other m, the general form reduces to it.
@@ -72,7 +72,7 @@ class Claim:
     least_m: int = 1
     only_m: int | None = None
     in_general: bool = False  # stated for generic A and H: a special member for which it fails refutes nothing
-    distinct_roots: bool = False  # makes sense only where chi has no repeated root
+    distinct_roots: bool = False  # makes sense only where chi has no repeated root, as all that uses the roots
     # A claim about a product of planar systems follows from the same claim about one block (blockwise) or about any
     # two blocks (pairwise); docs/mathematics.md says why, and which claims are of that kind.
     blockwise: bool = False
@@ -106,10 +106,11 @@ class Claim:
 _claims: dict[str, Claim] = {}
 
 
-def claim(place: str, label: str, formula: str, **more: Any) -> Callable[[ClaimFunction], ClaimFunction]:
+def claim(place: str, label: str, breaks: str = "", **more: Any) -> Callable[[ClaimFunction], ClaimFunction]:
     """Register a function as a claim; the section is that of its file.
 
-    Keywords are the fields of `Claim`: breaks, kind, least_m, only_m, distinct_roots, blockwise, symplectic, misprint.
+    The first line of its docstring is the title, the second one the formula. `breaks` are names of controls, blanks
+    between them; a claim with a reason `at_most` is about a rank that is attained. Other keywords: fields of `Claim`.
     """
 
     def register(function: ClaimFunction) -> ClaimFunction:
@@ -118,7 +119,9 @@ def claim(place: str, label: str, formula: str, **more: Any) -> Callable[[ClaimF
         key = function.__name__.strip("_").replace("_", "-")
         if key in _claims:
             raise ValueError(f"two claims have the name {key}")
-        _claims[key] = Claim(key, section, place, label, formula, function, **more)
+        formula = (function.__doc__ or "").splitlines()[1].strip()
+        kind = more.pop("kind", ClaimKind.ATTAINED if more.get("at_most") else ClaimKind.EQUAL)
+        _claims[key] = Claim(key, section, place, label, formula, function, tuple(breaks.split()), kind, **more)
         return function
 
     return register

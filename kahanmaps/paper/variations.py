@@ -46,14 +46,7 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
     roots = (o.lam[0], o.lam[0], *o.lam[2:])
     chi = tuple(o.changed(roots=roots).chi_of_roots)
     S, _ = o.symplectic_normal_form()
-    m, K = o.m, o.K
-    block = [-chi[i] if j == m - 1 else K.one if i == j + 1 else K.zero for i in range(m) for j in range(m)]
-    W = [
-        block[i * m + j] if i < m and j < m else block[(j - m) * m + i - m] if i >= m and j >= m else K.zero
-        for i in range(o.n)
-        for j in range(o.n)
-    ]
-    A = -(S * K.matrix(o.n, o.n, W) * o.J * S.transpose() * o.J)
+    A = -(S * o.doubled(o.companion(chi)) * o.J * S.transpose() * o.J)
     p = o.changed(A=A, known_chi=chi, base=None, draw=o.vector)
     return p.changed(roots=None, third=_cubic(p), associate_matrices=_signs(o, A, roots), draw=o.vector)
 
@@ -62,7 +55,7 @@ def derogatory(o: PaperObjects) -> PaperObjects:
     """A diagonalisable with lambda_1 = lambda_2, and H anything on the space of that root."""
     E = o.projector(0) + o.projector(1)
     A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
-    third = o.third + _product(o, [(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3"))])
+    third = o.sum([o.third, *(o.tensor(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3")))])
     signs = _signs(o, A, (o.lam[1], *o.lam[1:]))
     return o.changed(A=A, known_chi=None, base=None, roots=None, third=third, associate_matrices=signs, draw=o.vector)
 
@@ -84,17 +77,8 @@ def _cubic(p: PaperObjects) -> Any:
         powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]
         for k in range(p.m):
             for l in range(p.m):
-                terms.append((powers[k], powers[l], p.horner(k) * p.horner(l) * p.vector(name)))
-    return _product(p, terms)
-
-
-def _product(p: PaperObjects, terms: list[tuple[Any, Any, Any]]) -> Any:
-    """The sum of the tensors u (x) v (x) w, as an n^2 x n matrix."""
-    total = p.zeros(p.n * p.n, p.n)
-    for u, v, w in terms:
-        pairs = p.K.matrix(p.n * p.n, 1, [u[i, 0] * v[j, 0] for i in range(p.n) for j in range(p.n)])
-        total = total + pairs * w.transpose()
-    return total
+                terms.append(p.tensor(powers[k], powers[l], p.horner(k) * p.horner(l) * p.vector(name)))
+    return p.sum(terms)
 
 
 _CMOQ = "the theorem of Celledoni, McLachlan, Owren and Quispel"

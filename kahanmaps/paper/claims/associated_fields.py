@@ -8,17 +8,19 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
-@claim("Def. 4", "def assoc", "B^T J = J B, B^2 = I", breaks=("J", "B"), blockwise=True)
+@claim("Def. 4", "def assoc", "J B", blockwise=True)
 def matrices_of_associated_fields(o: PaperObjects) -> Pairs:
-    """B is skew-Hamiltonian and B^2 = I"""
+    """B is skew-Hamiltonian and B^2 = I
+    B^T J = J B, B^2 = I"""
     for B in o.associates():
         yield B.transpose() * o.J, o.J * B
         yield B * B, o.I
 
 
-@claim("Def. 4", "def assoc", "g = J B nabla H_0 = B^T J nabla H_0 = B^T f_0", breaks=("J", "A", "f"), blockwise=True)
+@claim("Def. 4", "def assoc", "J A f", blockwise=True)
 def associated_field(o: PaperObjects) -> Pairs:
-    """The associated vector field in its three forms"""
+    """The associated vector field in its three forms
+    g = J B nabla H_0 = B^T J nabla H_0 = B^T f_0"""
     for B in o.associates():
         g = o.value(o.g(B), o.x)
         yield g, o.J * (B * o.grad(o.x))
@@ -26,9 +28,10 @@ def associated_field(o: PaperObjects) -> Pairs:
         yield g, B.transpose() * o.fx
 
 
-@claim("Def. 4", "def assoc", "g = J nabla K, K = alpha H_0 + beta H_1 + gamma H_2", least_m=2, breaks=("H", "A"))
+@claim("Def. 4", "def assoc", "H A", least_m=2)
 def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
-    """The associated field is Hamiltonian, with the combination K of the H_i"""
+    """The associated field is Hamiltonian, with the combination K of the H_i
+    g = J nabla K, K = alpha H_0 + beta H_1 + gamma H_2"""
     v = o.vector("v")
     for signs in o.all_signs():
         # J^T = J^{-1}, so v . g = v . J nabla K is the slope of K along J^T v.
@@ -44,9 +47,10 @@ def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
         yield o.Kf(B, o.x), combination
 
 
-@claim("Def. 4", "", "B_s^T g_s = f_0;  (B_s B_t)^2 = I", breaks=("B",), blockwise=True)
+@claim("Def. 4", "", "B", blockwise=True)
 def equivalence_relation(o: PaperObjects) -> Pairs:
-    """Being associated is symmetric and transitive"""
+    """Being associated is symmetric and transitive
+    B_s^T g_s = f_0;  (B_s B_t)^2 = I"""
     matrices = list(o.associates())
     for k, B in enumerate(matrices):
         yield B.transpose() * o.value(o.g(B), o.x), o.fx
@@ -54,46 +58,45 @@ def equivalence_relation(o: PaperObjects) -> Pairs:
             yield B * C * (B * C), o.I
 
 
-@claim("Lemma 5 (31)", "f'f=g'g", "g' g = f_0' f_0", breaks=("B", "H"), blockwise=True)
+@claim("Lemma 5 (31)", "f'f=g'g", "B H", blockwise=True)
 def accelerations_agree(o: PaperObjects) -> Pairs:
-    """Associated fields have the same second derivative along the flow"""
+    """Associated fields have the same second derivative along the flow
+    g' g = f_0' f_0"""
     for B in o.associates():
         yield o.jac(o.g(B), o.x) * o.value(o.g(B), o.x), o.df * o.fx
 
 
-@claim("Lemma 5 (32)", "f'f'=g'g'", "(g')^2 = (f_0')^2", breaks=("B", "H"), blockwise=True)
+@claim("Lemma 5 (32)", "f'f'=g'g'", "B H", blockwise=True)
 def squares_of_jacobians_agree(o: PaperObjects) -> Pairs:
-    """Associated fields have Jacobi matrices with the same square"""
+    """Associated fields have Jacobi matrices with the same square
+    (g')^2 = (f_0')^2"""
     for B in o.associates():
         jacobian = o.jac(o.g(B), o.x)
         yield jacobian * jacobian, o.df * o.df
 
 
-@claim(
-    "Lemma 5, proof",
-    "",
-    "g'g = g'B^T f_0 = B^T g' f_0 = (B^T)^2 f_0' f_0 = f_0' f_0, the same for (g')^2",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("Lemma 5, proof", "", "B H", blockwise=True)
 def squares_step_by_step(o: PaperObjects) -> Pairs:
-    """The chains of equalities that prove (31) and (32)"""
+    """The chains of equalities that prove (31) and (32)
+    g'g = g'B^T f_0 = B^T g' f_0 = (B^T)^2 f_0' f_0 = f_0' f_0, the same for (g')^2"""
     for B in o.associates():
         BT, gx, dg = B.transpose(), o.value(o.g(B), o.x), o.jac(o.g(B), o.x)
         yield from pairwise([dg * gx, dg * (BT * o.fx), BT * (dg * o.fx), BT * (BT * (o.df * o.fx)), o.df * o.fx])
         yield from pairwise([dg * dg, dg * BT * o.df, BT * dg * o.df, BT * BT * o.df * o.df, o.df * o.df])
 
 
-@claim("Cor. 6 (33)", "condet", "det(I - eps g') = det(I - eps f_0')", breaks=("B", "f"), blockwise=True)
+@claim("Cor. 6 (33)", "condet", "B f", blockwise=True)
 def determinants_agree(o: PaperObjects) -> Pairs:
-    """Maps of associated fields share the invariant measure"""
+    """Maps of associated fields share the invariant measure
+    det(I - eps g') = det(I - eps f_0')"""
     for B in o.associates():
         yield o.det(o.minus_eps_jac(o.g(B), o.x)), o.det(o.minus_eps_jac(o.f, o.x))
 
 
-@claim("Cor. 6, proof", "", "tr f'^k = tr g'^k, both 0 for odd k", breaks=("B", "f"))
+@claim("Cor. 6, proof", "", "B f")
 def traces_agree(o: PaperObjects) -> Pairs:
-    """Traces of powers of the Jacobi matrices agree, up to k = 2m, and those of odd powers vanish"""
+    """Traces of powers of the Jacobi matrices agree, up to k = 2m, and those of odd powers vanish
+    tr f'^k = tr g'^k, both 0 for odd k"""
     powers = [o.df]
     for _ in range(2 * o.m - 1):
         powers.append(powers[-1] * o.df)
@@ -107,9 +110,10 @@ def traces_agree(o: PaperObjects) -> Pairs:
             power = power * second
 
 
-@claim("Lemma 7, proof", "", "det(A - t I) = chi(t)^2, chi = prod (t - lambda_i)", breaks=("roots", "A"))
+@claim("Lemma 7, proof", "", "roots A")
 def characteristic_polynomial_of_A(o: PaperObjects) -> Pairs:
-    """The characteristic polynomial of A is a square"""
+    """The characteristic polynomial of A is a square
+    det(A - t I) = chi(t)^2, chi = prod (t - lambda_i)"""
     t = o.scalar("t")
     chi = o.K.one
     for root in o.lam:
@@ -117,54 +121,45 @@ def characteristic_polynomial_of_A(o: PaperObjects) -> Pairs:
     yield o.det(o.A - o.I * t), chi * chi
 
 
-@claim("Lemma 7, proof", "", "prod (A - lambda_i I) = 0", breaks=("roots", "A"), distinct_roots=True)
+@claim("Lemma 7, proof", "", "roots A")
 def A_is_diagonalisable(o: PaperObjects) -> Pairs:
-    """For distinct roots A is diagonalisable: chi is its minimal polynomial"""
+    """For distinct roots A is diagonalisable: chi is its minimal polynomial
+    prod (A - lambda_i I) = 0"""
     product = o.I
     for root in o.lam:
         product = product * (o.A - o.I * root)
     yield product, o.zeros(o.n, o.n)
 
 
-@claim(
-    "Lemma 7, proof",
-    "",
-    "A = S diag(W, W^T) S^{-1}, S^T J S = J",
-    kind=ClaimKind.EXISTS,
-    breaks=("A",),
-    distinct_roots=True,
-    symplectic=False,
-)
+@claim("Lemma 7, proof", "", "A", kind=ClaimKind.EXISTS, distinct_roots=True, symplectic=False)
 def symplectic_normal_form_of_A(o: PaperObjects) -> Pairs:
-    """A is symplectically similar to diag(W, W^T), here over the same field with W a companion matrix"""
+    """A is symplectically similar to diag(W, W^T), here over the same field with W a companion matrix
+    A = S diag(W, W^T) S^{-1}, S^T J S = J"""
     S, W = o.symplectic_normal_form()
-    m, zero = o.m, o.K.zero
-    block = [[W[i, j] for j in range(m)] + [zero] * m for i in range(m)]
-    block += [[zero] * m + [W[j, i] for j in range(m)] for i in range(m)]
-    yield o.A * S, S * o.K.matrix(o.n, o.n, [entry for row in block for entry in row])
+    yield o.A * S, S * o.doubled(W)
     yield S.transpose() * o.J * S, o.J
 
 
 @claim(
     "Lemma 7, proof",
     "",
-    "rank E_i = 2 for the projector E_i onto the eigenspace of lambda_i",
-    kind=ClaimKind.ATTAINED,
+    "roots",
     at_most="the rank of a projector is its trace, and the eigenvalue lambda_i is double",
-    breaks=("roots",),
     distinct_roots=True,
 )
 def two_eigenvectors(o: PaperObjects) -> Pairs:
-    """Each eigenvalue has two linearly independent eigenvectors"""
+    """Each eigenvalue has two linearly independent eigenvectors
+    rank E_i = 2 for the projector E_i onto the eigenspace of lambda_i"""
     for i in o.each:
         E = o.projector(i)
         yield o.rank(E), 2
         yield o.is_zero(o.A * E - E * o.lam[i]), True
 
 
-@claim("Lemma 7 (34)", "", "B_i = alpha_i I + beta_i A + gamma_i A^2", breaks=("roots",), distinct_roots=True)
+@claim("Lemma 7 (34)", "", "roots")
 def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
-    """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation"""
+    """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation
+    B_i = alpha_i I + beta_i A + gamma_i A^2"""
     for i in o.free:
         # Independent of Lagrange's formula: I - 2 E_i with the projector E_i onto the eigenspace of lambda_i.
         E = o.projector(i)
@@ -172,38 +167,26 @@ def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
         yield o.A * E, E * o.lam[i]
 
 
-@claim(
-    "Lemma 7",
-    "",
-    "B_1, ..., B_m linearly independent (m > 2; for m = 2 B_2 = -B_1)",
-    kind=ClaimKind.ATTAINED,
-    least_m=3,
-    at_most="there are m of them",
-    distinct_roots=True,
-    breaks=("B=I",),
-)
+@claim("Lemma 7", "", "B=I", least_m=3, at_most="there are m of them", distinct_roots=True)
 def independent_matrices(o: PaperObjects) -> Pairs:
-    """The matrices B_i are linearly independent"""
+    """The matrices B_i are linearly independent
+    B_1, ..., B_m linearly independent (m > 2; for m = 2 B_2 = -B_1)"""
     rows = [o.B(i).entries() for i in o.each]
     yield o.rank(o.K.matrix(o.m, o.n * o.n, [entry for row in rows for entry in row])), o.m
 
 
-@claim("Lemma 7 (35)", "B^2", "B_i^2 = I", breaks=("B", "roots"), distinct_roots=True)
+@claim("Lemma 7 (35)", "B^2", "B roots")
 def involutions(o: PaperObjects) -> Pairs:
-    """The matrices B_i are involutions"""
+    """The matrices B_i are involutions
+    B_i^2 = I"""
     for i in o.free:
         yield o.B(i) * o.B(i), o.I
 
 
-@claim(
-    "Lemma 7 (36)",
-    "B char pol",
-    "det(B_i - t I) = (t - 1)^{2m-2} (t + 1)^2",
-    breaks=("B", "roots"),
-    distinct_roots=True,
-)
+@claim("Lemma 7 (36)", "B char pol", "B roots")
 def characteristic_polynomial_of_B(o: PaperObjects) -> Pairs:
-    """B_i has the eigenvalue -1 twice and 1 otherwise"""
+    """B_i has the eigenvalue -1 twice and 1 otherwise
+    det(B_i - t I) = (t - 1)^{2m-2} (t + 1)^2"""
     t = o.scalar("t")
     right = (t + o.K.one) * (t + o.K.one)
     for _ in range(2 * o.m - 2):
@@ -212,22 +195,25 @@ def characteristic_polynomial_of_B(o: PaperObjects) -> Pairs:
         yield o.det(o.B(i) - o.I * t), right
 
 
-@claim("Lemma 7 (37)", "B sum", "sum B_i = (m-2) I", breaks=("B",), distinct_roots=True)
+@claim("Lemma 7 (37)", "B sum", "B")
 def sum_of_matrices(o: PaperObjects) -> Pairs:
-    """The sum of the B_i; I for m = 3"""
+    """The sum of the B_i; I for m = 3
+    sum B_i = (m-2) I"""
     yield o.sum([o.B(i) for i in o.each]), o.I * o.number(o.m - 2)
 
 
-@claim("Lemma 7 (38)", "", "sum alpha_i = m-2, sum beta_i = sum gamma_i = 0", breaks=("B",), distinct_roots=True)
+@claim("Lemma 7 (38)", "", "B")
 def sums_of_coefficients(o: PaperObjects) -> Pairs:
-    """The same for the coefficients"""
+    """The same for the coefficients
+    sum alpha_i = m-2, sum beta_i = sum gamma_i = 0"""
     for k in range(o.m):
         yield o.sum([o.lagrange(i)[k] for i in o.each]), o.number(o.m - 2 if k == 0 else 0)
 
 
-@claim("(39)", "abc", "a, b, c elementary symmetric: chi = t^3 - a t^2 + b t - c", breaks=("A", "roots"))
+@claim("(39)", "abc", "A roots")
 def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
-    """The coefficients of chi from traces of powers of A (Newton's identities; every eigenvalue counts half)"""
+    """The coefficients of chi from traces of powers of A (Newton's identities; every eigenvalue counts half)
+    a, b, c elementary symmetric: chi = t^3 - a t^2 + b t - c"""
     half = o.number(1, 2)
     sums = [o.trace(o.A_to(k)) * half for k in range(1, o.m + 1)]
     elementary = [o.K.one]
@@ -240,9 +226,10 @@ def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
         yield o.chi_of_roots[o.m - k], elementary[k] * o.number(1 if k % 2 == 0 else -1)
 
 
-@claim("(40)", "B constr", "B_i(lambda_i) = -1, B_i(lambda_j) = 1", breaks=("B",), distinct_roots=True)
+@claim("(40)", "B constr", "B")
 def interpolation(o: PaperObjects) -> Pairs:
-    """The values of the interpolation polynomials"""
+    """The values of the interpolation polynomials
+    B_i(lambda_i) = -1, B_i(lambda_j) = 1"""
     for i in o.free:
         for j in o.each:
             value = o.K.zero
@@ -251,9 +238,10 @@ def interpolation(o: PaperObjects) -> Pairs:
             yield value, o.number(-1 if i == j else 1)
 
 
-@claim("(41)-(43)", "alpha", "alpha_i = (lambda_i^2 - b)/((l_i - l_j)(l_i - l_k)), ...", only_m=3, breaks=("B",))
+@claim("(41)-(43)", "alpha", "B", only_m=3)
 def lagrange_coefficients(o: PaperObjects) -> Pairs:
-    """The coefficients alpha, beta, gamma through the eigenvalues"""
+    """The coefficients alpha, beta, gamma through the eigenvalues
+    alpha_i = (lambda_i^2 - b)/((l_i - l_j)(l_i - l_k)), ..."""
     b = o.chi[1]
     for i in o.free:
         j, k = (other for other in o.each if other != i)
@@ -265,15 +253,10 @@ def lagrange_coefficients(o: PaperObjects) -> Pairs:
         yield gamma, o.number(-2) / below
 
 
-@claim(
-    "(41)-(43)",
-    "alpha",
-    "coefficient k of B_i = delta_k0 - 2 C_k(lambda_i)/chi'(lambda_i)",
-    breaks=("B",),
-    distinct_roots=True,
-)
+@claim("(41)-(43)", "alpha", "B")
 def lagrange_coefficients_for_every_m(o: PaperObjects) -> Pairs:
-    """The general form, with Horner's polynomials C_k of chi"""
+    """The general form, with Horner's polynomials C_k of chi
+    coefficient k of B_i = delta_k0 - 2 C_k(lambda_i)/chi'(lambda_i)"""
     for i in o.free:
         slope, C = o.K.zero, [o.K.zero] * o.m
         for k in range(o.m - 1, -1, -1):  # C_{m-1} = 1, C_{k-1} = t C_k + c_k
@@ -284,26 +267,29 @@ def lagrange_coefficients_for_every_m(o: PaperObjects) -> Pairs:
             yield o.lagrange(i)[k], o.number(1 if k == 0 else 0) - o.number(2) * C[k] / slope
 
 
-@claim("(44)", "", "B_1 B_2 = B_2 B_1 = -B_3, and cyclic", only_m=3, breaks=("B",))
+@claim("(44)", "", "B", only_m=3)
 def products_of_matrices(o: PaperObjects) -> Pairs:
-    """The products of the B_i for m = 3"""
+    """The products of the B_i for m = 3
+    B_1 B_2 = B_2 B_1 = -B_3, and cyclic"""
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         yield o.B(i) * o.B(j), -o.B(k)
         yield o.B(j) * o.B(i), -o.B(k)
 
 
-@claim("(44)", "", "B_i B_j = B_i + B_j - I (i != j)", least_m=2, breaks=("roots", "A"), distinct_roots=True)
+@claim("(44)", "", "roots A", least_m=2)
 def products_of_matrices_for_every_m(o: PaperObjects) -> Pairs:
-    """The products of the B_i for every m; for m = 3 the right-hand side is -B_k by (37)"""
+    """The products of the B_i for every m; for m = 3 the right-hand side is -B_k by (37)
+    B_i B_j = B_i + B_j - I (i != j)"""
     for i in o.free:
         for j in o.each:
             if i != j:
                 yield o.B(i) * o.B(j), o.B(i) + o.B(j) - o.I
 
 
-@claim("(45)", "assoc triple", "B_1^T g_1 = f_0, B_2^T g_1 = -g_3, B_3^T g_1 = -g_2", only_m=3, breaks=("B",))
+@claim("(45)", "assoc triple", "B", only_m=3)
 def fields_associated_to_an_associated_one(o: PaperObjects) -> Pairs:
-    """The triple of fields associated to g_i, for m = 3"""
+    """The triple of fields associated to g_i, for m = 3
+    B_1^T g_1 = f_0, B_2^T g_1 = -g_3, B_3^T g_1 = -g_2"""
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         g = o.value(o.g_(i), o.x)
         yield o.B(i).transpose() * g, o.fx
@@ -311,40 +297,38 @@ def fields_associated_to_an_associated_one(o: PaperObjects) -> Pairs:
         yield o.B(k).transpose() * g, -o.value(o.g_(j), o.x)
 
 
-@claim("Lemma 8 (46)", "f'f' thru B", "f_0'^2 = p_0 I + sum q_i B_i^T", breaks=("H", "B"), distinct_roots=True)
+@claim("Lemma 8 (46)", "f'f' thru B", "H B")
 def square_of_the_jacobian(o: PaperObjects) -> Pairs:
-    """The square of the Jacobi matrix is a combination of I and the B_i^T"""
+    """The square of the Jacobi matrix is a combination of I and the B_i^T
+    f_0'^2 = p_0 I + sum q_i B_i^T"""
     right = o.I * o.p0(o.x)
     for i in o.each:
         right = right + o.B(i).transpose() * o.q(i, o.x)
     yield o.df * o.df, right
 
 
-@claim("(47)", "p0", "p_0 = (4-m)/8 tr f_0'^2", breaks=("H", "f"), distinct_roots=True)
+@claim("(47)", "p0", "H f")
 def trace_part(o: PaperObjects) -> Pairs:
-    """f_0'^2 is a multiple of the identity on each eigenspace of A^T; p_0 is (4-m)/4 times the sum of the factors"""
+    """f_0'^2 is a multiple of the identity on each eigenspace of A^T; p_0 is (4-m)/4 times the sum of the factors
+    p_0 = (4-m)/8 tr f_0'^2"""
     for i in o.free:
         E = o.projector(i).transpose()
         yield o.df * o.df * E, E * o.eigenvalue_of_square(i, o.x)
     yield o.p0(o.x), o.sum([o.eigenvalue_of_square(i, o.x) for i in o.each]) * o.number(4 - o.m, 4)
 
 
-@claim("(48)", "qi", "q_i = 1/8 tr (B_i^T f_0'^2) = 1/8 tr (f_0' g_i')", breaks=("f",), distinct_roots=True)
+@claim("(48)", "qi", "f")
 def mixed_traces(o: PaperObjects) -> Pairs:
-    """q_i in its two forms"""
+    """q_i in its two forms
+    q_i = 1/8 tr (B_i^T f_0'^2) = 1/8 tr (f_0' g_i')"""
     for i in o.free:
         yield o.q(i, o.x), o.trace(o.df * o.jac(o.g_(i), o.x)) * o.number(1, 8)
 
 
-@claim(
-    "Lemma 8 (49)",
-    "char pol f'-g'",
-    "det(t I - (f_0'-g_i')) = t^{2m} - 1/2 t^{2m-2} tr (f_0'-g_i')^2",
-    breaks=("f", "roots"),
-    distinct_roots=True,
-)
+@claim("Lemma 8 (49)", "char pol f'-g'", "f roots")
 def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
-    """f_0' - g_i' has rank 2"""
+    """f_0' - g_i' has rank 2
+    det(t I - (f_0'-g_i')) = t^{2m} - 1/2 t^{2m-2} tr (f_0'-g_i')^2"""
     t = o.scalar("t")
     for i in o.free:
         difference = o.df - o.jac(o.g_(i), o.x)
@@ -356,15 +340,10 @@ def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
         yield difference, (o.I - o.B(i).transpose()) * o.df
 
 
-@claim(
-    "Lemma 8 (50)",
-    "pol f'-g'",
-    "(f_0'-g_i')^{2m} - 1/2 (f_0'-g_i')^{2m-2} tr (f_0'-g_i')^2 = 0",
-    breaks=("f", "roots"),
-    distinct_roots=True,
-)
+@claim("Lemma 8 (50)", "pol f'-g'", "f roots")
 def cayley_hamilton(o: PaperObjects) -> Pairs:
-    """The theorem of Cayley and Hamilton for f_0' - g_i'"""
+    """The theorem of Cayley and Hamilton for f_0' - g_i'
+    (f_0'-g_i')^{2m} - 1/2 (f_0'-g_i')^{2m-2} tr (f_0'-g_i')^2 = 0"""
     for i in o.free:
         difference = o.df - o.jac(o.g_(i), o.x)
         square = difference * difference
@@ -372,15 +351,10 @@ def cayley_hamilton(o: PaperObjects) -> Pairs:
         yield low * square, low * (o.trace(square) * o.number(1, 2))
 
 
-@claim(
-    "Lemma 8, proof",
-    "",
-    "32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0",
-    only_m=3,
-    breaks=("H", "B"),
-)
+@claim("Lemma 8, proof", "", "H B", only_m=3)
 def sixth_powers(o: PaperObjects) -> Pairs:
-    """The equation that (50) turns into, and the one after division by f'^4"""
+    """The equation that (50) turns into, and the one after division by f'^4
+    32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0"""
     square = o.df * o.df
     fourth = square * square
     for i in o.free:
@@ -390,15 +364,10 @@ def sixth_powers(o: PaperObjects) -> Pairs:
         yield rest * square * o.number(32), rest * (o.number(8) * traces)
 
 
-@claim(
-    "Lemma 8, proof",
-    "",
-    "64 f'^2 - 8(4-m) tr(f'^2) I - 8 sum tr(B_i^T f'^2) B_i^T = 0",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Lemma 8, proof", "", "H B")
 def sum_of_the_squares(o: PaperObjects) -> Pairs:
-    """The sum over i, equivalent to (46); for m = 3 as printed"""
+    """The sum over i, equivalent to (46); for m = 3 as printed
+    64 f'^2 - 8(4-m) tr(f'^2) I - 8 sum tr(B_i^T f'^2) B_i^T = 0"""
     square = o.df * o.df
     right = o.I * (o.number(8 * (4 - o.m)) * o.trace(square))
     for i in o.each:

@@ -17,15 +17,10 @@ def associated_pairs(o: PaperObjects) -> Iterator[tuple[Any, SystemOver, Any]]:
         yield B, o.g(B), o.step(o.g(B), o.x)
 
 
-@claim(
-    "Theorem 9 (51), (52)",
-    "eq: Phi1",
-    "x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, the same for g",
-    breaks=("eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("Theorem 9 (51), (52)", "eq: Phi1", "eps inhomogeneous", blockwise=True)
 def both_maps(o: PaperObjects) -> Pairs:
-    """Both maps in the forms of Section 2"""
+    """Both maps in the forms of Section 2
+    x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, the same for g"""
     yield o.x_tilde, o.solve(o.minus_eps_jac(o.f, o.x), o.x)
     yield o.x_tilde, o.plus_eps_jac(o.f, o.x_tilde) * o.x
     for _, g, x_hat in associated_pairs(o):
@@ -33,9 +28,10 @@ def both_maps(o: PaperObjects) -> Pairs:
         yield x_hat, o.plus_eps_jac(g, x_hat) * o.x
 
 
-@claim("Theorem 9", "th commute", "Phi_f o Phi_g = Phi_g o Phi_f", breaks=("B", "H", "map"), blockwise=True)
+@claim("Theorem 9", "th commute", "B H map", blockwise=True)
 def commutativity(o: PaperObjects) -> Pairs:
-    """The Kahan maps of associated vector fields commute, all pairs of the class"""
+    """The Kahan maps of associated vector fields commute, all pairs of the class
+    Phi_f o Phi_g = Phi_g o Phi_f"""
     fields = [(o.f, o.x_tilde), *((g, x_hat) for _, g, x_hat in associated_pairs(o))]
     if len(fields) > 8:  # pairs (f_s, f_t) are pairs (f, f_{st}) of another member: f with all, and neighbours
         chosen = [(0, k) for k in range(1, len(fields))] + [(k, k + 1) for k in range(1, len(fields) - 1)]
@@ -46,15 +42,10 @@ def commutativity(o: PaperObjects) -> Pairs:
         yield o.step(f, x_hat), o.step(g, x_tilde)
 
 
-@claim(
-    "(53), (54)",
-    "eq: hat tilde",
-    "Phi_g(Phi_f(x)) = (I - eps g'(x~))^{-1} (I + eps f'(x~)) x",
-    breaks=("map", "eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("(53), (54)", "eq: hat tilde", "map eps inhomogeneous", blockwise=True)
 def compositions(o: PaperObjects) -> Pairs:
-    """The two compositions as products of matrices"""
+    """The two compositions as products of matrices
+    Phi_g(Phi_f(x)) = (I - eps g'(x~))^{-1} (I + eps f'(x~)) x"""
     for _, g, x_hat in associated_pairs(o):
         first = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde) * o.x)
         second = o.solve(o.minus_eps_jac(o.f, x_hat), o.plus_eps_jac(g, x_hat) * o.x)
@@ -62,72 +53,47 @@ def compositions(o: PaperObjects) -> Pairs:
         yield o.step(o.f, x_hat), second
 
 
-@claim(
-    "(55)",
-    "det",
-    "(I - eps g'(x~))^{-1} (I + eps f'(x~)) = (I - eps f'(x^))^{-1} (I + eps g'(x^))",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("(55)", "det", "B H", blockwise=True)
 def matrix_equation(o: PaperObjects) -> Pairs:
-    """Commutativity as an identity of matrices, stronger than that of vectors"""
+    """Commutativity as an identity of matrices, stronger than that of vectors
+    (I - eps g'(x~))^{-1} (I + eps f'(x~)) = (I - eps f'(x^))^{-1} (I + eps g'(x^))"""
     for _, g, x_hat in associated_pairs(o):
         left = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde))
         yield left, o.solve(o.minus_eps_jac(o.f, x_hat), o.plus_eps_jac(g, x_hat))
 
 
-@claim(
-    "(56)",
-    "det 1",
-    "(I - eps f'(x^)) (I - eps g'(x~))^{-1} = (I + eps g'(x^)) (I + eps f'(x~))^{-1}",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("(56)", "det 1", "B H", blockwise=True)
 def matrix_equation_sorted(o: PaperObjects) -> Pairs:
-    """The matrix equation sorted by points"""
+    """The matrix equation sorted by points
+    (I - eps f'(x^)) (I - eps g'(x~))^{-1} = (I + eps g'(x^)) (I + eps f'(x~))^{-1}"""
     for _, g, x_hat in associated_pairs(o):
         left = o.minus_eps_jac(o.f, x_hat) * o.inverse(o.minus_eps_jac(g, o.x_tilde))
         yield left, o.plus_eps_jac(g, x_hat) * o.inverse(o.plus_eps_jac(o.f, o.x_tilde))
 
 
-@claim(
-    "Theorem 9, proof",
-    "",
-    "(I - eps g'(x~))^{-1} = (I + eps g'(x~)) (I - eps^2 f'(x~)^2)^{-1}",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("Theorem 9, proof", "", "B H", blockwise=True)
 def inverses(o: PaperObjects) -> Pairs:
-    """The inverses through I - eps^2 f'^2, for g' and for f'"""
+    """The inverses through I - eps^2 f'^2, for g' and for f'
+    (I - eps g'(x~))^{-1} = (I + eps g'(x~)) (I - eps^2 f'(x~)^2)^{-1}"""
     common = o.inverse(o.one_minus_square(o.f, o.x_tilde))
     yield o.inverse(o.plus_eps_jac(o.f, o.x_tilde)), o.minus_eps_jac(o.f, o.x_tilde) * common
     for _, g, _ in associated_pairs(o):
         yield o.inverse(o.minus_eps_jac(g, o.x_tilde)), o.plus_eps_jac(g, o.x_tilde) * common
 
 
-@claim(
-    "Theorem 9, proof",
-    "",
-    "(I - eps f'(x^)) (I + eps g'(x~)) = (I + eps g'(x^)) (I - eps f'(x~))",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("Theorem 9, proof", "", "B H", blockwise=True)
 def matrix_equation_without_inverses(o: PaperObjects) -> Pairs:
-    """The matrix equation without inverses"""
+    """The matrix equation without inverses
+    (I - eps f'(x^)) (I + eps g'(x~)) = (I + eps g'(x^)) (I - eps f'(x~))"""
     for _, g, x_hat in associated_pairs(o):
         left = o.minus_eps_jac(o.f, x_hat) * o.plus_eps_jac(g, o.x_tilde)
         yield left, o.plus_eps_jac(g, x_hat) * o.minus_eps_jac(o.f, o.x_tilde)
 
 
-@claim(
-    "Theorem 9, proof",
-    "",
-    "f'(x^) g'(x~) = f'(x^) B^T f'(x~) = B^T f'(x^) f'(x~) = g'(x^) f'(x~)",
-    breaks=("H", "A"),
-    blockwise=True,
-)
+@claim("Theorem 9, proof", "", "H A", blockwise=True)
 def quadratic_terms_cancel(o: PaperObjects) -> Pairs:
-    """The terms quadratic in eps cancel"""
+    """The terms quadratic in eps cancel
+    f'(x^) g'(x~) = f'(x^) B^T f'(x~) = B^T f'(x^) f'(x~) = g'(x^) f'(x~)"""
     for B, g, x_hat in associated_pairs(o):
         at_hat, at_tilde, BT = o.jac(o.f, x_hat), o.jac(o.f, o.x_tilde), B.transpose()
         steps = [
@@ -139,23 +105,19 @@ def quadratic_terms_cancel(o: PaperObjects) -> Pairs:
         yield from pairwise(steps)
 
 
-@claim("(57)", "aux", "-f'(x^) + g'(x~) = g'(x^) - f'(x~)", breaks=("B", "H"), blockwise=True)
+@claim("(57)", "aux", "B H", blockwise=True)
 def linear_terms(o: PaperObjects) -> Pairs:
-    """The terms linear in eps"""
+    """The terms linear in eps
+    -f'(x^) + g'(x~) = g'(x^) - f'(x~)"""
     for _, g, x_hat in associated_pairs(o):
         left = o.jac(g, o.x_tilde) - o.jac(o.f, x_hat)
         yield left, o.jac(g, x_hat) - o.jac(o.f, o.x_tilde)
 
 
-@claim(
-    "Theorem 9, proof",
-    "",
-    "f'(x^) = f'(x) + f''(x^ - x) = f'(x) + 2 eps f''(I - eps g')^{-1} g, ...",
-    breaks=("eps",),
-    blockwise=True,
-)
+@claim("Theorem 9, proof", "", "eps", blockwise=True)
 def jacobians_at_the_images(o: PaperObjects) -> Pairs:
-    """f' and g' at x^ and at x~, through the constant tensors f'' and g''"""
+    """f' and g' at x^ and at x~, through the constant tensors f'' and g''
+    f'(x^) = f'(x) + f''(x^ - x) = f'(x) + 2 eps f''(I - eps g')^{-1} g, ..."""
     two_eps = o.number(2) * o.eps
     for _, g, x_hat in associated_pairs(o):
         for field, image in ((g, x_hat), (o.f, o.x_tilde)):
@@ -165,15 +127,10 @@ def jacobians_at_the_images(o: PaperObjects) -> Pairs:
                 yield o.jac(h, image), o.jac(h, o.x) + o.second(h, increment) * two_eps
 
 
-@claim(
-    "(58)",
-    "aux2",
-    "f''(I - eps g')^{-1} g + g''(I - eps g')^{-1} g = f''(I - eps f')^{-1} f + g''(I - eps f')^{-1} f",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("(58)", "aux2", "B H", blockwise=True)
 def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
-    """The linear terms through f'' and g''"""
+    """The linear terms through f'' and g''
+    f''(I - eps g')^{-1} g + g''(I - eps g')^{-1} g = f''(I - eps f')^{-1} f + g''(I - eps f')^{-1} f"""
     for B in o.associates():
         g = o.g(B)
         by_g = o.solve(o.minus_eps_jac(g, o.x), o.value(g, o.x))
@@ -181,40 +138,30 @@ def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
         yield o.second(o.f, by_g) + o.second(g, by_g), o.second(o.f, by_f) + o.second(g, by_f)
 
 
-@claim("Lemma 10 (59)", "g''", "g'' v = f'' (B^T v), f'' v = g'' (B^T v)", breaks=("H", "B"), blockwise=True)
+@claim("Lemma 10 (59)", "g''", "H B", blockwise=True)
 def second_derivatives_agree(o: PaperObjects) -> Pairs:
-    """The second derivatives of associated fields"""
+    """The second derivatives of associated fields
+    g'' v = f'' (B^T v), f'' v = g'' (B^T v)"""
     v = o.vector("v")
     for B in o.associates():
         yield o.second(o.g(B), v), o.second(o.f, B.transpose() * v)
         yield o.second(o.f, v), o.second(o.g(B), B.transpose() * v)
 
 
-@claim(
-    "Lemma 10 (60)",
-    "Af''",
-    "B^T (f'' v) = f'' (B^T v), B^T (g'' v) = g'' (B^T v)",
-    least_m=2,
-    breaks=("H", "A"),
-    blockwise=True,
-)
+@claim("Lemma 10 (60)", "Af''", "H A", least_m=2, blockwise=True)
 def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
-    """The equivalent form of Lemma 10; in components, its proof (the print lacks the square of d^2 f_i/dx_j dx_k)"""
+    """The equivalent form of Lemma 10; in components, its proof (the print lacks the square of d^2 f_i/dx_j dx_k)
+    B^T (f'' v) = f'' (B^T v), B^T (g'' v) = g'' (B^T v)"""
     v = o.vector("v")
     for B in o.associates():
         for h in (o.f, o.g(B)):
             yield B.transpose() * o.second(h, v), o.second(h, B.transpose() * v)
 
 
-@claim(
-    "Theorem 9, proof",
-    "",
-    "f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and seven more",
-    breaks=("B", "H"),
-    blockwise=True,
-)
+@claim("Theorem 9, proof", "", "B H", blockwise=True)
 def last_displays(o: PaperObjects) -> Pairs:
-    """The matrices on both sides of (58), computed with the help of Lemma 10"""
+    """The matrices on both sides of (58), computed with the help of Lemma 10
+    f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and seven more"""
     common = o.one_minus_square(o.f, o.x)
     f, fx, df = o.f, o.fx, o.df
     for B in o.associates():

@@ -12,24 +12,20 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Pairs, claim
 
 
-@claim("Theorem 15 (94)", "grad tK", "nabla K~_i = B_i nabla H~", pairwise=True, breaks=("H", "B"))
+@claim("Theorem 15 (94)", "grad tK", "H B", pairwise=True)
 def gradients_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The integrals are related by the same differential equation as H and K_i"""
+    """The integrals are related by the same differential equation as H and K_i
+    nabla K~_i = B_i nabla H~"""
     v = o.vector("v")
     for signs in o.all_signs():
         left = o.slope(lambda o, x: o.integral(o.g(o.B_signs(signs)), x), o.x, v)
         yield left, o.slope(lambda o, x: o.H_tilde(x), o.x, o.B_signs(signs).transpose() * v)
 
 
-@claim(
-    "Theorem 15",
-    "th diff eqs",
-    "A nabla^2 H~ = nabla^2 H~ A^T, A nabla^2 K~_i = nabla^2 K~_i A^T",
-    pairwise=True,
-    breaks=("H", "A"),
-)
+@claim("Theorem 15", "th diff eqs", "H A", pairwise=True)
 def second_order_equations_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The integrals satisfy the same second order differential equations as H and K_i"""
+    """The integrals satisfy the same second order differential equations as H and K_i
+    A nabla^2 H~ = nabla^2 H~ A^T, A nabla^2 K~_i = nabla^2 K~_i A^T"""
     v, w = o.vector("v"), o.vector("w")
     left = o.second_slope(lambda o, x: o.H_tilde(x), o.x, o.AT * v, w)
     yield left, o.second_slope(lambda o, x: o.H_tilde(x), o.x, v, o.AT * w)
@@ -38,17 +34,19 @@ def second_order_equations_of_the_integrals(o: PaperObjects) -> Pairs:
         yield left, o.second_slope(lambda o, x: o.integral(o.g(o.B_signs(signs)), x), o.x, v, o.AT * w)
 
 
-@claim("(95), (96)", "tH", "H~ = -2 x^T Pi^{-1} f, K~_i = -2 x^T Pi^{-1} g_i", breaks=("eps", "f"), blockwise=True)
+@claim("(95), (96)", "tH", "eps f", blockwise=True)
 def integrals_by_the_inverse_tensor(o: PaperObjects) -> Pairs:
-    """The integrals through the inverse of the Poisson tensor"""
+    """The integrals through the inverse of the Poisson tensor
+    H~ = -2 x^T Pi^{-1} f, K~_i = -2 x^T Pi^{-1} g_i"""
     Pi = o.Pi(o.x)
     for g in [o.f, *(o.g(B) for B in o.associates())]:
         yield o.integral(g, o.x), o.dot(o.x, o.solve(Pi, o.value(g, o.x))) * o.number(-2)
 
 
-@claim("Lemma 16 (97)", "Pi inv", "Pi^{-1} = -P_0 J - eps^2 sum Q_i B_i J", breaks=("H", "B"), distinct_roots=True)
+@claim("Lemma 16 (97)", "Pi inv", "H B")
 def inverse_tensor(o: PaperObjects) -> Pairs:
-    """The inverse of the Poisson tensor"""
+    """The inverse of the Poisson tensor
+    Pi^{-1} = -P_0 J - eps^2 sum Q_i B_i J"""
     right = -(o.J * o.P0(o.x))
     for i in o.each:
         right = right - o.B(i) * o.J * (o.eps * o.eps * o.Q(i, o.x))
@@ -56,15 +54,10 @@ def inverse_tensor(o: PaperObjects) -> Pairs:
     yield o.inverse(o.Pi(o.x)), right
 
 
-@claim(
-    "Lemma 16 (98)-(101)",
-    "P0",
-    "P_0 = (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4, Q_1 = (-1/s_0 - 1/s_1 + 1/s_2 + 1/s_3)/(4 eps^2), ...",
-    only_m=3,
-    breaks=("B",),
-)
+@claim("Lemma 16 (98)-(101)", "P0", "B", only_m=3)
 def functions_P_and_Q(o: PaperObjects) -> Pairs:
-    """P_0 and Q_i as printed for m = 3, with s_0 = 1 and the s_i taken as eigenvalues of I - eps^2 f'^2"""
+    """P_0 and Q_i as printed for m = 3, with s_0 = 1 and the s_i taken as eigenvalues of I - eps^2 f'^2
+    P_0 = (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4, Q_1 = (-1/s_0 - 1/s_1 + 1/s_2 + 1/s_3)/(4 eps^2), ..."""
     one, squared = o.K.one, o.eps * o.eps
     reciprocal = [one / (one - squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
     yield o.P0(o.x) * o.number(4), one + o.sum(reciprocal)
@@ -73,28 +66,25 @@ def functions_P_and_Q(o: PaperObjects) -> Pairs:
         yield o.Q(i, o.x) * (o.number(4) * squared), right
 
 
-@claim("(102)", "s0", "s_0 = 1 - eps^2 (p_0 - q_1 - q_2 - q_3) = 1", only_m=3, breaks=("B",))
+@claim("(102)", "s0", "B", only_m=3)
 def function_s0(o: PaperObjects) -> Pairs:
-    """s_0 is 1, that is p_0 = q_1 + q_2 + q_3"""
+    """s_0 is 1, that is p_0 = q_1 + q_2 + q_3
+    s_0 = 1 - eps^2 (p_0 - q_1 - q_2 - q_3) = 1"""
     squared = o.eps * o.eps
     yield o.K.one - squared * o.p0(o.x) + squared * o.sum([o.q(i, o.x) for i in o.each]), o.K.one
 
 
-@claim("(102)", "s0", "p_0 = (4-m) tr f'^2/8, sum q_i = (m-2) tr f'^2/8", breaks=("B",), distinct_roots=True)
+@claim("(102)", "s0", "B")
 def sum_of_the_q(o: PaperObjects) -> Pairs:
-    """The linear relation between p_0 and the q_i for every m"""
+    """The linear relation between p_0 and the q_i for every m
+    p_0 = (4-m) tr f'^2/8, sum q_i = (m-2) tr f'^2/8"""
     yield o.sum([o.q(i, o.x) for i in o.each]), o.eighth_of_trace(o.x) * o.number(o.m - 2)
 
 
-@claim(
-    "(103)-(105)",
-    "s1",
-    "s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ...",
-    only_m=3,
-    breaks=("B",),
-)
+@claim("(103)-(105)", "s1", "B", only_m=3)
 def functions_s(o: PaperObjects) -> Pairs:
-    """s_1, s_2, s_3 in both forms"""
+    """s_1, s_2, s_3 in both forms
+    s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ..."""
     squared = o.eps * o.eps
     q = [o.q(i, o.x) for i in o.each]
     for i in o.free:
@@ -103,28 +93,18 @@ def functions_s(o: PaperObjects) -> Pairs:
         yield o.s(i, o.x), o.K.one - (squared + squared) * q[j] - (squared + squared) * q[k]
 
 
-@claim(
-    "(103)-(105)",
-    "s1",
-    "s_i = 1 - eps^2 (eigenvalue of f'^2 on the eigenspace of lambda_i)",
-    breaks=("B",),
-    distinct_roots=True,
-)
+@claim("(103)-(105)", "s1", "B")
 def functions_s_are_eigenvalues(o: PaperObjects) -> Pairs:
-    """What the s_i are: the eigenvalues of I - eps^2 f'^2"""
+    """What the s_i are: the eigenvalues of I - eps^2 f'^2
+    s_i = 1 - eps^2 (eigenvalue of f'^2 on the eigenspace of lambda_i)"""
     for i in o.free:
         yield o.s(i, o.x), o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, o.x)
 
 
-@claim(
-    "(106)",
-    "tH thru H K",
-    "H~ = 2 P_0 x^T J f + 2 eps^2 sum Q_i x^T B_i J f = ... = -6 P_0 H - 6 eps^2 sum Q_i K_i",
-    breaks=("H", "B", "inhomogeneous"),
-    distinct_roots=True,
-)
+@claim("(106)", "tH thru H K", "H B inhomogeneous")
 def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
-    """H~ through H and the K_i, all three lines"""
+    """H~ through H and the K_i, all three lines
+    H~ = 2 P_0 x^T J f + 2 eps^2 sum Q_i x^T B_i J f = ... = -6 P_0 H - 6 eps^2 sum Q_i K_i"""
     squared = o.eps * o.eps
     P0, Q = o.P0(o.x), [o.Q(i, o.x) for i in o.each]
     first = P0 * o.dot(o.x, o.J * o.fx) * o.number(2)
@@ -138,15 +118,10 @@ def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
         yield o.H_tilde(o.x), line
 
 
-@claim(
-    "(107)",
-    "tK thru H K",
-    "K~_1 = -6 P_0 K_1 - 6 eps^2 Q_1 H + 6 eps^2 Q_2 K_3 + 6 eps^2 Q_3 K_2",
-    only_m=3,
-    breaks=("B",),
-)
+@claim("(107)", "tK thru H K", "B", only_m=3)
 def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
-    """K~_i through H and the K_i, for m = 3"""
+    """K~_i through H and the K_i, for m = 3
+    K~_1 = -6 P_0 K_1 - 6 eps^2 Q_1 H + 6 eps^2 Q_2 K_3 + 6 eps^2 Q_3 K_2"""
     six = o.number(6) * o.eps * o.eps
     K = [o.Kf(o.B(i), o.x) for i in o.each]
     Q = [o.Q(i, o.x) for i in o.each]
@@ -156,15 +131,10 @@ def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
         yield o.integral(o.g_(i), o.x), right
 
 
-@claim(
-    "(107)",
-    "tK thru H K",
-    "K~_i = -6 P_0 K_i - 6 eps^2 sum_j Q_j K_ij, nabla K_ij = B_i B_j nabla H",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("(107)", "tK thru H K", "H B")
 def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
-    """The general form of K~_i"""
+    """The general form of K~_i
+    K~_i = -6 P_0 K_i - 6 eps^2 sum_j Q_j K_ij, nabla K_ij = B_i B_j nabla H"""
     six = o.number(6) * o.eps * o.eps
     for i in o.free:
         right = P_times(o, o.Kf(o.B(i), o.x))
@@ -173,9 +143,10 @@ def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
         yield o.integral(o.g_(i), o.x), right
 
 
-@claim("Lemma 17 (108)", "grads PQ", "nabla P_0 = (4-m) eps^2 B_i nabla Q_i", breaks=("H", "B"), distinct_roots=True)
+@claim("Lemma 17 (108)", "grads PQ", "H B")
 def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
-    """The gradients of P_0 and Q_i; for m = 3 the factor is eps^2"""
+    """The gradients of P_0 and Q_i; for m = 3 the factor is eps^2
+    nabla P_0 = (4-m) eps^2 B_i nabla Q_i"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.P0(x), o.x, v)
     reciprocals = o.slope(lambda o, x: o.reciprocals(x), o.x, v) * o.number(1, 4)
@@ -185,29 +156,19 @@ def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
         yield reciprocals, right  # for m = 4 the line above is 0 = 0
 
 
-@claim(
-    "Theorem 15, proof",
-    "",
-    "-nabla H~/6 = P_0 nabla H + H nabla P_0 + eps^2 sum (Q_i nabla K_i + K_i nabla Q_i)",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Theorem 15, proof", "", "H B")
 def gradient_of_H_tilde(o: PaperObjects) -> Pairs:
-    """The gradient of (106)"""
+    """The gradient of (106)
+    -nabla H~/6 = P_0 nabla H + H nabla P_0 + eps^2 sum (Q_i nabla K_i + K_i nabla Q_i)"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.H_tilde(x), o.x, v) * o.number(-1, 6)
     yield left, _product_rule(o, v)
 
 
-@claim(
-    "Theorem 15, proof",
-    "",
-    "-B_1 nabla H~/6 = P_0 nabla K_1 + eps^2 H nabla Q_1 + eps^2 Q_1 nabla H + K_1 nabla P_0 - ... = -nabla K~_1/6",
-    only_m=3,
-    breaks=("B", "H"),
-)
+@claim("Theorem 15, proof", "", "B H", only_m=3)
 def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
-    """The five lines that prove (94), for each i"""
+    """The five lines that prove (94), for each i
+    -B_1 nabla H~/6 = P_0 nabla K_1 + eps^2 H nabla Q_1 + eps^2 Q_1 nabla H + K_1 nabla P_0 - ... = -nabla K~_1/6"""
     v = o.vector("v")
     squared = o.eps * o.eps
     Q = [o.Q(i, o.x) for i in o.each]
@@ -229,23 +190,19 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
         yield lines, o.slope(lambda o, x: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
 
 
-@claim("Theorem 15, proof", "", "B_1 nabla K_2 = B_1 B_2 nabla H = -B_3 nabla H = -nabla K_3", only_m=3, breaks=("B",))
+@claim("Theorem 15, proof", "", "B", only_m=3)
 def relations_of_gradients(o: PaperObjects) -> Pairs:
-    """The relations used on the way"""
+    """The relations used on the way
+    B_1 nabla K_2 = B_1 B_2 nabla H = -B_3 nabla H = -nabla K_3"""
     gradient = o.grad(o.x)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         yield o.B(i) * (o.B(j) * gradient), -(o.B(k) * gradient)
 
 
-@claim(
-    "Lemma 16, proof",
-    "",
-    "B_i^T J B_i J = B_i^T B_i^T J^2 = -I, B_i^T J B_j J = B_i^T B_j^T J^2 = B_k^T",
-    only_m=3,
-    breaks=("B", "J"),
-)
+@claim("Lemma 16, proof", "", "B J", only_m=3)
 def products_with_J(o: PaperObjects) -> Pairs:
-    """The products of the matrices of the ansatz"""
+    """The products of the matrices of the ansatz
+    B_i^T J B_i J = B_i^T B_i^T J^2 = -I, B_i^T J B_j J = B_i^T B_j^T J^2 = B_k^T"""
     for i in o.free:
         B = o.B(i).transpose()
         yield B * o.J * o.B(i) * o.J, B * B * o.J * o.J
@@ -259,33 +216,28 @@ def products_with_J(o: PaperObjects) -> Pairs:
 @claim(
     "Lemma 16, proof",
     "",
-    "4 x 4 system with entry (2,3) = eps^3 q_3",
     only_m=3,
-    breaks=(),
     misprint="the entry (2,3) is eps^2 q_3: the matrix is symmetric and its entries have the same order in eps",
 )
 def linear_system_as_printed(o: PaperObjects) -> Pairs:
-    """The linear system for P_0 and Q_i, as printed"""
+    """The linear system for P_0 and Q_i, as printed
+    4 x 4 system with entry (2,3) = eps^3 q_3"""
     yield from _linear_system(o, o.eps * o.eps * o.eps)
 
 
-@claim("Lemma 16, proof", "", "4 x 4 system with entry (2,3) = eps^2 q_3", only_m=3, breaks=("B",))
+@claim("Lemma 16, proof", "", "B", only_m=3)
 def linear_system(o: PaperObjects) -> Pairs:
-    """The linear system for P_0 and Q_i, as mended; its solution is unique"""
+    """The linear system for P_0 and Q_i, as mended; its solution is unique
+    4 x 4 system with entry (2,3) = eps^2 q_3"""
     yield from _linear_system(o, o.eps * o.eps)
     matrix, unknown, right = _system_matrix(o, o.eps * o.eps)
     yield o.K.column(o.solve(matrix, right).entries()), unknown
 
 
-@claim(
-    "Lemma 16, proof",
-    "",
-    "Pi (u_0 J - sum u_i B_i J) = -(M u)_0 I + sum (M u)_i B_i^T, M the matrix of the system, u any vector",
-    only_m=3,
-    breaks=("B", "H"),
-)
+@claim("Lemma 16, proof", "", "B H", only_m=3)
 def ansatz_for_the_inverse(o: PaperObjects) -> Pairs:
-    """Pi times the ansatz is a combination of I and the B_i^T, with the coefficients of the linear system"""
+    """Pi times the ansatz is a combination of I and the B_i^T, with the coefficients of the linear system
+    Pi (u_0 J - sum u_i B_i J) = -(M u)_0 I + sum (M u)_i B_i^T, M the matrix of the system, u any vector"""
     matrix, _, _ = _system_matrix(o, o.eps * o.eps)
     u = o.K.column([o.vector("u")[k, 0] for k in range(4)])
     coefficients = matrix * u
@@ -297,40 +249,38 @@ def ansatz_for_the_inverse(o: PaperObjects) -> Pairs:
     yield o.Pi(o.x) * ansatz, right
 
 
-@claim("Theorem 12", "", "det Pi = (s_1 ... s_m)^2", breaks=("H", "B"), distinct_roots=True)
+@claim("Theorem 12", "", "H B")
 def non_degenerate_tensor(o: PaperObjects) -> Pairs:
-    """Pi is non-degenerate where the map is defined: the structure is symplectic"""
+    """Pi is non-degenerate where the map is defined: the structure is symplectic
+    det Pi = (s_1 ... s_m)^2"""
     product = o.K.one
     for i in o.each:
         product = product * o.s(i, o.x)
     yield o.det(o.Pi(o.x)), product * product
 
 
-@claim("Lemma 16, proof", "", "determinant of the 4 x 4 system = s_0 s_1 s_2 s_3", only_m=3, breaks=("B",))
+@claim("Lemma 16, proof", "", "B", only_m=3)
 def determinant_of_the_linear_system(o: PaperObjects) -> Pairs:
-    """The factorization of the determinant of the linear system, with s_0 = 1"""
+    """The factorization of the determinant of the linear system, with s_0 = 1
+    determinant of the 4 x 4 system = s_0 s_1 s_2 s_3"""
     matrix, _, _ = _system_matrix(o, o.eps * o.eps)
     yield o.det(matrix), o.s(0, o.x) * o.s(1, o.x) * o.s(2, o.x)
 
 
-@claim("(109)", "", "det(I - eps f') = s_1 s_2 s_3", breaks=("H", "B"), distinct_roots=True)
+@claim("(109)", "", "H B")
 def factorization_of_the_determinant(o: PaperObjects) -> Pairs:
-    """The factorization of the determinant, for every m into m factors"""
+    """The factorization of the determinant, for every m into m factors
+    det(I - eps f') = s_1 s_2 s_3"""
     product = o.K.one
     for i in o.each:
         product = product * o.s(i, o.x)
     yield o.det(o.minus_eps_jac(o.f, o.x)), product
 
 
-@claim(
-    "Lemma 17, proof",
-    "",
-    "nabla P_0 = -(4-m)/4 sum nabla s_i/s_i^2, nabla Q_1 = (nabla s_1/s_1^2 - nabla s_2/s_2^2 - ...)/(4 eps^2)",
-    breaks=("B",),
-    distinct_roots=True,
-)
+@claim("Lemma 17, proof", "", "B")
 def gradients_through_s(o: PaperObjects) -> Pairs:
-    """The gradients of P_0 and Q_i through those of the s_i, which are eigenvalues"""
+    """The gradients of P_0 and Q_i through those of the s_i, which are eigenvalues
+    nabla P_0 = -(4-m)/4 sum nabla s_i/s_i^2, nabla Q_1 = (nabla s_1/s_1^2 - nabla s_2/s_2^2 - ...)/(4 eps^2)"""
     v = o.vector("v")
     weighted = []
     for i in o.each:
@@ -343,15 +293,10 @@ def gradients_through_s(o: PaperObjects) -> Pairs:
         yield o.slope(lambda o, x: o.Q(i, x), o.x, v), right
 
 
-@claim(
-    "Lemma 17, proof",
-    "",
-    "B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ...",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Lemma 17, proof", "", "H B")
 def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
-    """B_i changes the sign of nabla s_i and keeps the others"""
+    """B_i changes the sign of nabla s_i and keeps the others
+    B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ..."""
     v = o.vector("v")
     for i in o.free:
         along = o.B(i).transpose() * v

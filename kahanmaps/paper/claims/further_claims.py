@@ -9,20 +9,15 @@ from typing import Any
 from kahanmaps.paper.claims.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
-from kahanmaps.paper.variations import VARIATIONS, Variation, jordan_block, varied
+from kahanmaps.paper.variations import VARIATIONS, jordan_block, varied
 
 _ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
 
 
-@claim(
-    "Structure",
-    "",
-    "det(I - eps f') = prod (1 + eps^2 D_i),  x~ = (x + 2 eps f)/(1 + eps^2 D_i) on each block",
-    breaks=("H", "eps"),
-    distinct_roots=True,
-)
+@claim("Structure", "", "H eps")
 def product_of_planar_maps(o: PaperObjects) -> Pairs:
-    """The map is a product of planar maps: no linear system has to be solved"""
+    """The map is a product of planar maps: no linear system has to be solved
+    det(I - eps f') = prod (1 + eps^2 D_i),  x~ = (x + 2 eps f)/(1 + eps^2 D_i) on each block"""
     product = o.K.one
     for i in o.each:
         E = o.projector(i).transpose()
@@ -32,15 +27,10 @@ def product_of_planar_maps(o: PaperObjects) -> Pairs:
     yield o.det(o.minus_eps_jac(o.f, o.x)), product
 
 
-@claim(
-    "Structure",
-    "",
-    "Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1",
-    breaks=("B", "H"),
-    distinct_roots=True,
-)
+@claim("Structure", "", "B H")
 def associated_maps_on_the_blocks(o: PaperObjects) -> Pairs:
-    """The map of an associated field is the map of f on some blocks and its inverse on the others"""
+    """The map of an associated field is the map of f on some blocks and its inverse on the others
+    Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1"""
     backwards = o.step(o.f, o.x, times=-1)
     for signs in o.all_signs():
         x_hat = o.step(o.g(o.B_signs(signs)), o.x)
@@ -49,9 +39,10 @@ def associated_maps_on_the_blocks(o: PaperObjects) -> Pairs:
             yield E * x_hat, E * (o.x_tilde if signs[i] > 0 else backwards)
 
 
-@claim("Structure", "", "Phi_{-f} = Phi_f^{-1}", breaks=("map",), blockwise=True)
+@claim("Structure", "", "map", blockwise=True)
 def opposite_field(o: PaperObjects) -> Pairs:
-    """The map of -f is the inverse of the map of f"""
+    """The map of -f is the inverse of the map of f
+    Phi_{-f} = Phi_f^{-1}"""
     opposite = o.g(-o.I)
     yield o.step(opposite, o.x_tilde), o.x
 
@@ -59,15 +50,14 @@ def opposite_field(o: PaperObjects) -> Pairs:
 @claim(
     "Structure",
     "",
-    "deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4",
-    kind=ClaimKind.ATTAINED,
+    "f",
     in_general=True,
     at_most="docs/mathematics.md proves it for all n by the content rule",
-    breaks=("f",),
     distinct_roots=True,
 )
 def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
-    """The degrees of the first four iterates are those of the theorem for all n"""
+    """The degrees of the first four iterates are those of the theorem for all n
+    deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4"""
     direction, form = o.vector("direction"), o.vector("form")
     degrees = [o.m * (3 * n * n + 5) // 4 if n % 2 else 3 * o.m * n * n // 4 + 1 for n in range(1, _ITERATES + 1)]
     size = degrees[-1] + 1  # one more, to see a larger degree
@@ -80,108 +70,68 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
         yield o.rank(o.K.matrix(size, size, quotients)), degree
 
 
-@claim(
-    "Tensor theorem",
-    "",
-    "A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]",
-    breaks=("A",),
-    symplectic=False,
-    theorem="the tensor theorem (docs/mathematics.md)",
-)
+@claim("Tensor theorem", "", "A", symplectic=False, theorem="the tensor theorem (docs/mathematics.md)")
 def map_over_the_algebra(o: PaperObjects) -> Pairs:
-    """The Kahan map of a system over Q[A^T] is one over Q[A^T]"""
+    """The Kahan map of a system over Q[A^T] is one over Q[A^T]
+    A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]"""
     jacobian = o.jacobian_of_step(o.arbitrary_system_over_the_algebra(), o.x)
     yield o.AT * jacobian, jacobian * o.AT
 
 
-@claim(
-    "Tensor theorem",
-    "",
-    "Phi_f o Phi_g = Phi_g o Phi_f, g = B^T f, for any quadratic f over Q[A^T]",
-    breaks=("B",),
-    symplectic=False,
-    theorem="the splitting lemma (docs/mathematics.md)",
-)
+@claim("Tensor theorem", "", "B", symplectic=False, theorem="the splitting lemma (docs/mathematics.md)")
 def commuting_systems_over_the_algebra(o: PaperObjects) -> Pairs:
-    """A system over Q[A^T] need not be Hamiltonian for its sign systems to commute"""
+    """A system over Q[A^T] need not be Hamiltonian for its sign systems to commute
+    Phi_f o Phi_g = Phi_g o Phi_f, g = B^T f, for any quadratic f over Q[A^T]"""
     f = o.arbitrary_system_over_the_algebra()
     for B in o.associates():
         g = f.transformed(B.transpose())
         yield o.step(f, o.step(g, o.x)), o.step(g, o.step(f, o.x))
 
 
-@claim(
-    "Tensor theorem",
-    "",
-    "dPhi (A^T)^k Pi(x) dPhi^T = (A^T)^k Pi(x~), k < m",
-    distinct_roots=True,
-    breaks=("H", "map"),
-    blockwise=True,
-)
+@claim("Tensor theorem", "", "H map", distinct_roots=True, blockwise=True)
 def poisson_map_for_each_power(o: PaperObjects) -> Pairs:
-    """Not one invariant Poisson tensor but m, one for each element of a basis of the algebra"""
+    """Not one invariant Poisson tensor but m, one for each element of a basis of the algebra
+    dPhi (A^T)^k Pi(x) dPhi^T = (A^T)^k Pi(x~), k < m"""
     jacobian = o.jacobian_of_step(o.f, o.x)
     for k in range(o.m):
         power = o.A_to(k).transpose()
         yield jacobian * power * o.Pi(o.x) * jacobian.transpose(), power * o.Pi(o.x_tilde)
 
 
-@claim(
-    "Tensor theorem",
-    "",
-    "sum c_k (A^T)^k Pi is a Poisson tensor for any constants c_k",
-    least_m=2,
-    pairwise=True,
-    distinct_roots=True,
-    breaks=("H", "f"),
-)
+@claim("Tensor theorem", "", "H f", least_m=2, pairwise=True, distinct_roots=True)
 def compatible_poisson_tensors(o: PaperObjects) -> Pairs:
-    """The m invariant Poisson tensors are compatible"""
+    """The m invariant Poisson tensors are compatible
+    sum c_k (A^T)^k Pi is a Poisson tensor for any constants c_k"""
     yield from jacobi_identity_of(o, o.polynomial_in_A([o.vector("c")[k, 0] for k in range(o.m)]).transpose())
 
 
 @claim(
     "A with a Jordan block",
     "",
-    "dim of the cubics = 4m, lambda_1 double, chi the minimal polynomial",
-    kind=ClaimKind.ATTAINED,
+    "J",
     at_most="docs/mathematics.md proves it for every A that is not derogatory",
     least_m=2,
-    breaks=("J",),
     distinct_roots=True,
 )
 def dimension_of_the_cubics_for_a_jordan_block(o: PaperObjects) -> Pairs:
-    """For A that is not diagonalisable, but not derogatory, the cubics form a space of dimension 4m as well"""
+    """For A that is not diagonalisable, but not derogatory, the cubics form a space of dimension 4m as well
+    dim of the cubics = 4m, lambda_1 double, chi the minimal polynomial"""
     yield comb(o.n + 2, 3) - jordan_block(o).rank_of_cubic_equations(), 4 * o.m
 
 
-@claim(
-    "Maximality",
-    "",
-    "Phi_f o Phi_g = Phi_g o Phi_f for g = B^T f, B^3 = B",
-    least_m=2,
-    breaks=("roots",),
-    distinct_roots=True,
-    blockwise=True,
-)
+@claim("Maximality", "", "roots", least_m=2, blockwise=True)
 def commutativity_for_idempotents(o: PaperObjects) -> Pairs:
-    """B may have the eigenvalue 0 as well: the map of the part of f on one block commutes with that of f"""
+    """B may have the eigenvalue 0 as well: the map of the part of f on one block commutes with that of f
+    Phi_f o Phi_g = Phi_g o Phi_f for g = B^T f, B^3 = B"""
     for i in o.each:
         g = o.g(o.projector(i))
         yield o.step(o.f, o.step(g, o.x)), o.step(g, o.x_tilde)
 
 
-@claim(
-    "Maximality",
-    "",
-    "Res(N_1, N_2) != 0, (l^3 - l) N_i(l) the components of Phi_f o Phi_{l f} - Phi_{l f} o Phi_f on a block",
-    kind=ClaimKind.DIFFERENT,
-    in_general=True,
-    breaks=("linear",),
-    distinct_roots=True,
-)
+@claim("Maximality", "", "linear", kind=ClaimKind.DIFFERENT, in_general=True)
 def only_cube_roots_commute(o: PaperObjects) -> Pairs:
-    """The maps of f and l f, so those of f at eps and at l eps, commute for l^3 = l only; hence those of f and B^T f"""
+    """The maps of f and l f, so those of f at eps and at l eps, commute for l^3 = l only; hence those of f and B^T f
+    Res(N_1, N_2) != 0, (l^3 - l) N_i(l) the components of Phi_f o Phi_{l f} - Phi_{l f} o Phi_f on a block"""
     for i in o.each:
         x = o.projector(i).transpose() * o.x
         fx, x_tilde = o.value(o.f, x), o.step(o.f, x)
@@ -201,16 +151,10 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
         yield (a * r - c * p) * (a * r - c * p) - (a * q - b * p) * (b * r - c * q), o.K.zero
 
 
-@claim(
-    "Periodic levels",
-    "",
-    "32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]",
-    breaks=("H", "f"),
-    distinct_roots=True,
-    blockwise=True,
-)
+@claim("Periodic levels", "", "H f", blockwise=True)
 def division_polynomials(o: PaperObjects) -> Pairs:
-    """Determinants [ijk] of points of an orbit in a plane: T has order 5 where g = 32/27, and 6 where g = 28/27"""
+    """Determinants [ijk] of points of an orbit in a plane: T has order 5 where g = 32/27, and 6 where g = 28/27
+    32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]"""
     for i in o.free:
         E = o.projector(i).transpose()
         points = [E * o.x]
@@ -306,32 +250,26 @@ def _formula(o: PaperObjects) -> Pairs:
 # VARIATIONS in turn: + holds, - fails, and a blank where it is not asked: of a variation that concerns g nothing is
 # asked that concerns f alone.
 _ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
-STATEMENTS: list[tuple[ClaimFunction, str, tuple[str, ...], dict[str, Any], str]] = [
-    (_commuting, "Phi_f o Phi_g = Phi_g o Phi_f", ("B", "map"), _BOTH, "++--++"),
-    (_measure, "dx/det(I - eps f') is invariant for f", ("map",), _ALONE, "+++ ++"),
-    (_shared_measure, "dx/det(I - eps f') is invariant for g", ("B", "map"), _BOTH, "++--++"),
-    (_modified, "modified H is conserved by f", ("map",), _ALONE, "+++ ++"),
-    (_shared_modified, "modified H is conserved by g, modified K by f", ("B", "map"), _BOTH, "++--++"),
-    (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", ("map",), _ALONE, "-++ ++"),
-    (_all_integrals, "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m", ("map",), _ALONE, "-   ++"),
-    (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", ("map",), _ALONE, "++- +-"),
-    (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", ("B", "map"), _BOTH, "++--+-"),
-    (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", ("f''",), {"pairwise": True, "least_m": 2}, "++- +-"),
-    (_gradients, "nabla (modified K) = B nabla (modified H)", ("B",), _BOTH, "++--++"),
-    (_involution, "{modified H, modified K} = 0 for Pi", ("B",), {"pairwise": True, "needs_g": True}, "++--++"),
-    (_formula, "modified H = P_0 H + eps^2 sum Q_i K_i", ("B",), {}, "-+-   "),
+STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
+    (_commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),
+    (_measure, "dx/det(I - eps f') is invariant for f", "map", _ALONE, "+++ ++"),
+    (_shared_measure, "dx/det(I - eps f') is invariant for g", "B map", _BOTH, "++--++"),
+    (_modified, "modified H is conserved by f", "map", _ALONE, "+++ ++"),
+    (_shared_modified, "modified H is conserved by g, modified K by f", "B map", _BOTH, "++--++"),
+    (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", "map", _ALONE, "-++ ++"),
+    (_all_integrals, "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m", "map", _ALONE, "-   ++"),
+    (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", "map", _ALONE, "++- +-"),
+    (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", "B map", _BOTH, "++--+-"),
+    (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", "f''", {"pairwise": True, "least_m": 2}, "++- +-"),
+    (_gradients, "nabla (modified K) = B nabla (modified H)", "B", _BOTH, "++--++"),
+    (_involution, "{modified H, modified K} = 0 for Pi", "B", {"pairwise": True, "needs_g": True}, "++--++"),
+    (_formula, "modified H = P_0 H + eps^2 sum Q_i K_i", "B", {}, "-+-   "),
 ]
 
 
-def _register_cell(
-    function: ClaimFunction,
-    formula: str,
-    breaks: tuple[str, ...],
-    how: dict[str, Any],
-    name: str,
-    variation: Variation,
-    holds: bool,
-) -> None:
+def _cell(function: ClaimFunction, name: str, holds: bool) -> ClaimFunction:
+    """The claim that the statement of a function holds, or fails, for the objects varied."""
+
     def cell(o: PaperObjects) -> Pairs:
         pairs = list(function(varied(name, o)))
         if holds or not pairs:
@@ -340,21 +278,22 @@ def _register_cell(
             yield tuple(o.K.column([e for pair in pairs for e in entries(pair[side])]) for side in (0, 1))
 
     cell.__name__ = f"{function.__name__}_{name}"
-    cell.__doc__ = f"{(function.__doc__ or '').splitlines()[0].rstrip('.')}: {variation.title}"
-    more = dict(how)
-    needs_g = more.pop("needs_g", False) and variation.least_m > 1 and name != "any-structure"
-    least = max(variation.least_m, more.pop("least_m", 1), 3 if needs_g else 1)
-    more |= {"distinct_roots": True, "least_m": least, "statement": formula, "variation": name}
-    if holds:
-        more |= {"symplectic": not variation.theorem, "theorem": variation.theorem}
-    else:
-        more |= {"kind": ClaimKind.DIFFERENT, "in_general": True}
-    claim(
-        variation.title, "", formula if holds else f"not {formula}", breaks=breaks if holds else ("unvaried",), **more
-    )(cell)
+    return cell
 
 
-for _function, _formula_text, _breaks, _how, _answers in STATEMENTS:
+for _function, _statement, _breaks, _how, _answers in STATEMENTS:
     for (_name, _variation), _answer in zip(VARIATIONS.items(), _answers, strict=True):
-        if _answer != " ":
-            _register_cell(_function, _formula_text, _breaks, _how, _name, _variation, _answer == "+")
+        if _answer == " ":
+            continue
+        _made = _cell(_function, _name, _answer == "+")
+        _title = f"{(_function.__doc__ or '').splitlines()[0].rstrip('.')}: {_variation.title}"
+        _more: dict[str, Any] = {"distinct_roots": True, "statement": _statement, "variation": _name, **_how}
+        _needs_g = _more.pop("needs_g", False) and _variation.least_m > 1 and _name != "any-structure"
+        _more["least_m"] = max(_variation.least_m, _how.get("least_m", 1), 3 if _needs_g else 1)
+        if _answer == "+":
+            _made.__doc__ = f"{_title}\n{_statement}"
+            _more |= {"breaks": _breaks, "symplectic": not _variation.theorem, "theorem": _variation.theorem}
+        else:
+            _made.__doc__ = f"{_title}\nnot {_statement}"
+            _more |= {"breaks": "unvaried", "kind": ClaimKind.DIFFERENT, "in_general": True}
+        claim(_variation.title, "", **_more)(_made)

@@ -11,54 +11,56 @@ from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 @claim(
     "Sect. 3",
     "",
-    "{x1,x3} = {x2,x4} = {x3,x6} = 1",
     only_m=3,
-    breaks=(),
     symplectic=False,
     misprint="the indices belong to different dimensions; with J of (13) it is {x1,x4} = {x2,x5} = {x3,x6} = 1",
 )
 def brackets_as_printed(o: PaperObjects) -> Pairs:
-    """The brackets of the coordinate functions, as printed"""
+    """The brackets of the coordinate functions, as printed
+    {x1,x3} = {x2,x4} = {x3,x6} = 1"""
     for i, j in ((0, 2), (1, 3), (2, 5)):
         yield o.dot(o.unit(i), o.J * o.unit(j)), o.K.one
 
 
-@claim("Sect. 3", "", "{x_i, x_{m+i}} = 1, all others 0", breaks=("J",), symplectic=False)
+@claim("Sect. 3", "", "J", symplectic=False)
 def brackets(o: PaperObjects) -> Pairs:
-    """The brackets of the coordinate functions, as mended: {x1,x4} = {x2,x5} = {x3,x6} = 1 for m = 3"""
+    """The brackets of the coordinate functions, as mended: {x1,x4} = {x2,x5} = {x3,x6} = 1 for m = 3
+    {x_i, x_{m+i}} = 1, all others 0"""
     for i in range(o.n):
         for j in range(o.n):
             expected = 1 if j == i + o.m else -1 if i == j + o.m else 0
             yield o.dot(o.unit(i), o.J * o.unit(j)), o.number(expected)
 
 
-@claim("(13)", "Ham", "x_i' = dH/dx_{m+i}, x_{m+i}' = -dH/dx_i", breaks=("f", "J"))
+@claim("(13)", "Ham", "f J")
 def equations_of_motion(o: PaperObjects) -> Pairs:
-    """The Hamiltonian system is x' = J nabla H_0"""
+    """The Hamiltonian system is x' = J nabla H_0
+    x_i' = dH/dx_{m+i}, x_{m+i}' = -dH/dx_i"""
     gradient = o.gradient(lambda o, x: o.H(x), o.x)
     for i in range(o.m):
         yield o.fx[i, 0], gradient[o.m + i, 0]
         yield o.fx[o.m + i, 0], -gradient[i, 0]
 
 
-@claim(
-    "(14), (15)", "grad K", "nabla H_1 = A nabla H_0, nabla H_2 = A nabla H_1", least_m=2, pairwise=True, breaks=("H",)
-)
+@claim("(14), (15)", "grad K", "H", least_m=2, pairwise=True)
 def gradients_of_the_chain(o: PaperObjects) -> Pairs:
-    """The chain starts with H_1 and, for m > 2, H_2"""
+    """The chain starts with H_1 and, for m > 2, H_2
+    nabla H_1 = A nabla H_0, nabla H_2 = A nabla H_1"""
     for i in range(1, min(o.m, 3)):
         yield o.gradient_of_chain(i, o.x), o.A * o.gradient_of_chain(i - 1, o.x)
 
 
-@claim("Prop. 1 (16)", "cond A", "A^T J = J A", breaks=("A", "J"), symplectic=False)
+@claim("Prop. 1 (16)", "cond A", "A J", symplectic=False)
 def skew_hamiltonian(o: PaperObjects) -> Pairs:
-    """A is skew-Hamiltonian"""
+    """A is skew-Hamiltonian
+    A^T J = J A"""
     yield o.AT * o.J, o.J * o.A
 
 
-@claim("Prop. 1", "", "{H_i, H_j} = 0", least_m=2, breaks=("A", "J"))
+@claim("Prop. 1", "", "A J", least_m=2)
 def involution(o: PaperObjects) -> Pairs:
-    """H_0, ..., H_{m-1} are pairwise in involution"""
+    """H_0, ..., H_{m-1} are pairwise in involution
+    {H_i, H_j} = 0"""
     first, second = o.gradient_of_chain(0, o.x), o.gradient_of_chain(1, o.x)
     yield o.dot(first, o.J * second), o.dot(first, o.J * (o.A * first))
     for i in range(o.m):
@@ -66,9 +68,10 @@ def involution(o: PaperObjects) -> Pairs:
             yield o.dot(o.gradient_of_chain(i, o.x), o.J * o.gradient_of_chain(j, o.x)), o.K.zero
 
 
-@claim("Prop. 1, proof", "", "JA skew;  (A^T)^2 J = A^T J A = J A^2", breaks=("A", "J"), blockwise=True)
+@claim("Prop. 1, proof", "", "A J", blockwise=True)
 def reasons_for_involution(o: PaperObjects) -> Pairs:
-    """J A is skew-symmetric, and A^2 satisfies the condition on A as well"""
+    """J A is skew-symmetric, and A^2 satisfies the condition on A as well
+    JA skew;  (A^T)^2 J = A^T J A = J A^2"""
     JA = o.J * o.A
     yield JA.transpose(), -JA
     w = o.vector("w")  # any vector instead of nabla H_0
@@ -81,40 +84,32 @@ def reasons_for_involution(o: PaperObjects) -> Pairs:
 @claim(
     "Prop. 1, proof",
     "",
-    "A non-scalar => nabla H_0, nabla H_1, nabla H_2 independent",
     only_m=3,
     kind=ClaimKind.ATTAINED,
-    breaks=(),
     distinct_roots=True,
     misprint="a non-scalar A may have a minimal polynomial of degree 2 (here A := B_1), and then H_2 is a combination "
     "of H_0 and H_1; what is needed is a minimal polynomial of degree 3",
 )
 def independence_for_non_scalar_A(o: PaperObjects) -> Pairs:
-    """A non-scalar A ensures that the gradients are independent, generically"""
+    """A non-scalar A ensures that the gradients are independent, generically
+    A non-scalar => nabla H_0, nabla H_1, nabla H_2 independent"""
     B = o.B(0)
     yield o.rank(o.columns([o.grad(o.x), B * o.grad(o.x), B * (B * o.grad(o.x))])), 3
 
 
-@claim(
-    "Prop. 1, proof",
-    "",
-    "minimal polynomial of degree m => nabla H_i independent",
-    kind=ClaimKind.ATTAINED,
-    in_general=True,
-    at_most="there are m of them",
-    breaks=("repeated", "H0"),
-    distinct_roots=True,
-)
+@claim("Prop. 1, proof", "", "repeated H0", in_general=True, at_most="there are m of them", distinct_roots=True)
 def independence_for_cyclic_A(o: PaperObjects) -> Pairs:
-    """The gradients are independent, generically, if the minimal polynomial of A has degree m"""
+    """The gradients are independent, generically, if the minimal polynomial of A has degree m
+    minimal polynomial of degree m => nabla H_i independent"""
     powers = [o.A_to(i).entries() for i in range(o.m)]
     yield o.rank(o.K.matrix(o.m, o.n * o.n, [entry for power in powers for entry in power])), o.m
     yield o.rank(o.columns([o.grad(o.x, i) for i in range(o.m)])), o.m
 
 
-@claim("(17)", "cond2", "A_1^T = A_4, A_2^T = -A_2, A_3^T = -A_3", breaks=("A",), symplectic=False)
+@claim("(17)", "cond2", "A", symplectic=False)
 def blocks(o: PaperObjects) -> Pairs:
-    """The block form of a skew-Hamiltonian matrix"""
+    """The block form of a skew-Hamiltonian matrix
+    A_1^T = A_4, A_2^T = -A_2, A_3^T = -A_3"""
     m = o.m
     for i in range(m):
         for j in range(m):
@@ -123,9 +118,10 @@ def blocks(o: PaperObjects) -> Pairs:
             yield o.A[m + j, i], -o.A[m + i, j]
 
 
-@claim("(18)", "A elem", "A with entries a_1, ..., a_15", only_m=3, breaks=("A",), symplectic=False)
+@claim("(18)", "A elem", "A", only_m=3, symplectic=False)
 def matrix_written_out(o: PaperObjects) -> Pairs:
-    """The 15 parameters of A where the paper writes them"""
+    """The 15 parameters of A where the paper writes them
+    A with entries a_1, ..., a_15"""
     A, zero = o.A, o.K.zero
     a = [zero, *(A[i, j] for i in range(3) for j in range(3))]
     a += [-A[0, 4], -A[0, 5], -A[1, 5], A[3, 1], A[3, 2], A[4, 2]]
@@ -140,9 +136,10 @@ def matrix_written_out(o: PaperObjects) -> Pairs:
     yield A, o.K.matrix(6, 6, [entry for row in written for entry in row])
 
 
-@claim("(19)", "d2H", "A nabla^2 H_i = nabla^2 H_i A^T, i = 0..m-1", breaks=("H", "A"), symplectic=False)
+@claim("(19)", "d2H", "H A", symplectic=False)
 def solvability(o: PaperObjects) -> Pairs:
     """The condition for solvability holds for H_0 and is passed on to every H_i
+    A nabla^2 H_i = nabla^2 H_i A^T, i = 0..m-1
 
     It is necessary and sufficient: the curl of A nabla H is A nabla^2 H - nabla^2 H A^T for the cube H of any linear
     form, and so for any cubic H.
@@ -156,9 +153,10 @@ def solvability(o: PaperObjects) -> Pairs:
     yield curl, o.dot(w, (o.A * hessian - hessian * o.AT) * v)
 
 
-@claim("Sect. 3", "", "A^{-1} nabla^2 H_1 = nabla^2 H_1 (A^{-1})^T", least_m=2, breaks=("H",))
+@claim("Sect. 3", "", "H", least_m=2)
 def solvability_backwards(o: PaperObjects) -> Pairs:
-    """The condition for H_1 with A replaced by its inverse (for a singular A: A plus a multiple of I, same space)"""
+    """The condition for H_1 with A replaced by its inverse (for a singular A: A plus a multiple of I, same space)
+    A^{-1} nabla^2 H_1 = nabla^2 H_1 (A^{-1})^T"""
     A, shift = o.A, 0
     while o.K.is_zero(o.det(A)):
         shift += 1
@@ -171,14 +169,13 @@ def solvability_backwards(o: PaperObjects) -> Pairs:
 @claim(
     "Prop. 2, proof",
     "",
-    "A X = X A^T: 2m(m-1) independent equations of m(2m-1)",
-    kind=ClaimKind.ATTAINED,
+    "repeated A",
     at_most="the 3m quadratic forms on the eigenspaces solve them",
-    breaks=("repeated", "A"),
     distinct_roots=True,
 )
 def independent_equations(o: PaperObjects) -> Pairs:
-    """Of the m(2m-1) scalar equations C_i = 0 only 2m(m-1) are independent: 12 of 15 for m = 3"""
+    """Of the m(2m-1) scalar equations C_i = 0 only 2m(m-1) are independent: 12 of 15 for m = 3
+    A X = X A^T: 2m(m-1) independent equations of m(2m-1)"""
     n = o.n
     columns = []
     for a in range(n):
@@ -196,31 +193,23 @@ def independent_equations(o: PaperObjects) -> Pairs:
 @claim(
     "Prop. 2",
     "",
-    "dim of the cubics = 4m for any skew-Hamiltonian A",
     only_m=3,
     kind=ClaimKind.ATTAINED,
-    breaks=(),
     distinct_roots=True,
     misprint="stated for any A of the kind; its minimal polynomial has to have degree 3. With lambda_1 := lambda_2 (A "
     "diagonalisable) the dimension is 24",
 )
 def dimension_of_the_cubics_for_any_A(o: PaperObjects) -> Pairs:
-    """The cubics of A form a space of dimension 12, without a condition on the roots"""
+    """The cubics of A form a space of dimension 12, without a condition on the roots
+    dim of the cubics = 4m for any skew-Hamiltonian A"""
     repeated = o.changed(A=o.A + o.projector(0) * (o.lam[1] - o.lam[0]))
     yield comb(o.n + 2, 3) - repeated.rank_of_cubic_equations(), 4 * o.m
 
 
-@claim(
-    "Prop. 2",
-    "",
-    "dim of the cubics = 4m, rank of the system C(2m+2,3) - 4m",
-    kind=ClaimKind.ATTAINED,
-    at_most="the 4m cubics on the eigenspaces solve them",
-    breaks=("repeated", "A"),
-    distinct_roots=True,
-)
+@claim("Prop. 2", "", "repeated A", at_most="the 4m cubics on the eigenspaces solve them", distinct_roots=True)
 def dimension_of_the_cubics(o: PaperObjects) -> Pairs:
-    """The cubics of A form a space of dimension 4m: 12 = 56 - 44 for m = 3"""
+    """The cubics of A form a space of dimension 4m: 12 = 56 - 44 for m = 3
+    dim of the cubics = 4m, rank of the system C(2m+2,3) - 4m"""
     unknowns = comb(o.n + 2, 3)
     rank = o.rank_of_cubic_equations()
     yield unknowns - rank, 4 * o.m

@@ -5,20 +5,22 @@ from __future__ import annotations
 from itertools import pairwise
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import ClaimKind, Pairs, claim
+from kahanmaps.paper.registry import Pairs, claim
 
 
-@claim("Theorem 11", "th integrals", "H~(x~) = H~(x), H~(x^) = H~(x)", breaks=("B", "inhomogeneous"), blockwise=True)
+@claim("Theorem 11", "th integrals", "B inhomogeneous", blockwise=True)
 def H_tilde_is_shared(o: PaperObjects) -> Pairs:
-    """H~ is an integral of all maps of the class"""
+    """H~ is an integral of all maps of the class
+    H~(x~) = H~(x), H~(x^) = H~(x)"""
     yield o.H_tilde(o.x_tilde), o.H_tilde(o.x)
     for B in o.associates():
         yield o.H_tilde(o.step(o.g(B), o.x)), o.H_tilde(o.x)
 
 
-@claim("Theorem 11", "th integrals", "K~(x~) = K~(x), K~(x^) = K~(x)", breaks=("B", "H"), blockwise=True)
+@claim("Theorem 11", "th integrals", "B H", blockwise=True)
 def K_tilde_is_shared(o: PaperObjects) -> Pairs:
-    """Every K~ is an integral of f and of every single-index g_i: the class shares m independent ones"""
+    """Every K~ is an integral of f and of every single-index g_i: the class shares m independent ones
+    K~(x~) = K~(x), K~(x^) = K~(x)"""
     images = [o.x_tilde, *(o.step(o.g_(i), o.x) for i in o.each)]
     for B in o.associates():
         for image in images:
@@ -28,15 +30,14 @@ def K_tilde_is_shared(o: PaperObjects) -> Pairs:
 @claim(
     "Theorem 11",
     "th integrals",
-    "rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m",
-    kind=ClaimKind.ATTAINED,
+    "H0",
     in_general=True,
     at_most="nabla K~_i = B_i nabla H~, and the B_i lie in a space of dimension m",
-    breaks=("H0",),
     distinct_roots=True,
 )
 def shared_integrals_are_independent(o: PaperObjects) -> Pairs:
-    """Two integrals of a pair f, g are independent; the class has exactly m independent ones"""
+    """Two integrals of a pair f, g are independent; the class has exactly m independent ones
+    rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
     gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
     if o.m > 1:
@@ -45,26 +46,20 @@ def shared_integrals_are_independent(o: PaperObjects) -> Pairs:
     yield o.rank(o.columns(gradients)), o.m
 
 
-@claim(
-    "(61), (62)",
-    "tH",
-    "H~ = eps^{-1} x^T J x~ = eps^{-1} x^T J (I - eps f')^{-1} x",
-    breaks=("eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("(61), (62)", "tH", "eps inhomogeneous", blockwise=True)
 def two_forms_of_H_tilde(o: PaperObjects) -> Pairs:
-    """H~ and K~ through the image and through the inverse matrix"""
+    """H~ and K~ through the image and through the inverse matrix
+    H~ = eps^{-1} x^T J x~ = eps^{-1} x^T J (I - eps f')^{-1} x"""
     yield o.H_tilde(o.x), o.dot(o.x, o.J * o.solve(o.minus_eps_jac(o.f, o.x), o.x)) / o.eps
     for B in o.associates():
         g = o.g(B)
         yield o.integral(g, o.x), o.dot(o.x, o.J * o.solve(o.minus_eps_jac(g, o.x), o.x)) / o.eps
 
 
-@claim(
-    "Sect. 7", "", "J f'^k = -(nabla^2 H J ... J nabla^2 H), symmetric for odd k, skew for even k", breaks=("f", "J")
-)
+@claim("Sect. 7", "", "f J")
 def terms_of_the_series(o: PaperObjects) -> Pairs:
-    """The matrices in the series of H~; so the terms with even k vanish"""
+    """The matrices in the series of H~; so the terms with even k vanish
+    J f'^k = -(nabla^2 H J ... J nabla^2 H), symmetric for odd k, skew for even k"""
     hessian = o.hess(o.x)
     word, power = hessian, o.df
     for k in range(1, 2 * o.order + 1):
@@ -75,15 +70,10 @@ def terms_of_the_series(o: PaperObjects) -> Pairs:
         word, power = word * o.J * hessian, power * o.df
 
 
-@claim(
-    "Sect. 7",
-    "",
-    "H~ = sum_{k<N} eps^{2k} x^T J f'^{2k+1} x + O(eps^{2N})",
-    breaks=("eps", "f", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("Sect. 7", "", "eps f inhomogeneous", blockwise=True)
 def series_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The series of H~ and K~ to every order up to the one asked for, with the exact remainder"""
+    """The series of H~ and K~ to every order up to the one asked for, with the exact remainder
+    H~ = sum_{k<N} eps^{2k} x^T J f'^{2k+1} x + O(eps^{2N})"""
     for g in [o.f, *(o.g_(i) for i in o.each)]:
         jacobian = o.jac(g, o.x)
         square, squared_eps = jacobian * jacobian, o.eps * o.eps
@@ -95,15 +85,10 @@ def series_of_the_integrals(o: PaperObjects) -> Pairs:
             yield o.integral(g, o.x), total + remainder
 
 
-@claim(
-    "(63), (64)",
-    "tH alt",
-    "H~ = x^T J (I - eps^2 f'^2)^{-1} f' x = 2 x^T J (I - eps^2 f'^2)^{-1} f",
-    breaks=("f", "eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("(63), (64)", "tH alt", "f eps inhomogeneous", blockwise=True)
 def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
-    """H~ and K~ as even functions of eps"""
+    """H~ and K~ as even functions of eps
+    H~ = x^T J (I - eps^2 f'^2)^{-1} f' x = 2 x^T J (I - eps^2 f'^2)^{-1} f"""
     for g in [o.f, *(o.g(B) for B in o.associates())]:
         square = o.one_minus_square(g, o.x)
         middle = o.dot(o.x, o.J * o.solve(square, o.jac(g, o.x) * o.x))
@@ -111,11 +96,10 @@ def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
         yield middle, o.dot(o.x, o.J * o.solve(square, o.value(g, o.x))) * o.number(2)
 
 
-@claim(
-    "Sect. 7", "", "2 x^T J f = -2 x^T nabla H = -6 H, the same for K", breaks=("f", "inhomogeneous"), blockwise=True
-)
+@claim("Sect. 7", "", "f inhomogeneous", blockwise=True)
 def leading_terms(o: PaperObjects) -> Pairs:
-    """The leading terms of H~ and K~"""
+    """The leading terms of H~ and K~
+    2 x^T J f = -2 x^T nabla H = -6 H, the same for K"""
     yield o.dot(o.x, o.J * o.fx) * o.number(2), o.dot(o.x, o.grad(o.x)) * o.number(-2)
     yield o.dot(o.x, o.grad(o.x)) * o.number(-2), o.H(o.x) * o.number(-6)
     for B in o.associates():
@@ -124,15 +108,10 @@ def leading_terms(o: PaperObjects) -> Pairs:
         yield middle, o.Kf(B, o.x) * o.number(-6)
 
 
-@claim(
-    "(65)",
-    "",
-    "H~(x~) = eps^{-1} x^T J (I - eps f'(x~)) (I - eps f'(x~))^{-1} (I - eps f'(x))^{-1} x",
-    breaks=("f", "eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("(65)", "", "f eps inhomogeneous", blockwise=True)
 def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
-    """The computation of H~(x~)"""
+    """The computation of H~(x~)
+    H~(x~) = eps^{-1} x^T J (I - eps f'(x~)) (I - eps f'(x~))^{-1} (I - eps f'(x))^{-1} x"""
     start = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
     after = o.solve(o.minus_eps_jac(o.f, o.x_tilde), start)
     steps = [
@@ -145,9 +124,10 @@ def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
     yield from pairwise(steps)
 
 
-@claim("(66)", "aux3", "K~(x~) = x^T J g'(x~) x", breaks=("B", "H", "inhomogeneous"), blockwise=True)
+@claim("(66)", "aux3", "B H inhomogeneous", blockwise=True)
 def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
-    """The computation of K~(x~)"""
+    """The computation of K~(x~)
+    K~(x~) = x^T J g'(x~) x"""
     for B in o.associates():
         g = o.g(B)
         inner = o.solve(o.one_minus_square(g, o.x_tilde), o.jac(g, o.x_tilde) * o.x_tilde)
@@ -161,15 +141,10 @@ def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
         yield from pairwise(steps)
 
 
-@claim(
-    "(67)",
-    "aux4",
-    "g'(x~) = g'(x) + 2 eps g'' (I - eps^2 f'^2)^{-1} (I + eps f') f",
-    breaks=("eps", "map"),
-    blockwise=True,
-)
+@claim("(67)", "aux4", "eps map", blockwise=True)
 def jacobian_of_g_at_the_image(o: PaperObjects) -> Pairs:
-    """g'(x~) through f at x"""
+    """g'(x~) through f at x
+    g'(x~) = g'(x) + 2 eps g'' (I - eps^2 f'^2)^{-1} (I + eps f') f"""
     increment = o.solve(o.one_minus_square(o.f, o.x), o.plus_eps_jac(o.f, o.x) * o.fx) * (o.number(2) * o.eps)
     for B in o.associates():
         g = o.g(B)
@@ -177,15 +152,10 @@ def jacobian_of_g_at_the_image(o: PaperObjects) -> Pairs:
         yield o.jac(g, o.x_tilde), o.jac(g, o.x) + o.second(g, increment)
 
 
-@claim(
-    "(68)",
-    "aux5",
-    "x^T J (g'' (I - eps^2 f'^2)^{-1} f) x = 0, through -2 nabla H^T (B^T (..)^{-1} J) nabla H",
-    breaks=("A", "f"),
-    blockwise=True,
-)
+@claim("(68)", "aux5", "A f", blockwise=True)
 def odd_terms_vanish(o: PaperObjects) -> Pairs:
-    """The odd terms in eps vanish: a skew-symmetric matrix between equal vectors"""
+    """The odd terms in eps vanish: a skew-symmetric matrix between equal vectors
+    x^T J (g'' (I - eps^2 f'^2)^{-1} f) x = 0, through -2 nabla H^T (B^T (..)^{-1} J) nabla H"""
     square = o.one_minus_square(o.f, o.x)
     inner = o.solve(square, o.fx)
     gradient = o.grad(o.x)
@@ -204,9 +174,10 @@ def odd_terms_vanish(o: PaperObjects) -> Pairs:
         yield skew.transpose(), -skew
 
 
-@claim("(69)", "aux7", "(g'' v) x = g'(x) v", breaks=("inhomogeneous",), blockwise=True)
+@claim("(69)", "aux7", "inhomogeneous", blockwise=True)
 def second_derivative_along_x(o: PaperObjects) -> Pairs:
-    """Homogeneity of g', for any vector v"""
+    """Homogeneity of g', for any vector v
+    (g'' v) x = g'(x) v"""
     v = o.vector("v")
     for g in [o.f, *(o.g(B) for B in o.associates())]:
         yield o.second(g, v) * o.x, o.jac(g, o.x) * v
@@ -215,13 +186,12 @@ def second_derivative_along_x(o: PaperObjects) -> Pairs:
 @claim(
     "Theorem 11, proof",
     "",
-    "K~(x~) = x^T J g' x + 2 eps^2 g'' (I - eps^2 f'^2)^{-1} f' f x",
-    breaks=(),
     misprint="the second term is a vector, the first a number: x^T J is missing before g''. Read as a number by its "
     "first component it fails",
 )
 def even_terms_as_printed(o: PaperObjects) -> Pairs:
-    """The even terms of K~(x~), as printed"""
+    """The even terms of K~(x~), as printed
+    K~(x~) = x^T J g' x + 2 eps^2 g'' (I - eps^2 f'^2)^{-1} f' f x"""
     inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
     for B in o.associates():
         g = o.g(B)
@@ -229,15 +199,10 @@ def even_terms_as_printed(o: PaperObjects) -> Pairs:
         yield o.integral(g, o.x_tilde), o.dot(o.x, o.J * (o.jac(g, o.x) * o.x)) + second
 
 
-@claim(
-    "Theorem 11, proof",
-    "",
-    "K~(x~) = x^T J g' x + 2 eps^2 x^T J g'' (I - eps^2 f'^2)^{-1} f' f x = ... = K~(x)",
-    breaks=("B", "H", "eps"),
-    blockwise=True,
-)
+@claim("Theorem 11, proof", "", "B H eps", blockwise=True)
 def even_terms(o: PaperObjects) -> Pairs:
-    """The even terms, as mended, and the four lines that end the proof"""
+    """The even terms, as mended, and the four lines that end the proof
+    K~(x~) = x^T J g' x + 2 eps^2 x^T J g'' (I - eps^2 f'^2)^{-1} f' f x = ... = K~(x)"""
     inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
     twice = o.number(2) * o.eps * o.eps
     for B in o.associates():
@@ -255,7 +220,8 @@ def even_terms(o: PaperObjects) -> Pairs:
         yield from pairwise(steps)
 
 
-@claim("Sect. 7", "", "sum K~_i = (m-2) H~", breaks=("B", "H"), distinct_roots=True)
+@claim("Sect. 7", "", "B H")
 def sum_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The sum rule; for m = 3 the sum of the three K~_i is H~"""
+    """The sum rule; for m = 3 the sum of the three K~_i is H~
+    sum K~_i = (m-2) H~"""
     yield o.sum([o.integral(o.g_(i), o.x) for i in o.each]), o.H_tilde(o.x) * o.number(o.m - 2)

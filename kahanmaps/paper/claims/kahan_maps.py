@@ -10,11 +10,10 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Pairs, claim
 
 
-@claim(
-    "(4)", "eq: diff eq gen", "f = Q + Bx + c, f' and f'' its derivatives, nabla^2 H that of nabla H", breaks=("f''",)
-)
+@claim("(4)", "eq: diff eq gen", "f''")
 def derivatives_of_the_system(o: PaperObjects) -> Pairs:
-    """What is called f', f'', nabla H and nabla^2 H is obtained by differentiation, for any quadratic f and cubic H"""
+    """What is called f', f'', nabla H and nabla^2 H is obtained by differentiation, for any quadratic f and cubic H
+    f = Q + Bx + c, f' and f'' its derivatives, nabla^2 H that of nabla H"""
     v, w = o.vector("v"), o.vector("w")
     p = o.inhomogeneous()
     for k in range(o.n):
@@ -24,15 +23,10 @@ def derivatives_of_the_system(o: PaperObjects) -> Pairs:
     yield p.second_slope(lambda p, x: p.H(x), p.x, v, w), o.dot(v, p.hess(p.x) * w)
 
 
-@claim(
-    "(5)-(7)",
-    "eq: Kahan gen",
-    "Kahan's equation, its solution and its inverse, for any quadratic f",
-    breaks=("map",),
-    symplectic=False,
-)
+@claim("(5)-(7)", "eq: Kahan gen", "map", symplectic=False)
 def any_quadratic_system(o: PaperObjects) -> Pairs:
-    """A quadratic system without any structure: the equation, the explicit form, reversibility"""
+    """A quadratic system without any structure: the equation, the explicit form, reversibility
+    Kahan's equation, its solution and its inverse, for any quadratic f"""
     f = o.arbitrary_system()
     x_tilde = o.step(f, o.x)
     right = o.K.column(f.polarised(o.x.entries(), x_tilde.entries()))
@@ -42,30 +36,20 @@ def any_quadratic_system(o: PaperObjects) -> Pairs:
     yield o.step(f, x_tilde, times=-1), o.x
 
 
-@claim(
-    "(8), (9)",
-    "eq: Phi hom",
-    "x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f",
-    breaks=("map", "eps"),
-    symplectic=False,
-)
+@claim("(8), (9)", "eq: Phi hom", "map eps", symplectic=False)
 def any_homogeneous_system(o: PaperObjects) -> Pairs:
-    """A homogeneous quadratic system without any structure"""
+    """A homogeneous quadratic system without any structure
+    x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f"""
     f = o.arbitrary_system(homogeneous=True)
     x_tilde = o.step(f, o.x)
     yield x_tilde, o.solve(o.minus_eps_jac(f, o.x), o.x)
     yield x_tilde, o.plus_eps_jac(f, x_tilde) * o.x
 
 
-@claim(
-    "(10)",
-    "Jac",
-    "dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~)), for any quadratic f",
-    breaks=("map", "eps"),
-    symplectic=False,
-)
+@claim("(10)", "Jac", "map eps", symplectic=False)
 def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
-    """The Jacobi matrix of the map of a system without any structure: M(x + t v) x~(x + t v) differentiated"""
+    """The Jacobi matrix of the map of a system without any structure: M(x + t v) x~(x + t v) differentiated
+    dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~)), for any quadratic f"""
     f, v = o.arbitrary_system(), o.vector("v")
     x_tilde = o.step(f, o.x)
     moved = o.jacobian_of_step(f, o.x) * v
@@ -75,54 +59,47 @@ def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
     yield moved - v, half_sum
 
 
-@claim(
-    "(11)",
-    "eq: CMOQ integral",
-    "H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved, for any cubic H and any skew J",
-    breaks=("map", "eps"),
-    symplectic=False,
-)
+@claim("(11)", "eq: CMOQ integral", "map eps", symplectic=False)
 def integral_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
-    """An arbitrary cubic H, with terms of all degrees, and an arbitrary skew J"""
+    """An arbitrary cubic H, with terms of all degrees, and an arbitrary skew J
+    H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved, for any cubic H and any skew J"""
     p = o.arbitrary_hamiltonian()
     yield p.modified_H(p.step(p.f, p.x)), p.modified_H(p.x)
 
 
-@claim(
-    "(12)",
-    "eq: CMOQ measure",
-    "dx/det(I - eps f') is invariant, for any cubic H and any skew J",
-    breaks=("map", "eps"),
-    symplectic=False,
-)
+@claim("(12)", "eq: CMOQ measure", "map eps", symplectic=False)
 def measure_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
-    """The invariant measure for an arbitrary cubic H and an arbitrary skew J"""
+    """The invariant measure for an arbitrary cubic H and an arbitrary skew J
+    dx/det(I - eps f') is invariant, for any cubic H and any skew J"""
     p = o.arbitrary_hamiltonian()
     x_tilde = p.step(p.f, p.x)
     before, after = p.det(p.minus_eps_jac(p.f, p.x)), p.det(p.minus_eps_jac(p.f, x_tilde))
     yield p.det(p.jacobian_of_step(p.f, p.x)) * before, after
 
 
-@claim("(5)", "eq: Kahan gen", "(x~ - x)/(2 eps) = Q(x,x~) + B(x + x~)/2 + c", breaks=("eps", "map"), blockwise=True)
+@claim("(5)", "eq: Kahan gen", "eps map", blockwise=True)
 def defining_equation(o: PaperObjects) -> Pairs:
-    """The map solves Kahan's equation with step 2 eps"""
+    """The map solves Kahan's equation with step 2 eps
+    (x~ - x)/(2 eps) = Q(x,x~) + B(x + x~)/2 + c"""
     for system in (o, o.inhomogeneous()):
         x_tilde = system.step(system.f, o.x)
         right = o.K.column(system.f.polarised(o.x.entries(), x_tilde.entries()))
         yield x_tilde - o.x, right * (o.eps * o.number(2))
 
 
-@claim("Sect. 2", "", "Q(x,x~) = (Q(x + x~) - Q(x) - Q(x~))/2", breaks=("inhomogeneous",), blockwise=True)
+@claim("Sect. 2", "", "inhomogeneous", blockwise=True)
 def polarisation(o: PaperObjects) -> Pairs:
-    """Q(x,x~) is the symmetric bilinear form of the quadratic form Q"""
+    """Q(x,x~) is the symmetric bilinear form of the quadratic form Q
+    Q(x,x~) = (Q(x + x~) - Q(x) - Q(x~))/2"""
     y = o.vector("y")
     whole = o.value(o.f, o.x + y) - o.value(o.f, o.x) - o.value(o.f, y)
     yield o.K.column(o.f.polarised(o.x.entries(), y.entries())) * o.number(2), whole
 
 
-@claim("Sect. 2", "", "x~ = x + 2 eps f + 2 eps^2 f'f + O(eps^3)", breaks=("eps", "map"), blockwise=True)
+@claim("Sect. 2", "", "eps map", blockwise=True)
 def second_order(o: PaperObjects) -> Pairs:
-    """The map approximates the time 2 eps shift along solutions, to second order, with this remainder"""
+    """The map approximates the time 2 eps shift along solutions, to second order, with this remainder
+    x~ = x + 2 eps f + 2 eps^2 f'f + O(eps^3)"""
     for system in (o, o.inhomogeneous()):
         f = system.f
         fx, df = o.value(f, o.x), o.jac(f, o.x)
@@ -131,45 +108,44 @@ def second_order(o: PaperObjects) -> Pairs:
         yield system.step(f, o.x), series + rest * (o.number(2) * o.eps * o.eps * o.eps)
 
 
-@claim("(6)", "eq: reversible", "Phi_f^{-1}(x, eps) = Phi_f(x, -eps)", breaks=("map",), blockwise=True)
+@claim("(6)", "eq: reversible", "map", blockwise=True)
 def reversibility(o: PaperObjects) -> Pairs:
-    """The map with -eps undoes the map with eps"""
+    """The map with -eps undoes the map with eps
+    Phi_f^{-1}(x, eps) = Phi_f(x, -eps)"""
     for system in (o, o.inhomogeneous()):
         yield system.step(system.f, system.step(system.f, o.x), times=-1), o.x
 
 
-@claim("(7)", "eq: Phi gen", "x~ = x + 2 eps (I - eps f')^{-1} f", breaks=("eps", "map"), blockwise=True)
+@claim("(7)", "eq: Phi gen", "eps map", blockwise=True)
 def explicit_form(o: PaperObjects) -> Pairs:
-    """The explicit form of the map"""
+    """The explicit form of the map
+    x~ = x + 2 eps (I - eps f')^{-1} f"""
     for system in (o, o.inhomogeneous()):
         f = system.f
         increment = o.solve(o.minus_eps_jac(f, o.x), o.value(f, o.x))
         yield system.step(f, o.x), o.x + increment * (o.number(2) * o.eps)
 
 
-@claim("(8)", "eq: Phi hom", "x~ = (I - eps f'(x))^{-1} x", breaks=("eps", "inhomogeneous"), blockwise=True)
+@claim("(8)", "eq: Phi hom", "eps inhomogeneous", blockwise=True)
 def homogeneous_form(o: PaperObjects) -> Pairs:
-    """The explicit form for homogeneous f"""
+    """The explicit form for homogeneous f
+    x~ = (I - eps f'(x))^{-1} x"""
     yield o.x_tilde, o.solve(o.minus_eps_jac(o.f, o.x), o.x)
 
 
-@claim(
-    "(9)",
-    "eq: Phi hom alt",
-    "x = (I + eps f'(x~))^{-1} x~,  x~ = (I + eps f'(x~)) x",
-    breaks=("eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("(9)", "eq: Phi hom alt", "eps inhomogeneous", blockwise=True)
 def homogeneous_form_backwards(o: PaperObjects) -> Pairs:
-    """The form of the inverse for homogeneous f, and x~ through f'(x~)"""
+    """The form of the inverse for homogeneous f, and x~ through f'(x~)
+    x = (I + eps f'(x~))^{-1} x~,  x~ = (I + eps f'(x~)) x"""
     matrix = o.plus_eps_jac(o.f, o.x_tilde)
     yield o.x, o.solve(matrix, o.x_tilde)
     yield o.x_tilde, matrix * o.x
 
 
-@claim("(10)", "Jac", "dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~))", breaks=("eps", "map"), blockwise=True)
+@claim("(10)", "Jac", "eps map", blockwise=True)
 def jacobi_matrix_of_the_map(o: PaperObjects) -> Pairs:
-    """The Jacobi matrix of the map"""
+    """The Jacobi matrix of the map
+    dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~))"""
     v = o.vector("v")
     for system in (o, o.inhomogeneous()):
         x_tilde = system.step(system.f, o.x)
@@ -178,56 +154,47 @@ def jacobi_matrix_of_the_map(o: PaperObjects) -> Pairs:
             yield system.slope(lambda o, x: o.step(o.f, x)[k, 0], o.x, v), right[k, 0]
 
 
-@claim(
-    "(11)",
-    "eq: CMOQ integral",
-    "x^T J^{-1} x~/(6 eps) = H + (2 eps/3) nabla H^T (I - eps f')^{-1} f",
-    breaks=("f", "eps", "inhomogeneous"),
-    blockwise=True,
-)
+@claim("(11)", "eq: CMOQ integral", "f eps inhomogeneous", blockwise=True)
 def two_forms_of_the_integral(o: PaperObjects) -> Pairs:
-    """Both forms of the integral of a Hamiltonian system agree (homogeneous H)"""
+    """Both forms of the integral of a Hamiltonian system agree (homogeneous H)
+    x^T J^{-1} x~/(6 eps) = H + (2 eps/3) nabla H^T (I - eps f')^{-1} f"""
     yield o.dot(o.x, o.solve(o.J, o.x_tilde)) / (o.number(6) * o.eps), o.modified_H(o.x)
 
 
 @claim(
     "(11)",
     "eq: CMOQ integral",
-    "x^T J^{-1} x~/(6 eps) = H + (2 eps/3) nabla H^T (I - eps f')^{-1} f for any cubic H",
-    breaks=(),
     misprint="as printed, for arbitrary cubic H, the first form is not the second: it needs H homogeneous (and J "
     "invertible)",
 )
 def two_forms_of_the_integral_for_any_cubic(o: PaperObjects) -> Pairs:
-    """Both forms of the integral agree for an arbitrary cubic Hamilton function"""
+    """Both forms of the integral agree for an arbitrary cubic Hamilton function
+    x^T J^{-1} x~/(6 eps) = H + (2 eps/3) nabla H^T (I - eps f')^{-1} f for any cubic H"""
     yield from two_forms_of_the_integral(o.inhomogeneous())
 
 
-@claim(
-    "(11)",
-    "eq: CMOQ integral",
-    "H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved",
-    breaks=("f", "eps"),
-    blockwise=True,
-)
+@claim("(11)", "eq: CMOQ integral", "f eps", blockwise=True)
 def integral_of_any_cubic_hamiltonian(o: PaperObjects) -> Pairs:
-    """The second form is an integral for every cubic H, homogeneous or not"""
+    """The second form is an integral for every cubic H, homogeneous or not
+    H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved"""
     for system in (o, o.inhomogeneous()):
         yield system.modified_H(system.step(system.f, o.x)), system.modified_H(o.x)
 
 
-@claim("(12)", "eq: CMOQ measure", "dx/det(I - eps f') is invariant", breaks=("f", "map"), blockwise=True)
+@claim("(12)", "eq: CMOQ measure", "f map", blockwise=True)
 def invariant_measure(o: PaperObjects) -> Pairs:
-    """The map of a Hamiltonian system has an invariant measure"""
+    """The map of a Hamiltonian system has an invariant measure
+    dx/det(I - eps f') is invariant"""
     for system in (o, o.inhomogeneous()):
         x_tilde = system.step(system.f, o.x)
         before, after = o.minus_eps_jac(system.f, o.x), o.minus_eps_jac(system.f, x_tilde)
         yield o.det(system.jacobian_of_step(system.f, o.x)) * o.det(before), o.det(after)
 
 
-@claim("Sect. 2", "", "n = 2: dPhi J dPhi^T det(I - eps f'(x)) = det(I - eps f'(x~)) J", only_m=1, breaks=("f", "map"))
+@claim("Sect. 2", "", "f map", only_m=1)
 def measure_means_symplectic_in_the_plane(o: PaperObjects) -> Pairs:
-    """In the plane an invariant measure is the same as symplecticity"""
+    """In the plane an invariant measure is the same as symplecticity
+    n = 2: dPhi J dPhi^T det(I - eps f'(x)) = det(I - eps f'(x~)) J"""
     jacobian = o.jacobian_of_step(o.f, o.x)
     left = jacobian * o.J * jacobian.transpose() * o.det(o.minus_eps_jac(o.f, o.x))
     yield left, o.J * o.det(o.minus_eps_jac(o.f, o.x_tilde))

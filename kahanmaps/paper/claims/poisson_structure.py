@@ -11,87 +11,66 @@ from math import comb
 from typing import Any
 
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.registry import ClaimKind, Pairs, claim
+from kahanmaps.paper.registry import Pairs, claim
 
 
-@claim("Theorem 12 (70)", "Pi short", "Pi = J - eps^2 f'^2 J, skew", breaks=("f",), blockwise=True)
+@claim("Theorem 12 (70)", "Pi short", "f", blockwise=True)
 def tensor(o: PaperObjects) -> Pairs:
-    """The tensor is skew-symmetric"""
+    """The tensor is skew-symmetric
+    Pi = J - eps^2 f'^2 J, skew"""
     Pi = o.Pi(o.x)
     yield Pi, o.one_minus_square(o.f, o.x) * o.J
     yield Pi.transpose(), -Pi
 
 
-@claim(
-    "Theorem 12 (71)",
-    "Pi long",
-    "Pi = (1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Theorem 12 (71)", "Pi long", "H B")
 def tensor_by_B(o: PaperObjects) -> Pairs:
-    """The tensor through the B_i"""
+    """The tensor through the B_i
+    Pi = (1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J"""
     yield o.Pi(o.x), _long_form(o, o.x)
 
 
-@claim(
-    "Theorem 12 (72)",
-    "Pi medium",
-    "Pi = (1 - eps^2 p) J - eps^2 q A^T J - eps^2 r (A^T)^2 J",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Theorem 12 (72)", "Pi medium", "H B")
 def tensor_by_A(o: PaperObjects) -> Pairs:
-    """The tensor through the powers of A; for m = 3 with p, q, r"""
+    """The tensor through the powers of A; for m = 3 with p, q, r
+    Pi = (1 - eps^2 p) J - eps^2 q A^T J - eps^2 r (A^T)^2 J"""
     right = o.J
     for k in range(o.m):
         right = right - o.A_to(k).transpose() * o.J * (o.eps * o.eps * o.coefficient_of_power(k, o.x))
     yield o.Pi(o.x), right
 
 
-@claim("(73)-(75)", "p", "p = p_0 + sum alpha_i q_i, q = sum beta_i q_i, r = sum gamma_i q_i", breaks=("H", "B"))
+@claim("(73)-(75)", "p", "H B")
 def coefficients_of_the_powers(o: PaperObjects) -> Pairs:
-    """p, q, r (for every m) are the coefficients of f'^2 in powers of A^T"""
+    """p, q, r (for every m) are the coefficients of f'^2 in powers of A^T
+    p = p_0 + sum alpha_i q_i, q = sum beta_i q_i, r = sum gamma_i q_i"""
     total = o.zeros(o.n, o.n)
     for k in range(o.m):
         total = total + o.A_to(k).transpose() * o.coefficient_of_power(k, o.x)
     yield o.df * o.df, total
 
 
-@claim(
-    "Theorem 12 (76)",
-    "Pois prop",
-    "dPhi Pi(x) dPhi^T = Pi(x~)",
-    distinct_roots=True,
-    breaks=("H", "map"),
-    blockwise=True,
-)
+@claim("Theorem 12 (76)", "Pois prop", "H map", distinct_roots=True, blockwise=True)
 def poisson_map(o: PaperObjects) -> Pairs:
-    """The map of f is Poisson"""
+    """The map of f is Poisson
+    dPhi Pi(x) dPhi^T = Pi(x~)"""
     jacobian = o.jacobian_of_step(o.f, o.x)
     yield jacobian * o.Pi(o.x) * jacobian.transpose(), o.Pi(o.x_tilde)
 
 
-@claim(
-    "Theorem 12", "th Poisson", "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", distinct_roots=True, breaks=("B", "H"), blockwise=True
-)
+@claim("Theorem 12", "th Poisson", "B H", distinct_roots=True, blockwise=True)
 def poisson_map_of_g(o: PaperObjects) -> Pairs:
-    """The maps of all associated fields are Poisson with respect to the same bracket"""
+    """The maps of all associated fields are Poisson with respect to the same bracket
+    dPhi_g Pi(x) dPhi_g^T = Pi(x^)"""
     for B in o.associates():
         jacobian = o.jacobian_of_step(o.g(B), o.x)
         yield jacobian * o.Pi(o.x) * jacobian.transpose(), o.Pi(o.step(o.g(B), o.x))
 
 
-@claim(
-    "Theorem 12, proof",
-    "",
-    "(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T",
-    distinct_roots=True,
-    breaks=("H", "f"),
-    blockwise=True,
-)
+@claim("Theorem 12, proof", "", "H f", distinct_roots=True, blockwise=True)
 def poisson_property_without_inverses(o: PaperObjects) -> Pairs:
-    """The property (76) without inverses, then multiplied by J. It holds for any two points, not only for x and x~"""
+    """The property (76) without inverses, then multiplied by J. It holds for any two points, not only for x and x~
+    (I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T"""
     plus, minus = o.plus_eps_jac(o.f, o.x_tilde), o.minus_eps_jac(o.f, o.x)
     before, after = o.Pi(o.x), o.Pi(o.x_tilde)
     yield plus * before * plus.transpose(), minus * after * minus.transpose()
@@ -99,57 +78,35 @@ def poisson_property_without_inverses(o: PaperObjects) -> Pairs:
     yield left, minus * after * o.J * o.plus_eps_jac(o.f, o.x)
 
 
-@claim(
-    "Theorem 12, proof",
-    "",
-    "Pi(x) J commutes with f'(y) at any point y",
-    distinct_roots=True,
-    breaks=("H", "f"),
-    blockwise=True,
-)
+@claim("Theorem 12, proof", "", "H f", distinct_roots=True, blockwise=True)
 def tensor_commutes_with_jacobians(o: PaperObjects) -> Pairs:
-    """Pi J is a polynomial in A^T and so commutes with f' at any point"""
+    """Pi J is a polynomial in A^T and so commutes with f' at any point
+    Pi(x) J commutes with f'(y) at any point y"""
     left, right = o.Pi(o.x) * o.J, o.jac(o.f, o.vector("y"))
     yield left * right, right * left
 
 
-@claim(
-    "Theorem 12, proof",
-    "",
-    "(I - eps f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps f'(x)^2)",
-    breaks=(),
-    misprint="the factor of both squares is eps^2, not eps",
-)
+@claim("Theorem 12, proof", "", misprint="the factor of both squares is eps^2, not eps")
 def last_display_as_printed(o: PaperObjects) -> Pairs:
-    """The last display of the proof of (76), as printed"""
+    """The last display of the proof of (76), as printed
+    (I - eps f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps f'(x)^2)"""
     after, before = o.jac(o.f, o.x_tilde), o.df
     left = (o.I - after * after * o.eps) * _long_form(o, o.x) * o.J
     yield left, _long_form(o, o.x_tilde) * o.J * (o.I - before * before * o.eps)
 
 
-@claim(
-    "Theorem 12, proof",
-    "",
-    "(I - eps^2 f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps^2 f'(x)^2)",
-    breaks=("H", "B"),
-    distinct_roots=True,
-)
+@claim("Theorem 12, proof", "", "H B")
 def last_display(o: PaperObjects) -> Pairs:
-    """The last display of the proof of (76), as mended, with Pi in the form (71)"""
+    """The last display of the proof of (76), as mended, with Pi in the form (71)
+    (I - eps^2 f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps^2 f'(x)^2)"""
     left = o.one_minus_square(o.f, o.x_tilde) * _long_form(o, o.x) * o.J
     yield left, _long_form(o, o.x_tilde) * o.J * o.one_minus_square(o.f, o.x)
 
 
-@claim(
-    "Lemma 13 (77), (78)",
-    "grad qr",
-    "nabla q = C_1 nabla r, nabla p = C_2 nabla r",
-    least_m=2,
-    breaks=("H",),
-    distinct_roots=True,
-)
+@claim("Lemma 13 (77), (78)", "grad qr", "H", least_m=2)
 def gradient_conditions(o: PaperObjects) -> Pairs:
-    """The gradients of the coefficients: nabla pi_k = C_k(A) nabla pi_{m-1}"""
+    """The gradients of the coefficients: nabla pi_k = C_k(A) nabla pi_{m-1}
+    nabla q = C_1 nabla r, nabla p = C_2 nabla r"""
     v = o.vector("v")
     for k in range(o.m - 1):
         left = o.slope(lambda o, x: o.coefficient_of_power(k, x), o.x, v)
@@ -158,26 +115,20 @@ def gradient_conditions(o: PaperObjects) -> Pairs:
         yield left, o.slope(lambda o, x: o.coefficient_of_power(o.m - 1, x), o.x, along)
 
 
-@claim("(79)-(81)", "C1", "C_1 = A - aI, C_2 = A^2 - aA + bI", only_m=3, breaks=("A",))
+@claim("(79)-(81)", "C1", "A", only_m=3)
 def matrices_C(o: PaperObjects) -> Pairs:
-    """C_1, C_2 and a, b through traces of A and A^2"""
+    """C_1, C_2 and a, b through traces of A and A^2
+    C_1 = A - aI, C_2 = A^2 - aA + bI"""
     a = o.trace(o.A) * o.number(1, 2)
     b = o.trace(o.A) * o.trace(o.A) * o.number(1, 8) - o.trace(o.A * o.A) * o.number(1, 4)
     yield o.horner(1), o.A - o.I * a
     yield o.horner(0), o.A * o.A - o.A * a + o.I * b
 
 
-@claim(
-    "Lemma 13 (82)",
-    "Jacobi id",
-    "{x_i,{x_j,x_k}} + cyclic = 0",
-    least_m=2,
-    pairwise=True,
-    distinct_roots=True,
-    breaks=("H", "f"),
-)
+@claim("Lemma 13 (82)", "Jacobi id", "H f", least_m=2, pairwise=True, distinct_roots=True)
 def jacobi_identity(o: PaperObjects) -> Pairs:
-    """Pi is a Poisson tensor: the Jacobi identity for all triples of coordinates"""
+    """Pi is a Poisson tensor: the Jacobi identity for all triples of coordinates
+    {x_i,{x_j,x_k}} + cyclic = 0"""
     yield from jacobi_identity_of(o, o.I)
 
 
@@ -192,15 +143,10 @@ def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
         yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
 
 
-@claim(
-    "Lemma 13, proof",
-    "",
-    "coefficient of eps^2 in the Jacobi identities vanishes for nabla pi_k = C_k w, w any vector",
-    least_m=2,
-    breaks=("J", "A"),
-)
+@claim("Lemma 13, proof", "", "J A", least_m=2)
 def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
-    """The gradient conditions solve the equations of first order in eps^2"""
+    """The gradient conditions solve the equations of first order in eps^2
+    coefficient of eps^2 in the Jacobi identities vanishes for nabla pi_k = C_k w, w any vector"""
     equations, solutions = _first_order(o)
     yield equations * solutions, o.zeros(equations.nrows(), o.n)
 
@@ -208,31 +154,24 @@ def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
 @claim(
     "Lemma 13, proof",
     "",
-    "these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions",
-    kind=ClaimKind.ATTAINED,
+    "repeated",
     least_m=3,
     at_most="the gradients (C_0 w, ..., C_(m-1) w) solve them",
-    breaks=("repeated",),
     distinct_roots=True,
 )
 def rank_of_the_first_order(o: PaperObjects) -> Pairs:
-    """Pi is Poisson only if the gradient conditions hold: 20 equations of rank 12 in 18 unknowns for m = 3"""
+    """Pi is Poisson only if the gradient conditions hold: 20 equations of rank 12 in 18 unknowns for m = 3
+    these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions"""
     equations, solutions = _first_order(o)
     yield equations.nrows(), comb(2 * o.m, 3)
     yield o.rank(equations), 2 * o.m * (o.m - 1)
     yield o.rank(solutions), equations.ncols() - 2 * o.m * (o.m - 1)
 
 
-@claim(
-    "Lemma 13, proof",
-    "",
-    "coefficient of eps^4 vanishes by virtue of nabla pi_k = C_k w, for any values pi_k and any vector w",
-    least_m=2,
-    breaks=("J", "A"),
-    distinct_roots=True,
-)
+@claim("Lemma 13, proof", "", "J A", least_m=2, distinct_roots=True)
 def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
-    """The coefficients of eps^4 in the Jacobi identity vanish, whatever p, q, r are, if the gradient conditions hold"""
+    """The coefficients of eps^4 in the Jacobi identity vanish, whatever p, q, r are, if the gradient conditions hold
+    coefficient of eps^4 vanishes by virtue of nabla pi_k = C_k w, for any values pi_k and any vector w"""
     values, w = o.vector("values"), o.vector("w")
     powers = [o.A_to(k).transpose() * o.J for k in range(o.m)]
     P = o.sum([power * values[k, 0] for k, power in enumerate(powers)])
@@ -244,9 +183,10 @@ def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
         yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
 
 
-@claim("Lemma 14 (83)", "grads pq", "nabla p_0 = (4-m) B_i nabla q_i", breaks=("H", "B"), distinct_roots=True)
+@claim("Lemma 14 (83)", "grads pq", "H B")
 def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
-    """The gradients of p_0 and q_i; for m = 3 the factor is 1"""
+    """The gradients of p_0 and q_i; for m = 3 the factor is 1
+    nabla p_0 = (4-m) B_i nabla q_i"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.p0(x), o.x, v)
     trace = o.slope(lambda o, x: o.eighth_of_trace(x), o.x, v)
@@ -256,16 +196,10 @@ def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
         yield trace, right  # for m = 4 the line above is 0 = 0
 
 
-@claim(
-    "Theorem 12, proof",
-    "",
-    "nabla p = (I + sum alpha_i B_i) nabla p_0, nabla q = sum beta_i B_i nabla p_0, ...",
-    least_m=2,
-    breaks=("H",),
-    distinct_roots=True,
-)
+@claim("Theorem 12, proof", "", "H", least_m=2)
 def gradients_through_p0(o: PaperObjects) -> Pairs:
-    """The gradients of p, q, r through nabla tr f'^2/8, which is nabla p_0 for m = 3"""
+    """The gradients of p, q, r through nabla tr f'^2/8, which is nabla p_0 for m = 3
+    nabla p = (I + sum alpha_i B_i) nabla p_0, nabla q = sum beta_i B_i nabla p_0, ..."""
     v = o.vector("v")
     for k in range(o.m):
         matrix = o.sum([o.B(i) * o.lagrange(i)[k] for i in o.each])
@@ -279,16 +213,10 @@ def gradients_through_p0(o: PaperObjects) -> Pairs:
         yield left, o.slope(lambda o, x: o.eighth_of_trace(x), o.x, matrix.transpose() * v)
 
 
-@claim(
-    "(84), (85)",
-    "",
-    "sum beta_i B_i = (A - aI) sum gamma_i B_i, I + sum alpha_i B_i = (A^2 - aA + bI) sum gamma_i B_i",
-    least_m=2,
-    breaks=("B",),
-    distinct_roots=True,
-)
+@claim("(84), (85)", "", "B", least_m=2)
 def sums_with_coefficients(o: PaperObjects) -> Pairs:
-    """The matrix identities behind the gradient conditions"""
+    """The matrix identities behind the gradient conditions
+    sum beta_i B_i = (A - aI) sum gamma_i B_i, I + sum alpha_i B_i = (A^2 - aA + bI) sum gamma_i B_i"""
     last = o.sum([o.B(i) * o.lagrange(i)[o.m - 1] for i in o.each])
     for k in range(o.m - 1):
         left = o.sum([o.B(i) * o.lagrange(i)[k] for i in o.each])
@@ -297,15 +225,10 @@ def sums_with_coefficients(o: PaperObjects) -> Pairs:
         yield left, o.horner(k) * last
 
 
-@claim(
-    "(86), (87)",
-    "pois lemma cond 1",
-    "beta_j + beta_k - beta_i = (lambda_i - a)(gamma_j + gamma_k - gamma_i), 1 + alpha_j + alpha_k - alpha_i = ...",
-    only_m=3,
-    breaks=("B",),
-)
+@claim("(86), (87)", "pois lemma cond 1", "B", only_m=3)
 def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
-    """The same at the eigenvalues, and the equivalent forms beta_i = (lambda_i - a) gamma_i, alpha_i - 1 = ..."""
+    """The same at the eigenvalues, and the equivalent forms beta_i = (lambda_i - a) gamma_i, alpha_i - 1 = ...
+    beta_j + beta_k - beta_i = (lambda_i - a)(gamma_j + gamma_k - gamma_i), 1 + alpha_j + alpha_k - alpha_i = ..."""
     a, b = -o.chi[2], o.chi[1]
     for i in o.free:
         j, k = (other for other in o.each if other != i)
@@ -324,15 +247,10 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
         yield ai - o.K.one, quadratic * ci
 
 
-@claim(
-    "(88), (89)",
-    "Af' comp",
-    "sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative",
-    least_m=2,
-    breaks=("H", "A"),
-)
+@claim("(88), (89)", "Af' comp", "H A", least_m=2)
 def components(o: PaperObjects) -> Pairs:
-    """B^T f' = f' B^T in components, and its derivative by x_l"""
+    """B^T f' = f' B^T in components, and its derivative by x_l
+    sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative"""
     for i in o.free:
         B = o.B(i)
         yield B.transpose() * o.df, o.df * B.transpose()
@@ -341,9 +259,10 @@ def components(o: PaperObjects) -> Pairs:
             yield B.transpose() * second, second * B.transpose()
 
 
-@claim("(90)", "grad q comp", "dq/dx_l = tr(B^T f''_l f')/8 + tr(B^T f' f''_l)/8", breaks=("f''",))
+@claim("(90)", "grad q comp", "f''")
 def gradient_of_q(o: PaperObjects) -> Pairs:
-    """The gradient of q_i in components: two sums"""
+    """The gradient of q_i in components: two sums
+    dq/dx_l = tr(B^T f''_l f')/8 + tr(B^T f' f''_l)/8"""
     for i in o.free:
         gradient = o.gradient(lambda o, x: o.q(i, x), o.x)
         for l in range(o.n):
@@ -351,14 +270,10 @@ def gradient_of_q(o: PaperObjects) -> Pairs:
             yield gradient[l, 0], first + second
 
 
-@claim(
-    "(91)-(93)",
-    "A grad q comp",
-    "(B nabla q)_n = sum_l (B^T)_ln dq/dx_l = sum d_n d_m f_j d_j f_m/8 + sum d_j f_k d_j d_n f_k/8",
-    breaks=("H", "B"),
-)
+@claim("(91)-(93)", "A grad q comp", "H B")
 def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
-    """Both contributions to B nabla q, and their sum nabla tr f'^2/8"""
+    """Both contributions to B nabla q, and their sum nabla tr f'^2/8
+    (B nabla q)_n = sum_l (B^T)_ln dq/dx_l = sum d_n d_m f_j d_j f_m/8 + sum d_j f_k d_j d_n f_k/8"""
     trace = o.gradient(lambda o, x: o.eighth_of_trace(x), o.x)
     for i in o.free:
         B = o.B(i)
