@@ -49,31 +49,11 @@ class MemberObjects(PaperObjects):
     member: FamilyMember
 
     @classmethod
-    def at(
-        cls,
-        member: FamilyMember,
-        K: Field,
-        eps: Any,
-        draw: Draw,
-        roots: tuple[Any, ...] | None,
-        sign_vectors: tuple[tuple[int, ...], ...] | None,
-        order: int,
-    ) -> MemberObjects:
+    def at(cls, member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, **more: Any) -> MemberObjects:
         """The objects of a member over K; `roots` are those of chi, None where they do not lie in K."""
-        chi = chi_of(member.A)
-        objects = cls(
-            K=K,
-            A=K.convert_matrix(member.A),
-            third=K.convert_matrix(_third_matrix(member)),
-            eps=eps,
-            roots=roots,
-            draw=draw,
-            base=member.hamiltonians[0].system.over(K),
-            known_chi=tuple(K.convert(chi[k]) for k in range(member.m + 1)),
-            sign_vectors=sign_vectors,
-            associate_matrices=_matrices_by_factor(member, K),
-            order=order,
-        )
+        base, chi = member.hamiltonians[0].system.over(K), chi_of(member.A)
+        known_chi = tuple(K.convert(chi[k]) for k in range(member.m + 1))
+        objects = cls(**_given(member, K), roots=roots, base=base, known_chi=known_chi, **more)
         objects.member = member
         return objects
 
@@ -93,9 +73,8 @@ class MemberObjects(PaperObjects):
     def lagrange(self, i: int) -> list[Any]:
         """The coefficients of B_i from the library, where the roots of chi are rational."""
         if self._is_split:
-            return [
-                self.K.convert(c) for c in self._associate(tuple(-1 if j == i else 1 for j in self.each)).coefficients
-            ]
+            signs = tuple(-1 if j == i else 1 for j in self.each)
+            return [self.K.convert(c) for c in self._associate(signs).coefficients]
         return super().lagrange(i)
 
     def B_signs(self, signs: Sequence[int]) -> Any:
@@ -177,8 +156,8 @@ def point_over(
     """A member at a random point over QQ or GF(p), eps random where it is not given."""
     value = K.zero if eps is None else K.convert(eps)
     value = _not_zero(K, rng) if value == 0 else value
-    signs = sign_sample(member.m, rng)
-    return MemberObjects.at(member, K, value, random_draw(K, member.dim, rng), roots, signs, order)
+    signs, draw = sign_sample(member.m, rng), random_draw(K, member.dim, rng)
+    return MemberObjects.at(member, K, roots, eps=value, draw=draw, sign_vectors=signs, order=order)
 
 
 def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
@@ -201,17 +180,13 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
             shear[place], back[place] = value, -value
         S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, back) * S_inverse
     A, third = _normal_form(K, roots, cubics)
-    # x = S z: the Hesse matrix is S^{-T} Hess_z S^{-1}, taken at z = S^{-1} x, and A becomes S^{-T} A S^T.
-    turned = S_inverse.transpose()
-    slices = K.matrix(n, n * n, (turned * K.matrix(n, n * n, third.entries())).entries())
-    columns = []
-    for l in range(n):
-        middle = K.matrix(n, n, [slices[i, j * n + l] for i in range(n) for j in range(n)]) * S_inverse
-        columns.append(middle.entries())
-    third = K.matrix(n * n, n, [entry for row in zip(*columns, strict=True) for entry in row]) * S_inverse
+    # x = S z: A becomes S^{-T} A S^T, and each index of the third derivatives is multiplied by S^{-1}: the last one,
+    # which comes first then, three times.
+    for _ in range(3):
+        third = K.matrix(n * n, n, (third * S_inverse).transpose().entries())
     eps = _not_zero(K, rng)
     signs = sign_sample(m, rng)
-    A = turned * A * S.transpose()
+    A = S_inverse.transpose() * A * S.transpose()
     return PaperObjects(
         K=K, A=A, third=third, eps=eps, roots=roots, draw=random_draw(K, n, rng), sign_vectors=signs, order=order
     )
@@ -288,7 +263,7 @@ def member_functions(
     lifted = None if roots is None else tuple(K.convert(root) for root in roots)
     value = by_name["eps"] if eps is None else K.convert(eps)
     signs = sign_sample(member.m, random.Random("signs"))
-    return MemberObjects.at(member, K, value, draw, lifted, signs, order)
+    return MemberObjects.at(member, K, lifted, eps=value, draw=draw, sign_vectors=signs, order=order)
 
 
 def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
@@ -320,9 +295,7 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
     with K.working():
         value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
         return PaperObjects(
-            K=K,
-            A=K.convert_matrix(member.A),
-            third=K.convert_matrix(_third_matrix(member)),
+            **_given(member, K),
             eps=value,
             roots=roots,
             draw=lambda name: K.column([K.convert(QQ.random(rng)) for _ in range(member.dim)]),
@@ -348,15 +321,12 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
         root = K.matrix(1, member.m, [K.convert(abs(r)) for r in rational_roots(member) or ()])[0, 0]
     value = K.variable() if eps is None else K.convert(eps)
     return PaperObjects(
-        K=K,
-        A=K.convert_matrix(member.A),
-        third=K.convert_matrix(_third_matrix(member)),
+        **_given(member, K),
         eps=value,
         roots=(root,) * member.m,
         draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
         known_chi=tuple(K.convert(abs(chi[k])) for k in range(member.m + 1)),
         sign_vectors=_two_sign_vectors(member.m),
-        associate_matrices=_matrices_by_factor(member, K),
         order=order,
     )
 
@@ -394,11 +364,18 @@ def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
     return {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
 
 
-def _third_matrix(member: FamilyMember) -> fmpq_mat:
-    """The third derivatives of H as an n^2 x n matrix."""
+def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
+    """The data of a member over K: A, the third derivatives of H and, where chi has repeated roots, the B.
+
+    These have one sign for each irreducible factor of chi, to its power.
+    """
     n = member.dim
     slices = [matrix.entries() for matrix in third_derivatives(member.H)]
-    return fmpq_mat(n * n, n, [slices[l][row] for row in range(n * n) for l in range(n)])
+    third = fmpq_mat(n * n, n, [slices[l][row] for row in range(n * n) for l in range(n)])
+    given = {"K": K, "A": K.convert_matrix(member.A), "third": K.convert_matrix(third)}
+    if not member.is_generic:
+        given["associate_matrices"] = tuple(K.convert_matrix(g.B) for g in list(member.associated())[1:])
+    return given
 
 
 def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:
@@ -419,10 +396,3 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
 def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:
     """Two associated systems with as many factors B_i as there can be: what is bounded for them is so for any pair."""
     return None if m == 1 else ((-1,) * m, (1,) + (-1,) * (m - 1))
-
-
-def _matrices_by_factor(member: FamilyMember, K: Field) -> tuple[Any, ...] | None:
-    """For a chi with repeated roots: the B with one sign for each of its irreducible factors, to its power."""
-    if member.is_generic:
-        return None
-    return tuple(K.convert_matrix(associate.B) for associate in list(member.associated())[1:])

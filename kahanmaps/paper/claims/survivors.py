@@ -6,8 +6,9 @@ to by the smallest counterexample: all numbers 0 or 1 and eps = 1, as few ones a
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from flint import fmpq
@@ -25,7 +26,7 @@ from kahanmaps.paper.verify import VerifyOptions, verify
 _MOST_ONES = 7
 _KEY = "not "
 
-Slot = tuple[str, tuple[int, ...]]
+Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coordinates, "x" with one
 
 
 def survivors(m: int = 3, settings: Settings | None = None) -> Report:
@@ -77,59 +78,60 @@ def table(report: Report) -> str:
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
     """The data in words, and the point with both sides; None where there is none with at most seven ones."""
-    slots, make = _SMALL[variation]()
+    m, roots, slots, more = _SMALL[variation]
     for count in range(2, _MOST_ONES + 1):
         for ones in itertools.combinations(slots, count):
-            o = make(ones)
+            o = _objects(m, roots, ones, **more)
             try:
                 failure = next((pair for pair in function(o) if not same(QQ, *pair)), None)
             except UNDEFINED:
                 continue
-            if failure is not None:
-                witness = witness_of(ClaimOutcome(o, 1, failure))
-                return (_words(o, ones), witness) if witness is not None else None
+            if failure is None:
+                continue
+            names = [f"{letter}{i + 1}" for letter in "uv" for i in range(m)]
+            terms = [
+                "*".join(names[i] + f"^{e}" * (e > 1) for i, e in enumerate(place) if e)
+                for kind, place in ones
+                if kind == "H"
+            ]
+            text = f"m = {m}, H = {' + '.join(terms)}"
+            brackets = [f"{{{names[place[0]]}, {names[place[1]]}}} = " for kind, place in ones if kind == "J"]
+            text += f", {''.join(brackets)}1 the only brackets" if brackets else ""
+            witness = witness_of(ClaimOutcome(o, 1, failure))
+            return (text, witness) if witness is not None else None
     return None
 
 
-def _words(o: PaperObjects, ones: Sequence[Slot]) -> str:
-    names = [f"{letter}{i + 1}" for letter in "uv" for i in range(o.m)]
-    terms = [
-        "*".join(names[i] + f"^{e}" * (e > 1) for i, e in enumerate(place) if e) for kind, place in ones if kind == "H"
-    ]
-    text = f"m = {o.m}, H = {' + '.join(terms)}"
-    brackets = [f"{{{names[i]}, {names[j]}}}" for kind, (i, j) in _pairs(ones) if kind == "J"]
-    return f"{text}, {' = '.join(brackets)} = 1 the only brackets" if brackets else text
-
-
-def _pairs(ones: Sequence[Slot]) -> Iterator[tuple[str, tuple[int, int]]]:
-    return ((kind, (place[0], place[1])) for kind, place in ones if kind == "J")
-
-
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) -> PaperObjects:
-    """Objects in normal form with A = diag(roots, roots), H the sum of the monomials, x the sum of the unit vectors."""
+    """Objects in normal form with A = diag(roots, roots), H the sum of the monomials, x the sum of the unit vectors.
+
+    Where there are brackets among the ones they make up J.
+    """
     n = 2 * m
-    cubic = [[0] * n for _ in range(n * n)]
-    hessian, linear, x = [[0] * n for _ in range(n)], [0] * n, [0] * n
+    cubic, hessian, linear, J = ([0] * n**k for k in (3, 2, 1, 2))
+    vectors = {"x": [0] * n, "v": [1] * n}
     for kind, place in ones:
-        where = [i for i, e in enumerate(place) for _ in range(e)] if kind == "H" else []
-        for i, j, k in itertools.permutations(where) if len(where) == 3 else ():
-            cubic[i * n + j][k] += 1
-        for i, j in itertools.permutations(where) if len(where) == 2 else ():
-            hessian[i][j] += 1
-        if len(where) == 1:
-            linear[where[0]] += 1
         if kind == "x":
-            x[place[0]] += 1
-    vectors = {"x": x, "v": [1] * n}
+            vectors["x"][place[0]] = 1
+        elif kind == "J":
+            J[place[0] * n + place[1]], J[place[1] * n + place[0]] = 1, -1
+        else:
+            # Every derivative of a monomial of this degree, along coordinates that it has in some order, gains 1.
+            where = [i for i, e in enumerate(place) for _ in range(e)]
+            entries = {3: cubic, 2: hessian, 1: linear}[len(where)]
+            for order in itertools.permutations(where):
+                entries[functools.reduce(lambda at, i: at * n + i, order)] += 1
+    if any(J):
+        more["J"] = QQ.matrix(n, n, list(map(fmpq, J)))
     return PaperObjects(
         K=QQ,
         A=QQ.matrix(n, n, [fmpq(roots[i % m] * (i == j)) for i in range(n) for j in range(n)]),
-        third=QQ.matrix(n * n, n, [fmpq(e) for row in cubic for e in row]),
-        hessian_of_quadratic_part=QQ.matrix(n, n, [fmpq(e) for row in hessian for e in row]),
-        gradient_of_linear_part=QQ.column([fmpq(e) for e in linear]),
+        third=QQ.matrix(n * n, n, list(map(fmpq, cubic))),
+        hessian_of_quadratic_part=QQ.matrix(n, n, list(map(fmpq, hessian))),
+        gradient_of_linear_part=QQ.column(list(map(fmpq, linear))),
         eps=fmpq(1),
         roots=tuple(map(fmpq, roots)),
-        draw=lambda name: QQ.column([fmpq(e) for e in vectors[name]]),
+        draw=lambda name: QQ.column(list(map(fmpq, vectors[name]))),
         **more,
     )
 
@@ -145,29 +147,10 @@ def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
     return found + [("x", (i,)) for i in range(2 * m)]
 
 
-Small = tuple[list[Slot], Callable[[Sequence[Slot]], PaperObjects]]
-
-
-def _any_structure() -> Small:
-    pairs: list[Slot] = [("J", pair) for pair in itertools.combinations(range(4), 2)]
-
-    def make(ones: Sequence[Slot]) -> PaperObjects:
-        entries = dict.fromkeys((pair for _, pair in _pairs(ones)), 1)
-        J = [fmpq(entries.get((i, j), 0) - entries.get((j, i), 0)) for i in range(4) for j in range(4)]
-        return _objects(2, (1, 2), ones, J=QQ.matrix(4, 4, J))
-
-    return pairs + _slots(2, (3,)), make
-
-
-_SMALL: dict[str, Callable[[], Small]] = {
-    "inhomogeneous": lambda: (_slots(1, (3, 2, 1)), lambda ones: _objects(1, (1,), ones)),
-    "steps": lambda: (
-        _slots(1, (3,)),
-        lambda ones: _objects(1, (1,), ones, associate_matrices=(QQ.identity(2) * fmpq(-2),)),
-    ),
-    "any-structure": _any_structure,
-    "derogatory": lambda: (
-        _slots(2, (3,), planar=False),
-        lambda ones: _objects(2, (1, 1), ones, associate_matrices=(QQ.identity(4),)),
-    ),
+# Where a variation is tried: m, the roots of chi, what may be 1, and the matrices B.
+_SMALL: dict[str, tuple[int, tuple[int, ...], list[Slot], dict[str, Any]]] = {
+    "inhomogeneous": (1, (1,), _slots(1, (3, 2, 1)), {}),
+    "steps": (1, (1,), _slots(1, (3,)), {"associate_matrices": (QQ.identity(2) * fmpq(-2),)}),
+    "any-structure": (2, (1, 2), [("J", pair) for pair in itertools.combinations(range(4), 2)] + _slots(2, (3,)), {}),
+    "derogatory": (2, (1, 1), _slots(2, (3,), planar=False), {"associate_matrices": (QQ.identity(4),)}),
 }
