@@ -22,8 +22,8 @@ import random
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import count
+from functools import lru_cache, reduce
+from itertools import count, product
 from typing import Any, cast
 
 from flint import fmpq_poly
@@ -146,20 +146,18 @@ def verify(
             raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M}")
         if settings.eps is not None:
             raise InputError("found an eps, expected none: universal claims are for every eps")
-        member, context = (
-            None,
-            {
-                "version": __version__,
-                "system": f"universal, m = {m}",
-                "eps": "every",
-                "time_step": "every",
-                "convention": CONVENTION,
-                "arithmetic": "exact",
-                "seed": settings.seed,
-                "error_bits": settings.error_bits,
-                "m": m,
-            },
-        )
+        member = None
+        context = {
+            "version": __version__,
+            "system": f"universal, m = {m}",
+            "eps": "every",
+            "time_step": "every",
+            "convention": CONVENTION,
+            "arithmetic": "exact",
+            "seed": settings.seed,
+            "error_bits": settings.error_bits,
+            "m": m,
+        }
     else:
         file = as_file(system)
         member = file.member
@@ -294,17 +292,20 @@ class Verifier:
             return "its A or H is special"
         if not self.member.is_generic:
             return "its A is not generic"
-        reasons = []
         form = normal_form(self.member)
-        chi = form.chi
-        vanishing = _common_factor(chi, form.coefficients)
-        if vanishing.degree() > 0:
-            reasons.append(f"H vanishes on the eigenspaces of the roots of {format_univariate(vanishing)}")
-        flat = _common_factor(chi, form.D_coefficients) // vanishing
-        if flat.degree() > 0:
-            reasons.append(
-                f"H is the cube of a linear form on the eigenspaces of the roots of {format_univariate(flat)}"
-            )
+
+        def vanishing(coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
+            """The monic polynomial of the roots at which all of these elements of Q[t]/chi vanish."""
+            return reduce(fmpq_poly.gcd, coefficients, form.chi)
+
+        zero = vanishing(form.coefficients)
+        cubes = vanishing(form.D_coefficients) // zero
+        special = ((zero, "H vanishes"), (cubes, "H is the cube of a linear form"))
+        reasons = [
+            f"{what} on the eigenspaces of the roots of {format_univariate(roots)}"
+            for roots, what in special
+            if roots.degree() > 0
+        ]
         if all(factor.degree == 1 and abs(factor.polynomial[0]) in (0, 1) for factor in self.member.factors):
             reasons.append("A^3 = A, so that H_1 is associated to H_0 where it is not 0")
         return "; ".join(reasons) or "its A or H is special"
@@ -474,17 +475,13 @@ class Verifier:
             if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
                 continue
             outcome = self._broken(claim, name)
-            text = f"control {name}: {CONTROLS[name].breaks}"
             if outcome is None:
-                verdict, evidence = Verdict.UNDECIDED, Evidence("control", f"{text}; not defined, or no roots of chi")
+                verdict, what = Verdict.UNDECIDED, "not defined, or no roots of chi"
             elif outcome.holds or not outcome.pairs:
-                verdict, evidence = Verdict.SUPPORTED, Evidence("control", f"{text}; the claim holds all the same")
+                verdict, what = Verdict.SUPPORTED, "the claim holds all the same"
             else:
-                field = outcome.objects.K.name
-                verdict, evidence = (
-                    Verdict.REFUTED,
-                    Evidence("control", f"{text}; fails at an exact point over {field}"),
-                )
+                verdict, what = Verdict.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
+            evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
             found.append(replace(finding, control=True, place=place))
@@ -499,26 +496,21 @@ class Verifier:
         nothing cancels, take minutes from m = 5 on.
         """
         at_one = claim.kind is ClaimKind.EQUAL
-        needed = 1 if at_one else _POINTS
         finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
         outcome, failed = None, 0
-        for roots in (False, True):
-            for find in finds:
-                for number in range(_POINTS):
-                    objects = find(roots, number)
-                    if objects is None:
-                        continue
-                    try:
-                        outcome = evaluate(claim, broken(name, objects))
-                    except (*UNDEFINED, LookupError):
-                        continue
-                    if outcome.holds:
-                        if claim.kind is not ClaimKind.EQUAL:
-                            return outcome
-                        continue
-                    failed += 1
-                    if failed >= needed:
-                        return outcome
+        for roots, find, number in product((False, True), finds, range(_POINTS)):
+            objects = find(roots, number)
+            if objects is None:
+                continue
+            try:
+                outcome = evaluate(claim, broken(name, objects))
+            except (*UNDEFINED, LookupError):
+                continue
+            if outcome.holds and not at_one:
+                return outcome
+            failed += not outcome.holds
+            if failed >= (1 if at_one else _POINTS):
+                return outcome
         return outcome
 
     def _finding(
@@ -579,21 +571,19 @@ class ClaimAtPoints:
                 yield Trial()
                 continue
             if not outcome.holds:
-                field, decision = outcome.objects.K.name, None
+                why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
+                text = f"fails at a point over {outcome.objects.K.name}, where {why}"
+                evidence = Evidence("point over GF(p)", text)
                 for exact_number in range(12):  # a rational point is better to look at
                     exact = self._verifier.exact_point(self._roots, exact_number)
                     if exact is None:
                         break
                     with suppress(*UNDEFINED, LookupError):
                         if not (found := evaluate(self._claim, exact)).holds:
+                            outcome = found
                             evidence = Evidence("exact rational point", "fails at a rational point, exactly")
-                            decision = Decision(Verdict.REFUTED, evidence, witness_of(found))
                             break
-                if decision is None:
-                    why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
-                    evidence = Evidence("point over GF(p)", f"fails at a point over {field}, where {why}")
-                    decision = Decision(Verdict.REFUTED, evidence, witness_of(outcome))
-                yield Trial(decision=decision)
+                yield Trial(decision=Decision(Verdict.REFUTED, evidence, witness_of(outcome)))
             elif not outcome.pairs:
                 text = "it does not apply to this member: there is nothing to compare"
                 yield Trial(decision=Decision(Verdict.UNDECIDED, Evidence("outside the hypotheses", text)))
@@ -633,11 +623,3 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
         f"multiplied out in normal form, {what}, all data indeterminate",
         {"blocks": blocks, "indeterminates": len(K.variables), "products_of_terms": PROOF_BUDGET - K.budget},
     )
-
-
-def _common_factor(chi: fmpq_poly, coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
-    """The monic gcd of chi and these elements of Q[t]/chi: the roots at which all of them vanish."""
-    common = chi
-    for coefficient in coefficients:
-        common = common.gcd(coefficient)
-    return common
