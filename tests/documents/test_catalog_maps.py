@@ -1,25 +1,38 @@
-"""The maps of the catalogue that are not Kahan's: what their files state is proved or measured again."""
+"""Maps that are not Kahan's, of the catalogue and of examples: what their files state is proved or measured again."""
+
+import json
+from pathlib import Path
 
 import pytest
 from flint import fmpq
 from helpers import quick
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
-from kahanmaps.checks.preserve import check_measure
+from kahanmaps.checks.preserve import check_measure, check_poisson
+from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load, map_names
-from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.structured_facts import relations
+from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.singular.singularities import singularities, symbolic_denominator
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 every_map = pytest.mark.parametrize("name", map_names())
+EXAMPLES = {
+    path.stem: read_system(path) for path in sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
+}
 FILES = {name: load(name) for name in map_names()}
+every_file = pytest.mark.parametrize("file", [*FILES.values(), *EXAMPLES.values()], ids=lambda file: file.name)
 # The flows whose Kahan maps were repaired: x' and y' for eps -> 0, and the degree of their integral.
 UNREPAIRED = {
     "repaired_octahedral": ("2*x*y", "-2*y^2 - 4*x^2 - 6*x - 6", 4),
@@ -27,21 +40,27 @@ UNREPAIRED = {
 }
 
 
-@every_map
-def test_a_file_has_a_title_sources_and_facts_and_reads_back_equal(name):
-    file = FILES[name]
-    assert set(file.catalog) >= {"title", "sources", "facts", "degrees", "verdict"}
-    assert parse_system(file.to_toml(), name) == file
-    assert not file.is_quadratic
+@every_file
+def test_a_file_reads_back_equal(file):
+    again = parse_system(file.to_toml(), file.name)
+    assert again == file
+    assert json.loads(json.dumps(file.document)) == again.document
 
 
-@every_map
-def test_what_is_claimed_to_be_preserved_is_proved(name):
-    file = FILES[name]
+@every_file
+def test_what_is_claimed_to_be_preserved_is_proved(file):
     if file.integrals:
         assert {str(finding.verdict) for finding in check_integrals(file).findings} == {"proved"}
     if file.density is not None:
         assert {str(finding.verdict) for finding in check_measure(file).findings} == {"proved"}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_another_claim_of_an_example_is_refuted(name):  # so the checks can fail
+    file = EXAMPLES[name]
+    wrong = parse_rational_function(f"{file.variables[0]}^2 + 1", [*file.variables, "eps"])
+    assert str(check_integrals(file, extra={"wrong": wrong}).verdict) == "refuted"
+    assert str(check_measure(file, extra=wrong).verdict) == "refuted"
 
 
 @every_map
@@ -107,3 +126,36 @@ def test_five_steps_of_lyness_and_eight_of_todd_close_for_a_1():
         laboratory = Laboratory(load(name, {"a": 1}))
         assert {len(map_.orbit(20)) for map_ in laboratory.maps} == {period}
         assert {len(map_.orbit(20)) for map_ in Laboratory(load(name)).maps} == {20}
+
+
+def test_maps_of_different_kinds_commute_or_not():
+    # The Kahan map of x' = x^2 is x/(1 - 2 eps x); of x' = 3 x^2 at a third of eps it is the same.
+    one = parse_system('variables = ["x"]\n[map]\nimage = ["x/(1 - 2*eps*x)"]')
+    other = parse_system('variables = ["x"]\n[system]\nrhs = ["x^2 + eps^2*x^2"]')
+    third = parse_system('variables = ["x"]\n[bilinear]\nequations = ["X - x = eps*(x + X)"]')
+    assert str(check_commute(one, other).verdict) == "proved"
+    assert str(check_commute(one, third).verdict) == "refuted"
+    settings = Settings(eps=fmpq(1, 5))
+    assert str(check_commute(one, one, settings, fmpq(1, 3)).verdict) == "proved"
+    report = check_commute(third, one, settings, fmpq(1, 3))
+    assert str(report.verdict) == "refuted"
+    assert "the map of g is taken at eps2 = 1/3" in report.notes[0]
+
+
+def test_degrees_and_singularities_of_a_qrt_map_are_those_of_an_elliptic_fibration():
+    # Quadratic growth; x^2 y^2 - x^2 - y^2 + x y is a pencil of biquadratic curves. 2 n^2 + 1: Bellon 1999.
+    map_ = EXAMPLES["mcmillan"].map
+    assert degree_growth(map_, max_terms=6).degrees == (1, 3, 9, 19, 33, 51, 73)
+    run = singularities(map_, "1/3")
+    assert {(h.polynomial, h.confined_at) for h in run.hypersurfaces} == {("y - 1", 3), ("y + 1", 3)}
+    assert symbolic_denominator(map_) == [("y - 1", 1), ("y + 1", 1)]
+
+
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name != "rescaled-top"])
+def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
+    file = EXAMPLES[name]
+    for ask in (lambda: file.system, lambda: with_symbols(file), lambda: with_symbols(file, list(file.parameters))):
+        with pytest.raises(InputError, match="expected a quadratic vector field"):
+            ask()
+    with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
+        check_poisson(file)

@@ -4,6 +4,7 @@ Lemmas are identities of polynomials, or hold at rational points with ==; each h
 """
 
 import random
+from math import prod
 
 import pytest
 from flint import fmpq
@@ -97,17 +98,8 @@ def test_over_the_determinant_there_are_k_plus_1_integrals(k):
     p, orbits = map_.prime, invariant_polynomials(n)
 
     def values(x):
-        powers = [[pow(c, e, p) for e in range(n + 1)] for c in x]
-        total = []
-        for orbit in orbits:
-            value = 0
-            for exponent in orbit:
-                term = 1
-                for table, e in zip(powers, exponent, strict=True):
-                    term = term * table[e] % p
-                value += term
-            total.append(value % p)
-        return total
+        terms = ([prod(pow(c, e, p) for c, e in zip(x, exponent, strict=True)) for exponent in o] for o in orbits)
+        return [sum(values) % p for values in terms]
 
     rows = []
     for x, y in map_.pairs(len(orbits) + 8):
