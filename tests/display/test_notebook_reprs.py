@@ -172,7 +172,7 @@ def test_hostile_and_huge_findings_are_escaped_and_cut():
 
 @pytest.fixture(scope="module")
 def analysis():
-    return km.analyze(km.load("lotka_volterra"), seconds=16)
+    return km.analyze(km.load("lotka_volterra"))
 
 
 def test_an_analysis_shows_the_verdict_before_the_statements_and_each_part_by_itself(analysis):
@@ -184,7 +184,7 @@ def test_an_analysis_shows_the_verdict_before_the_statements_and_each_part_by_it
 
 
 def test_integrals_are_shown_as_formulas(top):
-    found = text_of(km.find_integrals(top, seconds=10))
+    found = text_of(km.find_integrals(top))
     assert r"\displaystyle I_1 = " in found
     assert "2 found; in all 2 independent (measured: relations of degree up to 2 along orbits show 2)" in found
 
