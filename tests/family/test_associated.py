@@ -5,31 +5,16 @@ are; over number fields, that their maps commute, and that of others do not. Sou
 """
 
 from dataclasses import replace
+from math import prod
 
 import pytest
+from family.members import over_members, t
 from flint import fmpq_mat, fmpq_poly
 
 import kahanmaps as km
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
+from kahanmaps.family.draw import draw_with_chi, parse_chi
 from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix
-
-t = fmpq_poly([0, 1])
-
-MEMBERS = {
-    "m = 2, split": draw_with_eigenvalues([1, -2], 1),
-    "m = 3, split": draw_with_eigenvalues([1, "-1/2", 3], 1),
-    "m = 2, irreducible": draw_with_chi(t**2 - 2, 1),
-    "m = 3, partly split": draw_with_chi((t - 1) * (t**2 - 2), 1),
-    "m = 3, a root twice, diagonalisable": draw_with_eigenvalues([1, 1, 2], 1),
-    "m = 3, a root twice, not diagonalisable": draw_with_chi((t - 1) ** 2 * (t + 1), 1),
-}
-over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
-
-
-def split(m: int) -> FamilyMember:
-    return draw_with_eigenvalues(range(1, m + 1), seed=m)
-
 
 # The matrices B_s.
 
@@ -45,11 +30,8 @@ def test_a_sign_matrix_is_the_sign_on_the_part_that_belongs_to_the_factor(member
 
 
 def chi_without(member: FamilyMember, factor: Factor) -> fmpq_poly:
-    rest = fmpq_poly([1])
-    for other in member.factors:
-        if other.polynomial != factor.polynomial:
-            rest *= other.polynomial**other.multiplicity
-    return rest
+    others = (f.polynomial**f.multiplicity for f in member.factors if f.polynomial != factor.polynomial)
+    return prod(others, start=fmpq_poly([1]))
 
 
 # How many there are, and which.

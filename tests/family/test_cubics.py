@@ -4,36 +4,22 @@ Specified here: the dimension is 4m for generic A and the true one otherwise; ex
 condition, and others are refused with the reason. Source: petrera-suris-2017.
 """
 
-import random
 from itertools import pairwise
 
 import pytest
-from flint import fmpq_mat, fmpq_poly
-from helpers import random_skew_hamiltonian
+from family.members import over_members
+from flint import fmpq_mat
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.errors import HypothesisError
 from kahanmaps.family.cubics import belongs, chain, cubic_space, default_variables, require_member
-from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import diagnosis, minimal_degree
 
-t = fmpq_poly([0, 1])
 DIAGONAL = fmpq_mat([[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]])
 X4 = default_variables(4)
 x1, x2, x3, x4 = ring(X4).gens()
-
-MEMBERS = {
-    "m = 1": draw_generic(1, 1),
-    "m = 2, split": draw_with_eigenvalues([1, -2], 1),
-    "m = 2, irreducible": draw_with_chi(t**2 - 2, 1),
-    "m = 3, partly split": draw_with_chi((t - 1) * (t**2 + 1), 1),
-    "m = 4, split": draw_with_eigenvalues([-1, 0, 2, "1/2"], 1),
-    "m = 3, a root twice": draw_with_eigenvalues([1, 1, 2], 1),
-    "m = 2, not diagonalisable": draw_with_chi((t - 1) ** 2, 1),
-}
-over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
 
 
 def hessian(H):
@@ -48,14 +34,6 @@ def fulfils_the_condition(A, H) -> bool:
         for i in range(n)
         for j in range(n)
     )
-
-
-def generic(m: int, seed: int) -> fmpq_mat:
-    """The first generic matrix from a seed on."""
-    rng = random.Random(seed)
-    while "not generic" in diagnosis(A := random_skew_hamiltonian(m, rng)):
-        pass
-    return A
 
 
 # Membership.
@@ -89,7 +67,7 @@ def test_each_gradient_of_a_chain_is_a_times_the_one_before(member):
         assert gradient(following) == linear_combinations(member.A, gradient(H))
 
 
-# Potentials and third derivatives.
+# Dimensions.
 
 
 def blocks(*jordan: tuple[int, int]) -> fmpq_mat:

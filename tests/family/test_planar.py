@@ -8,7 +8,8 @@ refused.
 from dataclasses import replace
 
 import pytest
-from flint import fmpq, fmpq_mat, fmpq_poly
+from family.members import GENERIC, t
+from flint import fmpq, fmpq_mat
 from helpers import random_point
 
 from kahanmaps.algebra.parsing import parse_polynomial
@@ -17,11 +18,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import NormalForm, normal_form
 from kahanmaps.maps.kahan import KahanMap
-
-t = fmpq_poly([0, 1])
 
 
 def diagonal(eigenvalues, H: str) -> FamilyMember:
@@ -33,32 +32,15 @@ def diagonal(eigenvalues, H: str) -> FamilyMember:
 
 # No unit vector generates K e1 = K here.
 PRODUCT = diagonal([1, 2, 3, 5], "x1^3 + x2*x6^2 + x3^2*x7 - x8^3 + 5*x4*x8^2")
-SPLIT = {
-    "m = 1": draw_generic(1, 1),
-    "m = 2, split": draw_with_eigenvalues([1, -2], 1),
-    "m = 3, split, fractions": draw_with_eigenvalues(["1/2", "-2/3", 4], 1),
+MEMBERS = GENERIC | {
     "m = 4, split, a product": PRODUCT,
     "m = 3, of the paper": load("paper_m3").member,
+    "m = 3, partly split, -+": replace(GENERIC["m = 3, partly split"], signs=(-1, 1)),  # another system than f_0
 }
-NOT_SPLIT = {
-    "m = 2, irreducible": draw_with_chi(t**2 - 2, 1),
-    "m = 3, irreducible": draw_generic(3, 1),
-    "m = 3, partly split": draw_with_chi((t - 1) * (t**2 + 1), 1),
-    "m = 4, two quadratic factors": draw_with_chi((t**2 + 1) * (t**2 - 2), 1),
-    "m = 4, partly split": draw_with_chi((t - 1) * (2 * t - 1) * (t**2 + t + 3), 1),
-}
-MINUS = {  # signs pick another system than f_0
-    "m = 3, partly split, -+": replace(NOT_SPLIT["m = 3, partly split"], signs=(-1, 1))
-}
-MEMBERS = SPLIT | NOT_SPLIT | MINUS
 FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
 over_members = pytest.mark.parametrize(
     ("member", "form"), [(MEMBERS[name], FORMS[name]) for name in MEMBERS], ids=MEMBERS.keys()
 )
-
-
-def samples(dim: int, count: int = 3) -> list[tuple[fmpq, ...]]:
-    return [random_point(dim, seed) for seed in range(count)]
 
 
 # The system.
@@ -68,7 +50,7 @@ def samples(dim: int, count: int = 3) -> list[tuple[fmpq, ...]]:
 def test_the_planar_step_is_the_kahan_map(member, form):
     for eps in ("1/3", -2):
         phi = KahanMap(member.chosen.system, eps)
-        for x in samples(member.dim):
+        for x in (random_point(member.dim, seed) for seed in range(3)):
             assert form.point(*form.step(*form.coordinates(x), eps)) == phi.step(x)
 
 

@@ -7,7 +7,8 @@ factors come in the order that signs refer to; random symplectic matrices are sy
 import random
 
 import pytest
-from flint import fmpq, fmpq_mat, fmpq_poly
+from family.members import t
+from flint import fmpq, fmpq_mat
 from helpers import random_skew_hamiltonian
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,7 +17,6 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi, defects, diagnosis, factors_of_chi, random_symplectic
 from kahanmaps.systems.hamiltonian import standard_structure
 
-t = fmpq_poly([0, 1])
 over_m = pytest.mark.parametrize("m", [1, 2, 3, 4])
 seeds = st.integers(0, 10**6)
 
@@ -25,26 +25,15 @@ def drawn(m: int, seed: int) -> fmpq_mat:
     return random_skew_hamiltonian(m, random.Random(seed))
 
 
-def diagonal(*values) -> fmpq_mat:
-    """diag(values, values)."""
-    n = 2 * len(values)
-    return fmpq_mat(n, n, [fmpq(values[i % len(values)]) if i == j else fmpq(0) for i in range(n) for j in range(n)])
-
-
 # Recognition.
-
-
-def is_skew_hamiltonian(A: fmpq_mat) -> bool:
-    """The definition."""
-    J = standard_structure(A.nrows())
-    return A.transpose() * J == J * A
 
 
 @given(seed=seeds, row=st.integers(0, 3), column=st.integers(0, 3), change=st.integers(-3, 3))
 def test_defects_are_found_exactly_where_the_definition_fails(seed, row, column, change):
     A = drawn(2, seed)
     A[row, column] += change
-    assert (defects(A) == []) is is_skew_hamiltonian(A)
+    J = standard_structure(4)
+    assert (defects(A) == []) is (A.transpose() * J == J * A)
 
 
 # chi.

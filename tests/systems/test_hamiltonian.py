@@ -59,17 +59,15 @@ def test_with_the_standard_structure_the_equations_are_the_canonical_ones(H):
 # What is refused.
 
 
-def test_an_energy_of_degree_four_is_refused():
-    with pytest.raises(InputError, match="H has degree 4, expected at most 3"):
-        CubicHamiltonian(q**3 * p, standard_structure(2))
-
-
-@pytest.mark.parametrize("J", [standard_structure(4), fmpq_mat(2, 3), fmpq_mat(1, 2)], ids=["4x4", "2x3", "1x2"])
-def test_a_structure_of_another_size_is_refused(J):
-    with pytest.raises(InputError, match=r"expected 2 x 2 for 2 variables"):
-        CubicHamiltonian(q**3, J)
-
-
-def test_a_structure_that_is_not_skew_is_refused_by_the_entry():
-    with pytest.raises(InputError, match=r"entry \(1,2\) is 1, entry \(2,1\) is 1, expected opposite"):
-        CubicHamiltonian(q**3, fmpq_mat([[0, 1], [1, 0]]))
+@pytest.mark.parametrize(
+    ("H", "J", "words"),
+    [
+        (q**3 * p, standard_structure(2), "H has degree 4, expected at most 3"),
+        (q**3, standard_structure(4), "expected 2 x 2 for 2 variables"),
+        (q**3, fmpq_mat(2, 3), "expected 2 x 2 for 2 variables"),
+        (q**3, fmpq_mat([[0, 1], [1, 0]]), r"entry \(1,2\) is 1, entry \(2,1\) is 1, expected opposite"),
+    ],
+)
+def test_what_is_no_cubic_or_no_skew_structure_is_refused(H, J, words):
+    with pytest.raises(InputError, match=words):
+        CubicHamiltonian(H, J)
