@@ -30,7 +30,6 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.maps.polarised import MAX_DEGREE, polarised_map
-from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
 
@@ -123,7 +122,9 @@ class DocumentReader(PartReader):
         in_iterates = {name: function for name, function in claims.items() if iterates_in(*function.names)}
         integrals = {name: function for name, function in claims.items() if name not in in_iterates}
         density = self._read_density()
-        self._read_catalog()
+        if catalog := self._table("catalog"):
+            self._unknown_keys("catalog", catalog)
+            read_structured_facts(catalog, self.variables, self._mistake)
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
         # With its name and the parameters that hold, long integers as text (JSON needs them so).
@@ -431,26 +432,6 @@ class DocumentReader(PartReader):
             self._mistake("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
             return None
         return claim
-
-    def _read_catalog(self) -> None:
-        section = self._table("catalog")
-        if not section:
-            return
-        self._unknown_keys("catalog", section)
-        for key in ("title", "convention"):
-            if not isinstance(section.get(key, ""), str):
-                self._mistake(f"catalog.{key}", f"found {show(section[key])}, expected text")
-        for key in ("sources", "facts"):
-            value = section.get(key, [])
-            if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-                self._mistake(f"catalog.{key}", f"found {show(value)}, expected a list of texts")
-            elif key == "sources":
-                for item in value:
-                    if item not in SOURCES:
-                        self._mistake(
-                            "catalog.sources", f"unknown source {quoted(str(item))}, expected a key of sources.py"
-                        )
-        read_structured_facts(section, self.variables, self._mistake)
 
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 

@@ -26,7 +26,8 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import monomials, ring
-from kahanmaps.errors import InputError, quoted, show
+from kahanmaps.errors import InputError, show
+from kahanmaps.sources import SOURCES
 
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
@@ -76,14 +77,14 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])
     (x^2 + y^2, 1)
     """
-    if isinstance(given, str):
-        match = _UP_TO.fullmatch(given)
-        if match is None:
-            raise InputError(f'found {quoted(given)}, expected "degree <= d" or a list of polynomials')
+    match = _UP_TO.fullmatch(given) if isinstance(given, str) else None
+    if match is None and not (_are_texts(given) and given):
+        raise InputError(f'found {show(given)}, expected "degree <= d" or a list of polynomials')
+    if match is not None:
         top = int(match[1])
         count = comb(top + len(variables), top)
         if count > MAX_MONOMIALS:
-            raise InputError(f"found {quoted(given)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
+            raise InputError(f"found {show(given)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
         context = ring(variables)
         exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
         return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
@@ -103,70 +104,60 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
 def read_structured_facts(
     section: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
-    """Look through the structured facts of a [catalog] section; `mistake(key, sentence)` is told what is wrong."""
-    degrees = section.get("degrees", [1])
-    if not isinstance(degrees, list) or not degrees or not all(_is_count(d) and 0 < d < 10**100 for d in degrees):
-        mistake(
-            "catalog.degrees",
-            f"found {show(degrees)}, expected a list of positive integers of at most 100 digits, d_1 first",
-        )
-    for key, known in (("growth", GROWTHS), ("verdict", VERDICTS)):
-        if key in section and section[key] not in known:
-            mistake(f"catalog.{key}", f"found {show(section[key])}, expected one of {', '.join(known)}")
-    if "dynamical_degree" in section:
-        _read_dynamical_degree(section["dynamical_degree"], mistake)
-    codimension = section.get("codimension", 0)
-    at_most = len(variables) if variables is not None else None
-    if not _is_count(codimension) or (at_most is not None and codimension > at_most):
-        bound = "an integer, 0 or more" if at_most is None else f"an integer from 0 to {at_most}, the dimension"
-        mistake("catalog.codimension", f"found {show(codimension)}, expected {bound}")
+    """Look through a [catalog] section, all keys of which are known; `mistake(key, sentence)` is told what is wrong."""
+    at_most = 10**9 if variables is None else len(variables)
+    bound = "an integer, 0 or more" if variables is None else f"an integer from 0 to {at_most}, the dimension"
+    rules: dict[str, tuple[Callable[[Any], bool], str]] = {
+        **dict.fromkeys(("title", "convention"), (lambda value: isinstance(value, str), "text")),
+        "sources": (lambda value: _are_texts(value) and set(value) <= set(SOURCES), "a list of keys of sources.py"),
+        "facts": (_are_texts, "a list of texts"),
+        "degrees": (_are_degrees, "a list of positive integers of at most 100 digits, d_1 first"),
+        "growth": (GROWTHS.__contains__, f"one of {', '.join(GROWTHS)}"),
+        "verdict": (VERDICTS.__contains__, f"one of {', '.join(VERDICTS)}"),
+        "dynamical_degree": (_is_minimal, "an irreducible polynomial in x with leading coefficient 1"),
+        "codimension": (lambda value: type(value) is int and 0 <= value <= at_most, bound),
+        "relations": (_are_tables, "tables [[catalog.relations]]"),
+    }
+    for key, (is_good, expected) in rules.items():
+        if key in section and not is_good(section[key]):
+            mistake(f"catalog.{key}", f"found {show(section[key])}, expected {expected}")
     tables = section.get("relations", [])
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        mistake("catalog.relations", f"found {show(tables)}, expected tables [[catalog.relations]]")
-        return
-    for k, table in enumerate(tables):
-        _read_relation(f"catalog.relations[{k + 1}]", table, variables, mistake)
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
-
-
-def _read_dynamical_degree(given: Any, mistake: Callable[[str, str], None]) -> None:
-    expected = "expected an irreducible polynomial in x with leading coefficient 1"
-    if not isinstance(given, str):
-        mistake("catalog.dynamical_degree", f"found {show(given)}, {expected}")
-        return
-    try:
-        polynomial = parse_polynomial(given, ["x"])
-    except InputError as error:
-        mistake("catalog.dynamical_degree", str(error))
-        return
-    is_irreducible = not polynomial.is_constant() and [power for _, power in polynomial.factor()[1]] == [1]
-    if not is_irreducible or polynomial.leading_coefficient() != 1:
-        mistake("catalog.dynamical_degree", f"found {show(given)}, {expected}")
-
-
-def _read_relation(
-    path: str, table: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
-) -> None:
-    for key in table:
-        if key not in _RELATION_KEYS:
-            mistake(f"{path}.{key}", f"unknown key, expected one of {', '.join(sorted(_RELATION_KEYS))}")
-    for key in _RELATION_KEYS:
-        if key not in table:
-            mistake(f"{path}.{key}", "missing")
-    given, dimension = table.get("monomials"), table.get("dimension", 0)
-    count: int | None = None
-    if given is not None:
-        is_list = isinstance(given, list) and given and all(isinstance(text, str) for text in given)
-        if not isinstance(given, str) and not is_list:
-            mistake(f"{path}.monomials", f'found {show(given)}, expected "degree <= d" or a list of polynomials')
-        elif variables is not None:
+    for k, table in enumerate(tables if _are_tables(tables) else ()):
+        path = f"catalog.relations[{k + 1}]"
+        for key in (
+            *(key for key in table if key not in _RELATION_KEYS),
+            *(key for key in _RELATION_KEYS if key not in table),
+        ):
+            mistake(f"{path}.{key}", f"expected a table of {' and '.join(_RELATION_KEYS)}, no more and no less")
+        count = 10**9
+        if "monomials" in table and variables is not None:
             try:
-                count = len(relation_functions(given, variables))
+                count = len(relation_functions(table["monomials"], variables))
             except InputError as error:
                 mistake(f"{path}.monomials", str(error))
-    if not _is_count(dimension) or (count is not None and dimension >= count):
-        bound = "an integer, 0 or more" if count is None else f"an integer from 0 to {count - 1}"
-        mistake(f"{path}.dimension", f"found {show(dimension)}, expected {bound}")
+        dimension = table.get("dimension", 0)
+        if type(dimension) is not int or not 0 <= dimension < count:
+            expected = "an integer, 0 or more" if count == 10**9 else f"an integer from 0 to {count - 1}"
+            mistake(f"{path}.dimension", f"found {show(dimension)}, expected {expected}")
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list | tuple) and all(isinstance(item, str) for item in value)
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(item, dict) for item in value)
+
+
+def _are_degrees(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(type(d) is int and 0 < d < 10**100 for d in value)
+
+
+def _is_minimal(text: Any) -> bool:
+    """Whether a text is an irreducible monic polynomial in x."""
+    try:
+        polynomial = parse_polynomial(text, ["x"])
+    except InputError:
+        return False
+    is_monic = not polynomial.is_constant() and polynomial.leading_coefficient() == 1
+    return is_monic and [power for _, power in polynomial.factor()[1]] == [1]

@@ -25,8 +25,10 @@ from kahanmaps.systems.quadratic import SystemOver
 
 Method = TypeVar("Method", bound=Callable[..., Any])
 # The data that consist of elements of K: numbers, matrices, tuples of them, a system.
-_IN_K = ("A", "J", "third", "eps", "roots", "associate_matrices", "known_chi", "hessian_of_quadratic_part", "minus")
-_IN_K += ("gradient_of_linear_part", "lower_terms", "step_eps", "base", "error_of_second")
+_IN_K = (
+    *("A", "J", "third", "eps", "roots", "associate_matrices", "known_chi", "hessian_of_quadratic_part"),
+    *("gradient_of_linear_part", "lower_terms", "minus", "step_eps", "base", "error_of_second"),
+)
 
 
 def remembered(method: Method) -> Method:
