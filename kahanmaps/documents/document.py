@@ -69,27 +69,11 @@ class _Part(NamedTuple):
     plain: dict[str, Any]
 
 
-class Contents(NamedTuple):
-    """What a system file holds; the fields are those of `SystemFile`."""
-
-    name: str
-    kind: str
-    parameters: Mapping[str, fmpq]
-    map: BirationalMap
-    hamiltonian: CubicHamiltonian | None
-    member: FamilyMember | None
-    integrals: Mapping[str, RationalFunction]
-    density: RationalFunction | None
-    document: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
-    integrals_in_iterates: Mapping[str, RationalFunction] = {}
-
-
 class DocumentReader(PartReader):
     """One pass over a document: every part is read as far as it can be, mistakes are collected."""
 
-    def read(self) -> Contents:
-        """The contents. Raises SystemFileError with every mistake of the document."""
+    def read(self) -> dict[str, Any]:
+        """The fields of a `SystemFile`. Raises SystemFileError with every mistake of the document."""
         try:
             self.document, notes = without_left_sides(self.document)
         except InputError as error:
@@ -134,19 +118,19 @@ class DocumentReader(PartReader):
             document["parameters"] = {key: format_number(value) for key, value in self.parameters.items()}
         if self.root is not None:
             document.setdefault("parameters", {})[self.root[0]] = str(self.root[1])
-        return Contents(
-            name,
-            kind,
-            self.parameters,
-            map_,
-            hamiltonian,
-            member,
-            integrals,
-            density,
-            document,
-            tuple(notes),
-            in_iterates,
-        )
+        return {
+            "name": name,
+            "kind": kind,
+            "parameters": self.parameters,
+            "map": map_,
+            "hamiltonian": hamiltonian,
+            "member": member,
+            "integrals": integrals,
+            "density": density,
+            "document": document,
+            "notes": tuple(notes),
+            "integrals_in_iterates": in_iterates,
+        }
 
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
@@ -180,7 +164,10 @@ class DocumentReader(PartReader):
 
                 def at_number(value: fmpq) -> BirationalMap:  # for floats
                     overrides = {**self.overrides, parameter: value}
-                    return DocumentReader(self.document, self.where, overrides, self.other).read().map
+                    found: BirationalMap = DocumentReader(self.document, self.where, overrides, self.other).read()[
+                        "map"
+                    ]
+                    return found
 
                 map_ = AlgebraicMap(map_, root, at_number)
             self.variables = map_.variables  # a polarised map has more of them
@@ -206,11 +193,8 @@ class DocumentReader(PartReader):
         return map_
 
     def _read_given(self, kind: str, section: Mapping[str, Any]) -> BirationalMap | None:
-        if kind == "system":
-            return self._read_system(section)
-        if kind == "composition":
-            return self._read_composition(section)
-        return self._read_bilinear(section) if kind == "bilinear" else self._read_map(section)
+        read = {"system": self._read_system, "composition": self._read_composition, "bilinear": self._read_bilinear}
+        return read.get(kind, self._read_map)(section)
 
     def _read_parameters(self) -> None:
         for name, value in (self._table("parameters") or {}).items():
@@ -301,13 +285,9 @@ class DocumentReader(PartReader):
             self._mistake("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
             return None
         given = self._required("system", section, "rhs")
-        found = [
-            self._polynomial(f"system.rhs[{i + 1}]", value, degree)
-            for i, value in enumerate(given if isinstance(given, list) else ())
-        ]
+        known = self._each("system.rhs", given, lambda path, value: self._polynomial(path, value, degree))
         rhs = self._list("system", "rhs", given, "right-hand side")
-        known = [polynomial for polynomial in found if polynomial is not None]
-        if rhs is None or len(known) != len(rhs) or self.variables is None or self.unsure:
+        if rhs is None or known is None or self.variables is None or self.unsure:
             return None
         return self._made("system.rhs", make, known, degree)
 
@@ -324,30 +304,26 @@ class DocumentReader(PartReader):
             hint = "" if "new" in section else ': give new = ["..."], names for the coordinates of the new point'
             self._mistake("bilinear.new", f"{error}{hint}")
             return None
-        found = []
-        for i, value in enumerate(given):
-            path = f"bilinear.equations[{i + 1}]"
+
+        def equation(path: str, value: Any) -> fmpq_mpoly | None:
             sides = (self._text(path, value) or "").split("=")
             if len(sides) != 2:
                 self._mistake(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
-                continue
+                return None
             left, right = (self._polynomial(path, side, 1, new) for side in sides)
-            if left is not None and right is not None:
-                found.append(left - right)
-        if len(found) != len(given) or self.unsure:
+            return None if left is None or right is None else left - right
+
+        found = self._each("bilinear.equations", given, equation)
+        if found is None or self.unsure:
             return None
         return self._sound(bilinear_map, "bilinear", self.variables, found)
 
     def _read_map(self, section: Mapping[str, Any]) -> BirationalMap | None:
-        functions: dict[str, list[RationalFunction] | None] = {"image": None, "inverse": None}
         self._required("map", section, "image")
-        for key in functions:
-            given = self._list("map", key, section.get(key), "function")
-            found = [self._claim(f"map.{key}[{i + 1}]", value) for i, value in enumerate(given or ())]
-            functions[key] = (
-                known if (known := [f for f in found if f is not None]) and len(known) == len(found) else None
-            )
-        image, inverse = functions["image"], functions["inverse"]
+        image, inverse = (
+            self._each(f"map.{key}", self._list("map", key, section.get(key), "function"), self._claim) or None
+            for key in ("image", "inverse")
+        )
         if image is None or self.variables is None or self.unsure or ("inverse" in section and inverse is None):
             return None
         return self._sound(explicit_map, "map", self.variables, image, inverse)
@@ -442,9 +418,8 @@ class DocumentReader(PartReader):
             if given is not None:
                 self._mistake("composition.of", f"found {show(given)}, expected {EXPECTED['composition', 'of']}")
             return None
-        parts = [self._part(f"composition.of[{k + 1}]", entry) for k, entry in enumerate(given)]
-        known = [part for part in parts if part is not None]
-        if len(known) < len(parts) or self.unsure:
+        known = self._each("composition.of", given, self._part)
+        if known is None or self.unsure:
             return None
         if sum(abs(part.power) for part in known) > _MOST_FACTORS:
             self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
@@ -482,7 +457,7 @@ class DocumentReader(PartReader):
             if values:
                 map_ = reader.read_map(next(kind for kind in KINDS if kind in reader.document), list(values))
             else:
-                map_ = reader.read().map
+                map_ = reader.read()["map"]
         except InputError as error:
             self._mistake(f"{path}.{key}", str(error))
             return None

@@ -139,7 +139,7 @@ class SystemFile(Displayed):
         if not isinstance(self.map, AlgebraicMap):
             return self
         value = {self.map.given.symbols[0]: self.map.root.rounded()}
-        return SystemFile(*DocumentReader(dict(self.document), self.name, value).read())
+        return SystemFile(**DocumentReader(dict(self.document), self.name, value).read())
 
     @property
     def normal_form(self) -> SystemNormalForm | NoNormalForm:
@@ -258,7 +258,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     reader = DocumentReader(document, where, parameters or {}, partial(_named, Path(where).parent))
     reader.inside = (os.path.abspath(where),)
     contents = reader.read()
-    return SystemFile(*contents._replace(notes=(*notes, *contents.notes)))
+    return SystemFile(**{**contents, "notes": (*notes, *contents["notes"])})
 
 
 def _document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:

@@ -182,6 +182,13 @@ class PartReader:
             return None
         return value
 
+    def _each(self, path: str, given: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
+        """What is read of every entry of a list, mistakes of all of them noted; None where one cannot be read."""
+        entries = given if isinstance(given, list) else []
+        found = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
+        known = [one for one in found if one is not None]
+        return known if len(known) == len(found) else None
+
     def _claim(self, path: str, value: Any) -> RationalFunction | None:
         text = self._text(path, value)
         if text is None or self.variables is None:

@@ -47,7 +47,7 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
     document = {key: value for key, value in file.document.items() if key not in ("catalog", "integrals", "density")}
     given = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
     title = f"{file.name} at {', '.join(f'{name} = {given[name]}' for name in values)}"
-    return SystemFile(*DocumentReader({**document, "name": title, "parameters": given}, file.name, {}).read())
+    return SystemFile(**DocumentReader({**document, "name": title, "parameters": given}, file.name, {}).read())
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:

@@ -88,7 +88,7 @@ def system_from(recipe: Mapping[str, Any], document: Callable[[str], str]) -> Sy
 
 @lru_cache(_KEPT)
 def _read(text: str, parameters: str) -> SystemFile:
-    return SystemFile(*DocumentReader(json.loads(text), "system", json.loads(parameters)).read())
+    return SystemFile(**DocumentReader(json.loads(text), "system", json.loads(parameters)).read())
 
 
 @lru_cache(_KEPT)

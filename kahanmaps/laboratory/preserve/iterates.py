@@ -278,7 +278,7 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
         "parameters": {**values, **dict.fromkeys(levels, "1")},
         "system": {"rhs": rhs},
     }
-    file = SystemFile(*DocumentReader(document, laboratory.file.name, {}).read())
+    file = SystemFile(**DocumentReader(document, laboratory.file.name, {}).read())
     inside = Laboratory(file, (*laboratory.symbols, *levels), laboratory.eps, laboratory.seed)
 
     def back(F: fmpq_mpoly, shift: int) -> fmpq_mpoly:
