@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
@@ -161,16 +161,9 @@ def _hidden(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
     return symplectic_inverse(S).transpose() * normal * S.transpose()
 
 
-def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> list[fmpq_mpoly]:
+def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> tuple[fmpq_mpoly, ...]:
     """The rows of `matrix` as linear forms."""
-    context = ring(variables)
-    forms = []
-    for row in matrix.tolist():
-        form = context.constant(0)
-        for entry, x in zip(row, context.gens(), strict=True):
-            form = form + entry * x
-        forms.append(form)
-    return forms
+    return linear_combinations(matrix, ring(variables).gens())
 
 
 def _discriminant(a: Any, b: Any, c: Any, d: Any) -> Any:

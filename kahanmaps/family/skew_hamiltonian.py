@@ -47,29 +47,22 @@ def defects(A: fmpq_mat) -> list[str]:
     n = A.nrows()
     if n != A.ncols() or n % 2 or n == 0:
         return [f"A is {n} x {A.ncols()}, expected a square matrix of even size 2m"]
-    m = n // 2
+    m, J = n // 2, standard_structure(n)
+    expected = -(J * A.transpose() * J)  # equal to A exactly for A^T J = J A
+    skew = "block must be skew"
     found = []
-    for i in range(m):
-        for j in range(m):
-            if A[m + j, m + i] != A[i, j]:
-                found.append(
-                    f"entry ({m + j + 1},{m + i + 1}) is {_show(A[m + j, m + i])}, expected {_show(A[i, j])}: "
-                    "the lower right block must be the transpose of the upper left one"
-                )
-    for name, top, left in (("upper right", 0, m), ("lower left", m, 0)):
+    for rule, top, left in (
+        ("lower right block must be the transpose of the upper left one", m, m),
+        (f"upper right {skew}", 0, m),
+        (f"lower left {skew}", m, 0),
+    ):
         for i in range(m):
-            for j in range(i, m):
-                above, below = A[top + i, left + j], A[top + j, left + i]
-                if i == j and above != 0:
-                    found.append(
-                        f"entry ({top + i + 1},{left + i + 1}) is {_show(above)}, expected 0: "
-                        f"the {name} block must be skew"
-                    )
-                elif i != j and above != -below:
-                    found.append(
-                        f"entry ({top + j + 1},{left + i + 1}) is {_show(below)}, expected {_show(-above)}: "
-                        f"the {name} block must be skew"
-                    )
+            for j in range(0 if top == left else i, m):
+                row, column = top + j, left + i
+                entry = fmpq(0) if top != left and i == j else expected[row, column]
+                if A[row, column] != entry:
+                    place = f"entry ({row + 1},{column + 1})"
+                    found.append(f"{place} is {_show(A[row, column])}, expected {_show(entry)}: the {rule}")
     return found
 
 

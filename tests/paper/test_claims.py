@@ -81,16 +81,14 @@ def failing(claim, spectra):
     return [name for name, found in outcomes.items() if not found or any(equal is not wanted for equal in found)]
 
 
-@together("claim", RIGHT)
-def test_a_claim_holds_for_every_kind_of_spectrum(claim):
-    assert members_of(claim, QUICK)
-    assert failing(claim, QUICK) == []
+spectra = pytest.mark.parametrize("spectra", [QUICK, pytest.param(LARGER, marks=pytest.mark.slow)], ids=len)
 
 
-@pytest.mark.slow
+@spectra
 @together("claim", RIGHT)
-def test_a_claim_holds_for_further_members(claim):
-    assert failing(claim, LARGER) == []
+def test_a_claim_holds_for_every_kind_of_spectrum(claim, spectra):
+    assert members_of(claim, spectra) or spectra is LARGER
+    assert failing(claim, spectra) == []
 
 
 @together("claim", MISPRINTS)

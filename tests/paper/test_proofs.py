@@ -139,23 +139,10 @@ SIGNS = {
     "(46) with B_i for B_i^T": lambda o: [
         (o.df * o.df, o.sum([o.I * o.p0(o.x), *(o.B(i) * o.q(i, o.x) for i in o.each)]))
     ],
-    "(70) J + eps^2 f'^2 J is invariant": lambda o: [
-        (
-            o.jacobian_of_step(o.f, o.x) * (o.J + o.J - o.Pi(o.x)) * o.jacobian_of_step(o.f, o.x).transpose(),
-            o.J + o.J - o.Pi(o.x_tilde),
-        )
-    ],
     "(94) nabla K~ = nabla H~": lambda o: [
         (
             o.slope(lambda o, x: o.integral(o.g_(0), x), o.x, o.vector("v")),
             o.slope(lambda o, x: o.integral(o.f, x), o.x, o.vector("v")),
-        )
-    ],
-    "(95) H~ = 2 x^T Pi^{-1} f": lambda o: [(o.H_tilde(o.x), o.dot(o.x, o.solve(o.Pi(o.x), o.fx)) * o.number(2))],
-    "(108) nabla P_0 = (4 - m) eps^2 nabla Q_i": lambda o: [
-        (
-            o.slope(lambda o, x: o.P0(x), o.x, o.vector("v")),
-            o.slope(lambda o, x: o.Q(0, x), o.x, o.vector("v")) * o.eps * o.eps * o.number(4 - o.m),
         )
     ],
 }
