@@ -265,25 +265,19 @@ def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
 
 
 def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
-    """The idempotent E of the space taken apart, as far as its elements E X E do it."""
-    found = _part_or_pieces(space, E)
-    if isinstance(found, _Part):
-        yield found
-    else:
-        for piece in found:
-            yield from _parts(space, piece)
-
-
-def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq_mat]:
-    """The idempotents that an element E X E splits E into; where there is none, E with the best X."""
+    """The idempotent E of the space taken apart, as far as its elements E X E do it; each piece with the best X."""
     if trace(E) == 2:  # self-adjoint in a symplectic plane: scalar
-        return _Part(E, E * 0, _T)
+        yield _Part(E, E * 0, _T)
+        return
     for X in space:
         if len(pieces := _projections(E * X * E, E)) > 1:
-            return pieces
+            for piece in pieces:
+                yield from _parts(space, piece)
+            return
     own = _reduced([E * X * E for X in space])
     if len(own) == 1:
-        return _Part(E, E * 0, _T)
+        yield _Part(E, E * 0, _T)
+        return
     # In a commutative algebra the trace form has the rank of its semisimple part, the number of roots to be found.
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(own, 2))
     flat, turned = (fmpq_mat([M.entries() for M in Ms]) for Ms in (own, [X.transpose() for X in own]))
@@ -295,7 +289,9 @@ def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq
     more = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
     for tried, X in enumerate(itertools.chain(own, more)):
         if len(pieces := _projections(X, E)) > 1:
-            return pieces
+            for piece in pieces:
+                yield from _parts(space, piece)
+            return
         polynomial = _factors_on(X, E)[0].polynomial
         value, power, length = evaluate_at_matrix(polynomial, X) * E, E, 0
         while power != 0 * power:  # the least k with polynomial(X)^k E = 0, times the degree
@@ -306,9 +302,8 @@ def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq
         if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in found) >= target:
             break
     _, X, polynomial = max(found, key=lambda choice: choice[0])
-    if polynomial.degree() > 1:
-        return _Part(E, X, polynomial)
-    return _Part(E, _reduced([X + E * polynomial[0]])[0], _T)
+    is_field = polynomial.degree() > 1
+    yield _Part(E, X, polynomial) if is_field else _Part(E, _reduced([X + E * polynomial[0]])[0], _T)
 
 
 def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from math import comb
 from typing import Any
 
+from kahanmaps.paper.claims.introduction import perturbed_hamiltonians_are_conserved
 from kahanmaps.paper.claims.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
@@ -216,12 +217,6 @@ def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
     return lambda o, x: o.modified(list(o.associates())[k], x)
 
 
-def _all_integrals(o: PaperObjects) -> Pairs:
-    """The map of f conserves the m functions eps^{-1} x^T J (A^T)^k x~"""
-    for k in range(o.m):
-        yield o.H_tilde_(k, o.x_tilde), o.H_tilde_(k, o.x)
-
-
 def _gradients(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians satisfy the same differential equation as H and K"""
     v = o.vector("v")
@@ -257,7 +252,13 @@ STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
     (_modified, "modified H is conserved by f", "map", _ALONE, "+++ ++"),
     (_shared_modified, "modified H is conserved by g, modified K by f", "B map", _BOTH, "++--++"),
     (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", "map", _ALONE, "-++ ++"),
-    (_all_integrals, "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m", "map", _ALONE, "-   ++"),
+    (
+        perturbed_hamiltonians_are_conserved,
+        "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m",
+        "map",
+        _ALONE,
+        "-   ++",
+    ),
     (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", "map", _ALONE, "++- +-"),
     (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", "B map", _BOTH, "++--+-"),
     (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", "f''", {"pairwise": True, "least_m": 2}, "++- +-"),
