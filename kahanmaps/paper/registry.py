@@ -12,7 +12,8 @@ differently for other m, the general form reduces to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -176,6 +177,18 @@ def evaluate(claim: Claim, o: PaperObjects) -> ClaimOutcome:
             if same(o.K, left, right) != (claim.kind is not ClaimKind.DIFFERENT):
                 return ClaimOutcome(o, pairs, (left, right))
     return ClaimOutcome(o, pairs, None)
+
+
+def outcomes(
+    claim: Claim,
+    points: Iterable[PaperObjects | None],
+    change: Callable[[PaperObjects], PaperObjects] = lambda objects: objects,
+) -> Iterator[ClaimOutcome]:
+    """What a claim comes to at those of the points, each changed first, at which it is defined."""
+    for objects in points:
+        if objects is not None:
+            with suppress(*UNDEFINED, LookupError):  # the last one where the roots of chi are needed and not there
+                yield evaluate(claim, change(objects))
 
 
 def witness_of(outcome: ClaimOutcome) -> Witness | None:

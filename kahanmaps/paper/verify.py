@@ -22,7 +22,7 @@ import random
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from itertools import count, product
 from typing import Any, cast
 
@@ -57,6 +57,7 @@ from kahanmaps.paper.registry import (
     claims,
     entries,
     evaluate,
+    outcomes,
     same,
     witness_of,
 )
@@ -497,20 +498,13 @@ class Verifier:
         """
         at_one = claim.kind is ClaimKind.EQUAL
         finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
+        chosen = product((False, True), finds, range(_POINTS))
+        points = (find(roots, number) for roots, find, number in chosen)
         outcome, failed = None, 0
-        for roots, find, number in product((False, True), finds, range(_POINTS)):
-            objects = find(roots, number)
-            if objects is None:
-                continue
-            try:
-                outcome = evaluate(claim, broken(name, objects))
-            except (*UNDEFINED, LookupError):
-                continue
-            if outcome.holds and not at_one:
-                return outcome
+        for outcome in outcomes(claim, points, partial(broken, name)):
             failed += not outcome.holds
-            if failed >= (1 if at_one else _POINTS):
-                return outcome
+            if (outcome.holds and not at_one) or failed >= (1 if at_one else _POINTS):
+                break
         return outcome
 
     def _finding(
@@ -574,15 +568,11 @@ class ClaimAtPoints:
                 why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
                 text = f"fails at a point over {outcome.objects.K.name}, where {why}"
                 evidence = Evidence("point over GF(p)", text)
-                for exact_number in range(12):  # a rational point is better to look at
-                    exact = self._verifier.exact_point(self._roots, exact_number)
-                    if exact is None:
-                        break
-                    with suppress(*UNDEFINED, LookupError):
-                        if not (found := evaluate(self._claim, exact)).holds:
-                            outcome = found
-                            evidence = Evidence("exact rational point", "fails at a rational point, exactly")
-                            break
+                # A rational point is better to look at.
+                exact = (self._verifier.exact_point(self._roots, exact_number) for exact_number in range(12))
+                if found := next((found for found in outcomes(self._claim, exact) if not found.holds), None):
+                    outcome = found
+                    evidence = Evidence("exact rational point", "fails at a rational point, exactly")
                 yield Trial(decision=Decision(Verdict.REFUTED, evidence, witness_of(outcome)))
             elif not outcome.pairs:
                 text = "it does not apply to this member: there is nothing to compare"

@@ -14,11 +14,10 @@ x3' = -3/2*x1*x2
 'Euler top'
 
 A file is data, in the format of every other system file; its name is that of the system. Each of its facts opens with
-its status: Proved (in the source named; where none is, by the argument given or by tests/documents/test_catalog.py,
-which expands claims with eps and the parameters as indeterminates), Refuted (at a point), Measured (a finite
-computation modulo a prime, which is no proof), Classical, or Origin (how the file was made). Degrees, growth, verdict
-and relations stand there for programs as well, see `kahanmaps.documents.structured_facts`;
-tests/documents/test_catalog_facts.py measures them again.
+its status: Proved (in the source named; where none is, by the argument given or by tests/documents/test_catalog.py),
+Refuted (at a point), Measured (a finite computation modulo a prime, which is no proof), Classical, or Origin (how the
+file was made). Degrees, growth, verdict and relations stand there for programs as well, see
+`kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py finds them again.
 """
 
 from __future__ import annotations
