@@ -20,12 +20,29 @@ from kahanmaps.errors import InputError, quoted
 MAX_CHARACTERS = 2_000_000  # of all equations together
 _OPEN, _CLOSE = ("(", "[", "{"), (")", "]", "}")
 _EQUALS = ("=", "==", ":=")
-_DERIVATIVES = ("diff", "Diff", "D", "der", "Derivative")  # of Maple, Mathematica, Modelica, SymPy
 # Decomposed, a dot above a letter is a character of its own; two dots, and a double quote, are two primes.
 _PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "″": 2, '"': 2, "\u0308": 2, "‴": 3}
 _TOKEN = re.compile(
     r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
 )
+_MOST_TOKENS = 16  # of a derivative other than by primes
+_NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
+_CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
+# Derivatives, with blanks only between two words, and their order.
+_WRITTEN = [
+    (re.compile(pattern + _ARGUMENT), order)
+    for pattern, order in (
+        (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
+        (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
+        (rf"d ?{_NAME}{_ARGUMENT}/d ?t", 1),
+        (rf"d(?:\^2 ?|2){_NAME}{_ARGUMENT}/d ?t\^?2", 2),
+        (rf"{_NAME}_ddot", 2),
+        (rf"{_NAME}_dot", 1),
+        (rf"{_NAME}ddot", 2),
+        (rf"{_NAME}dot", 1),
+        (rf"d{_NAME}dt", 1),
+    )
+]
 _LATEX = ("dot", "ddot", "frac", "dfrac", "mathrm", "rm", "left", "begin", "d", "dt")
 _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 
@@ -173,59 +190,21 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     first = tokens[start] if start < len(tokens) else ""
     if not is_name(first):
         return None
-    rest = tokens[start + 1 : start + 12]  # longer ones have more derivatives than are read
-    if first in _DERIVATIVES and rest[:1] and rest[0] in _OPEN:
-        return _called(tokens, start)
-    if first[0] == "d" and "/" in rest[:7]:
-        found = _leibniz(tokens, start)
-        if found is not None:
-            return found
     end = _argument(tokens, start + 1)
     order = 0
     while end < len(tokens) and tokens[end] in _PRIMES:
         order, end = order + _PRIMES[tokens[end]], end + 1
     if order:
         return _Derivative(first, order, _argument(tokens, end))
-    for ending, order in (("_ddot", 2), ("_dot", 1), ("ddot", 2), ("dot", 1)):
-        if first.endswith(ending) and first != ending:
-            return _Derivative(first.removesuffix(ending), order, end)
-    if len(first) > 3 and first[0] == "d" and first.endswith("dt"):
-        return _Derivative(first[1:-2], 1, end)
-    return None
-
-
-def _called(tokens: Sequence[str], start: int) -> _Derivative | None:
-    """diff(x(t), t), diff(x(t), t, t), diff(x(t), t$2), D[x[t], {t, 2}], D(x)(t), der(x)."""
-    if start + 2 >= len(tokens) or not is_name(tokens[start + 2]):
-        return None
-    name, end = tokens[start + 2], _argument(tokens, start + 3)
-    inside: list[str] = []  # behind the function
-    while end < len(tokens) and tokens[end] not in _CLOSE[:2]:
-        inside.append(tokens[end])
-        end += 1
-    times = "".join(inside)
-    orders = {"": 1, ",t": 1, ",t,t": 2, ",t$2": 2, ",{t,2}": 2, ",(t,2": 2, ",{t,1}": 1}
-    if end == len(tokens) or times not in orders:
-        return None
-    end += 1 + (times == ",(t,2")  # SymPy's Derivative(x(t), (t, 2)) has one bracket more
-    return _Derivative(name, orders[times], _argument(tokens, end))
-
-
-def _leibniz(tokens: Sequence[str], start: int) -> _Derivative | None:
-    """dx/dt, d x / d t, dx(t)/dt, d^2x/dt^2."""
-    above, k, order = tokens[start][1:], start + 1, 1
-    if not above and tokens[k : k + 2] == ["^", "2"]:
-        order, k = 2, k + 2
-    elif above[:1].isdigit():  # d2x/dt2
-        order, above = int(above[0]), above[1:]
-    if not above:
-        above, k = (tokens[k] if k < len(tokens) else ""), k + 1
-    k = _argument(tokens, k)
-    if not is_name(above) or k >= len(tokens) or tokens[k] != "/":
-        return None
-    for text, count in {1: (("dt", 1), ("dt", 2)), 2: (("dt^2", 3), ("dt^2", 4), ("dt2", 1))}.get(order, ()):
-        if "".join(tokens[k + 1 : k + 1 + count]) == text:
-            return _Derivative(above, order, k + 1 + count)
+    text, last, ends = "", "", dict[int, int]()  # the length of the text up to a token -> the place of the next token
+    for place, token in enumerate(tokens[start : start + _MOST_TOKENS], start + 1):
+        is_apart = (last[-1:].isalnum() or last[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
+        text, last = f"{text}{' ' * is_apart}{token}", token
+        ends[len(text)] = place
+    for pattern, order in _WRITTEN:
+        match = pattern.match(text)
+        if match is not None and match.end() in ends:
+            return _Derivative(match[1], order, ends[match.end()])
     return None
 
 
