@@ -277,13 +277,11 @@ class DocumentReader(PartReader):
         method = "polarised" if method == "polarized" else method
         if method not in _DISCRETIZATIONS:
             words = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
-            self._mistake("system.discretization", f"found {show(method)}, expected one of {words}")
-            return None
+            return self._refused("system.discretization", f"found {show(method)}, expected one of {words}")
         make, usual, largest = _DISCRETIZATIONS[method]
         degree = section.get("degree", usual)
         if type(degree) is not int or not 2 <= degree <= largest:
-            self._mistake("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
-            return None
+            return self._refused("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
         given = self._required("system", section, "rhs")
         known = self._each("system.rhs", given, lambda path, value: self._polynomial(path, value, degree))
         rhs = self._list("system", "rhs", given, "right-hand side")
@@ -302,14 +300,12 @@ class DocumentReader(PartReader):
             check_names((*self.variables, *new, *self.parameters, *self.symbols, "eps"))
         except InputError as error:
             hint = "" if "new" in section else ': give new = ["..."], names for the coordinates of the new point'
-            self._mistake("bilinear.new", f"{error}{hint}")
-            return None
+            return self._refused("bilinear.new", f"{error}{hint}")
 
         def equation(path: str, value: Any) -> fmpq_mpoly | None:
             sides = (self._text(path, value) or "").split("=")
             if len(sides) != 2:
-                self._mistake(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
-                return None
+                return self._refused(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
             left, right = (self._polynomial(path, side, 1, new) for side in sides)
             return None if left is None or right is None else left - right
 
@@ -334,8 +330,7 @@ class DocumentReader(PartReader):
         if map_ is None:
             return None
         if reason := why_no_map(map_, None if self.root is None else self.root[1]):
-            self._mistake(path, reason)
-            return None
+            return self._refused(path, reason)
         return map_
 
     def _read_hamiltonian(self, section: Mapping[str, Any]) -> CubicHamiltonian | None:
@@ -392,8 +387,7 @@ class DocumentReader(PartReader):
         except InputError as error:
             message = str(error)
             key = "A" if message.startswith("A is") else "signs" if "signs" in message.split(",")[0] else "H"
-            self._mistake(f"family.{key}", message)
-            return None
+            return self._refused(f"family.{key}", message)
 
     def _read_density(self) -> RationalFunction | None:
         if "density" not in self.document:
@@ -405,8 +399,7 @@ class DocumentReader(PartReader):
         value = self._required("density", section, "phi")
         claim = self._claim("density.phi", value) if value is not None else None
         if claim is not None and claim.numerator.is_zero() and not self.unsure:
-            self._mistake("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
-            return None
+            return self._refused("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
         return claim
 
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
@@ -422,8 +415,7 @@ class DocumentReader(PartReader):
         if known is None or self.unsure:
             return None
         if sum(abs(part.power) for part in known) > _MOST_FACTORS:
-            self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
-            return None
+            return self._refused("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
         self.document = {**self.document, "composition": {"of": [part.plain for part in known]}}
         values = [part.values for part in known]
         make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
@@ -431,8 +423,7 @@ class DocumentReader(PartReader):
 
     def _part(self, path: str, entry: Any) -> _Part | None:
         if not isinstance(entry, dict):
-            self._mistake(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
-            return None
+            return self._refused(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
         before = len(self.mistakes)
         for key in entry:
             if key not in KEYS["composition.of"]:
@@ -440,8 +431,9 @@ class DocumentReader(PartReader):
                 self._mistake(f"{path}.{key}", f"unknown key, expected one of {expected}")
         named = [key for key in ("file", "system", "map") if key in entry]
         if len(named) != 1:
-            self._mistake(path, f"found {' and '.join(named) or 'none'} of file, system and map, expected exactly one")
-            return None
+            return self._refused(
+                path, f"found {' and '.join(named) or 'none'} of file, system and map, expected exactly one"
+            )
         (key,) = named
         power, inverse = entry.get("power", 1), entry.get("inverse", False)
         if type(power) is not int or power == 0:
@@ -459,11 +451,11 @@ class DocumentReader(PartReader):
             else:
                 map_ = reader.read()["map"]
         except InputError as error:
-            self._mistake(f"{path}.{key}", str(error))
-            return None
+            return self._refused(f"{path}.{key}", str(error))
         if entry.get("involution") and not is_involution(map_):
-            self._mistake(f"{path}.involution", "found a map whose square is not the identity, expected an involution")
-            return None
+            return self._refused(
+                f"{path}.involution", "found a map whose square is not the identity, expected an involution"
+            )
         plain = {name: value for name, value in entry.items() if name not in named}
         found = dict(reader.document)
         if key != "map":

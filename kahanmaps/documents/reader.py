@@ -77,13 +77,16 @@ class PartReader:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
+    def _refused(self, key: str, sentence: str) -> Any:
+        """None, which stands for what cannot be read, and a mistake."""
+        self._mistake(key, sentence)
+
     def _made(self, path: str, make: Callable[..., T], *given: Any) -> T | None:
         """What is made of what is given; None, and a mistake, where it cannot be."""
         try:
             return make(*given)
         except InputError as error:
-            self._mistake(path, str(error))
-            return None
+            return self._refused(path, str(error))
 
     def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
         known = KEYS[section]
@@ -97,14 +100,12 @@ class PartReader:
         value = self.document.get(key, {})
         if isinstance(value, dict):
             return value
-        self._mistake(key, f"found {show(value)}, expected a table [{key}]")
-        return None
+        return self._refused(key, f"found {show(value)}, expected a table [{key}]")
 
     def _text(self, path: str, value: Any) -> str | None:
         if isinstance(value, int | str) and not isinstance(value, bool):
             return value if isinstance(value, str) else self._made(path, format_number, fmpq(value))
-        self._mistake(path, f"found {show(value)}, expected an expression in quotes")
-        return None
+        return self._refused(path, f"found {show(value)}, expected an expression in quotes")
 
     def _polynomial(
         self, path: str, value: Any, at_most: int, more: Sequence[str] = (), *, of_map: bool = True
@@ -120,11 +121,9 @@ class PartReader:
             polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
         except UnknownName as error:
             where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
-            self._mistake(path, f"{error}\nif it is a parameter, give its value: {where}")
-            return None
+            return self._refused(path, f"{error}\nif it is a parameter, give its value: {where}")
         except InputError as error:
-            self._mistake(path, str(error))
-            return None
+            return self._refused(path, str(error))
         found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
         if found > at_most and not self.unsure:
             degree = "" if found == 3 else f" and degree = {found}"
@@ -132,18 +131,15 @@ class PartReader:
                 f'\nfor a field of degree {found} write discretization = "polarised"{degree} into [system] of a file'
             )
             hint = polarised if path.startswith("system.rhs") and found <= MAX_DEGREE else ""
-            self._mistake(path, f"found a polynomial of degree {found}, expected at most {at_most}{hint}")
-            return None
+            return self._refused(path, f"found a polynomial of degree {found}, expected at most {at_most}{hint}")
         return polynomial
 
     def _matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
         if not isinstance(value, list) or not value or not all(isinstance(row, list) for row in value):
-            self._mistake(path, f'found {show(value)}, expected rows of numbers, e.g. [["0", "1"], ["-1", "0"]]')
-            return None
+            return self._refused(path, f'found {show(value)}, expected rows of numbers, e.g. [["0", "1"], ["-1", "0"]]')
         expected = size or len(value)
         if expected > MAX_DIMENSION:
-            self._mistake(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
-            return None
+            return self._refused(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
         bad = False
         if len(value) != expected:
             self._mistake(path, f"found {len(value)} rows, expected {expected}")
@@ -172,14 +168,12 @@ class PartReader:
         if value is None:
             return None
         if not isinstance(value, list):
-            self._mistake(path, f"found {show(value)}, expected {EXPECTED.get((section, key), 'a list')}")
-            return None
+            return self._refused(path, f"found {show(value)}, expected {EXPECTED.get((section, key), 'a list')}")
         if self.variables is None:
             return None
         if len(value) != len(self.variables):
             count = len(self.variables)
-            self._mistake(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
-            return None
+            return self._refused(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
         return value
 
     def _each(self, path: str, given: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
