@@ -30,7 +30,6 @@ from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.scan.result import Scan
-from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import MATRICES, Symmetries
@@ -263,19 +262,17 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
         kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
         kind += " in all" if found.polynomial == "?" else ""
         kind += "" if found.stage is None else f", of map {found.stage + 1}"
-        yield found.polynomial, kind, _outcome(found)
+        outcome = found.status + (f": {found.note}" if found.note else "")
+        if found.status in ("confined", "not confined"):
+            end = f"confined after {found.confined_at} steps"
+            if found.status == "not confined":
+                end = f"not confined within {found.followed} steps"
+            outcome = f"contracted by step {found.contracted_at}, {end}"
+        yield found.polynomial, kind, outcome
         if found.steps:
             ranks = " ".join(str(step.rank) for step in found.steps)
             poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
             yield f"  ranks {ranks}", f"poles {poles}"
-
-
-def _outcome(found: Hypersurface) -> str:
-    if found.status == "confined":
-        return f"contracted by step {found.contracted_at}, confined after {found.confined_at} steps"
-    if found.status == "not confined":
-        return f"contracted by step {found.contracted_at}, not confined within {found.followed} steps"
-    return found.status + (f": {found.note}" if found.note else "")
 
 
 # -- symmetries

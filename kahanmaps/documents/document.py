@@ -105,7 +105,13 @@ class DocumentReader(PartReader):
                 claims[name_of_claim] = claim
         in_iterates = {name: function for name, function in claims.items() if iterates_in(*function.names)}
         integrals = {name: function for name, function in claims.items() if name not in in_iterates}
-        density = self._read_density()
+        density, section = None, self._table("density") if "density" in self.document else None
+        if section is not None:
+            self._unknown_keys("density", section)
+            value = self._required("density", section, "phi")
+            density = self._claim("density.phi", value) if value is not None else None
+            if density is not None and density.numerator.is_zero() and not self.unsure:
+                self._mistake("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
         if catalog := self._table("catalog"):
             self._unknown_keys("catalog", catalog)
             read_structured_facts(catalog, self.variables, self._mistake)
@@ -164,9 +170,8 @@ class DocumentReader(PartReader):
 
                 def at_number(value: fmpq) -> BirationalMap:  # for floats
                     overrides = {**self.overrides, parameter: value}
-                    found: BirationalMap = DocumentReader(self.document, self.where, overrides, self.other).read()[
-                        "map"
-                    ]
+                    reader = DocumentReader(self.document, self.where, overrides, self.other)
+                    found: BirationalMap = reader.read()["map"]
                     return found
 
                 map_ = AlgebraicMap(map_, root, at_number)
@@ -388,19 +393,6 @@ class DocumentReader(PartReader):
             message = str(error)
             key = "A" if message.startswith("A is") else "signs" if "signs" in message.split(",")[0] else "H"
             return self._refused(f"family.{key}", message)
-
-    def _read_density(self) -> RationalFunction | None:
-        if "density" not in self.document:
-            return None
-        section = self._table("density")
-        if section is None:
-            return None
-        self._unknown_keys("density", section)
-        value = self._required("density", section, "phi")
-        claim = self._claim("density.phi", value) if value is not None else None
-        if claim is not None and claim.numerator.is_zero() and not self.unsure:
-            return self._refused("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
-        return claim
 
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 

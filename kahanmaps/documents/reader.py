@@ -77,9 +77,10 @@ class PartReader:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
-    def _refused(self, key: str, sentence: str) -> Any:
+    def _refused(self, key: str, sentence: str) -> T | None:
         """None, which stands for what cannot be read, and a mistake."""
         self._mistake(key, sentence)
+        return None
 
     def _made(self, path: str, make: Callable[..., T], *given: Any) -> T | None:
         """What is made of what is given; None, and a mistake, where it cannot be."""
