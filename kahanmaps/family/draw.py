@@ -20,7 +20,8 @@ from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.skew_hamiltonian import random_symplectic, symplectic_inverse
+from kahanmaps.family.skew_hamiltonian import companion_matrix, random_symplectic, symplectic_inverse, two_blocks
+from kahanmaps.family.tensor import GENERATOR, components, split_names
 
 MAX_M = 16  # beyond, H may be longer than the texts that system files allow
 
@@ -67,41 +68,17 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     _require_size(size)
     chi = chi / chi.leading_coefficient()
     rng = random.Random(integer(seed, "the seed"))
-    companion = fmpq_mat(m, m)
-    for i in range(m):
-        companion[i, m - 1] = -chi[i]
-        if i:
-            companion[i, i - 1] = fmpq(1)
-    normal = fmpq_mat(2 * m, 2 * m)
-    for i in range(m):
-        for j in range(m):
-            normal[j, i] = normal[m + i, m + j] = companion[i, j]
+    companion = companion_matrix(chi)
+    normal = two_blocks(companion.transpose(), companion)
     S = random_symplectic(m, rng)
     forms = _coordinates(symplectic_inverse(S), default_variables(2 * m))
     zero = forms[0].context().constant(0)
-    X = forms[:m]
     # Y in the basis dual to 1, t, ..., t^(m-1) under (a, b) -> coefficient of t^(m-1) in a b, so that J is standard.
     Y = [zero] * m
     for j in range(m):
         for k in range(j, m):
             coefficient = fmpq(1) if k == m - 1 else chi[k + 1]
             Y[k - j] = Y[k - j] + coefficient * forms[m + j]
-
-    def products(left: Sequence[fmpq_mpoly], right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        """The product of two elements of (Q[t]/chi)[x], lists of m polynomials in x."""
-        full = [zero] * (2 * m - 1)
-        for i, a in enumerate(left):
-            if not a.is_zero():
-                for j, b in enumerate(right):
-                    full[i + j] = full[i + j] + a * b
-        for power in range(2 * m - 2, m - 1, -1):
-            for k in range(m):
-                if chi[k] != 0:
-                    full[power - m + k] = full[power - m + k] - chi[k] * full[power]
-        return full[:m]
-
-    squares = [products(X, X), products(X, Y), products(Y, Y)]
-    cubes = [products(squares[0], X), products(squares[0], Y), products(squares[2], X), products(squares[2], Y)]
     drawn: list[list[int]] = []
     # The discriminant is to be invertible: a genuine map on the part of every factor.
     while not drawn or _discriminant(*map(fmpq_poly, drawn)).gcd(chi).degree() != 0:
@@ -110,10 +87,11 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
             element = [rng.randint(-size, size) for _ in range(m)]
             if any(element):
                 drawn.append(element)
-    H = zero
-    for cube, coefficients in zip(cubes, drawn, strict=True):
-        factor: list[fmpq_mpoly] = [zero + c for c in coefficients]
-        H += products(factor, cube)[m - 1]
+    X_, Y_, t = ring(["X", "Y", GENERATOR]).gens()
+    elements = [sum((t**k * c for k, c in enumerate(coefficients)), 0 * t) for coefficients in drawn]
+    a, b, c, d = elements
+    h = a * X_**3 + b * X_**2 * Y_ + c * X_ * Y_**2 + d * Y_**3
+    H = components(h, split_names(["X", "Y"], m), chi)[m - 1].compose(*forms[:m], *Y, ctx=zero.context())
     return FamilyMember(_hidden(normal, S), H)
 
 

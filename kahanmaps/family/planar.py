@@ -32,7 +32,7 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import third_derivatives
-from kahanmaps.family.skew_hamiltonian import bits_of, format_univariate
+from kahanmaps.family.skew_hamiltonian import bits_of, companion_matrix, format_univariate, two_blocks
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
@@ -218,9 +218,8 @@ class NormalForm(Displayed):
         if any(coefficient.degree() >= m for coefficient in self.coefficients):
             raise AssertionError("normal form: a coefficient of h is not reduced modulo chi")
         # Multiplication by t in the basis 1, t, ..., t^(m-1), for both coordinates.
-        block = [[-self.chi[i] if j == m - 1 else fmpq(i == j + 1) for j in range(m)] for i in range(m)]
-        zeros = [fmpq(0)] * m
-        times_t = fmpq_mat([[*row, *zeros] for row in block] + [[*zeros, *row] for row in block])
+        companion = companion_matrix(self.chi)
+        times_t = two_blocks(companion, companion)
         if self.A.transpose() * self.S != self.S * times_t:
             raise AssertionError("normal form: t does not act as A^T")
         values = self._functional_of_powers(fmpq_poly([1]), 2 * m - 1)

@@ -159,6 +159,24 @@ def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
     return value
 
 
+def companion_matrix(chi: fmpq_poly) -> fmpq_mat:
+    """Multiplication by t on Q[t]/chi in the basis 1, t, ..., t^(m-1).
+
+    >>> companion_matrix(fmpq_poly([-2, 0, 1]))
+    [0, 2]
+    [1, 0]
+    """
+    m = int(chi.degree())
+    entries = [-chi[i] / chi[m] if j == m - 1 else fmpq(i == j + 1) for i in range(m) for j in range(m)]
+    return fmpq_mat(m, m, entries)
+
+
+def two_blocks(first: fmpq_mat, second: fmpq_mat) -> fmpq_mat:
+    """diag(first, second) of two square matrices of the same size."""
+    zeros = [0] * first.nrows()
+    return fmpq_mat([[*row, *zeros] for row in first.tolist()] + [[*zeros, *row] for row in second.tolist()])
+
+
 def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     """A random integer matrix S with S^T J S = J and small entries: a product of elementary symplectic matrices.
 

@@ -22,7 +22,7 @@ from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_inte
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
-from kahanmaps.family.skew_hamiltonian import evaluate_at_matrix
+from kahanmaps.family.skew_hamiltonian import companion_matrix, evaluate_at_matrix
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
 
 GENERATOR = "t"
@@ -50,7 +50,7 @@ def over_algebra(system: QuadraticSystem, chi: fmpq_poly) -> QuadraticSystem:
             f"{MAX_DIMENSION} over Q"
         )
     variables = split_names(system.variables, chi.degree())
-    parts = [_components(polynomial, variables, chi, variables) for polynomial in system.rhs]
+    parts = [components(polynomial, variables, chi) for polynomial in system.rhs]
     return QuadraticSystem(tuple(itertools.chain.from_iterable(parts)))
 
 
@@ -192,13 +192,15 @@ def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
     )
 
 
-def _components(
-    polynomial: fmpq_mpoly, variables: Sequence[str], chi: fmpq_poly, names: Sequence[str]
+def components(
+    polynomial: fmpq_mpoly, variables: Sequence[str], chi: fmpq_poly, names: Sequence[str] = ()
 ) -> list[fmpq_mpoly]:
     """The coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ..., in the ring of `names`.
 
-    Of the polynomial's own variables the first ones are split, and t and those in `names` are kept.
+    Of the polynomial's own variables the first ones are split, into `variables`, and t and those in `names` are kept.
+    Without `names` the ring is that of the variables.
     """
+    names = names or variables
     m = int(chi.degree())
     context = ring((*names, GENERATOR))
     gens = dict(zip(context.names(), context.gens(), strict=True))
@@ -222,11 +224,11 @@ def _quotient(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField
     variables = split_names(function.names[:-1], m)
     names = (*variables, "eps")
     K = FunctionField(names, DEFAULT_BUDGET, reduces=True)
-    companion = fmpq_mat([[-chi[i] / chi[m] if j == m - 1 else fmpq(i == j + 1) for j in range(m)] for i in range(m)])
+    companion = companion_matrix(chi)
 
     def matrix(polynomial: fmpq_mpoly) -> FunctionMatrix:
         total, power = K.matrix(m, m, [K.zero] * (m * m)), QQ.identity(m)
-        for part in _components(polynomial, variables, chi, names):
+        for part in components(polynomial, variables, chi, names):
             total = total + K.convert_matrix(power) * Function(K, part, K.context.constant(1))
             power = power * companion
         return total
