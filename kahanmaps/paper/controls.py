@@ -23,7 +23,7 @@ class Control:
     least_m: int = 1
 
 
-def _broken_H(o: PaperObjects) -> PaperObjects:
+def broken_H(o: PaperObjects) -> PaperObjects:
     """H plus the cube of a random linear form; for m = 1, where every cubic belongs, f is doubled but not H."""
     if o.m == 1:
         return o.changed(base=o.f.transformed(o.I * o.number(2)))
@@ -31,30 +31,30 @@ def _broken_H(o: PaperObjects) -> PaperObjects:
     return o.changed(third=o.third + o.tensor(u, u, u), base=None)
 
 
-def _broken_J(o: PaperObjects) -> PaperObjects:
+def broken_J(o: PaperObjects) -> PaperObjects:
     """J plus a random skew matrix of rank 2, throughout; for m = 1, where A^T J = J A for every skew J, twice J."""
     u, v = o.vector("break 1"), o.vector("break 2")
     return o.changed(J=o.J + u * v.transpose() - v * u.transpose(), base=None)
 
 
-def _broken_f(o: PaperObjects) -> PaperObjects:
+def broken_f(o: PaperObjects) -> PaperObjects:
     """f plus a random vector times the square of a random linear form; H stays."""
     p, u = o.vector("break 1"), o.vector("break 2")
     return o.changed(base=SystemOver(o.K, o.f.tensor + o.tensor(p, u, u), o.f.B, o.f.c))
 
 
-def _broken_B(o: PaperObjects) -> PaperObjects:
+def broken_B(o: PaperObjects) -> PaperObjects:
     given = o.associate_matrices and tuple((o.I * o.number(3) - B) * o.number(1, 2) for B in o.associate_matrices)
     return o.changed(minus=o.number(2), associate_matrices=given)
 
 
-def _repeated_root(o: PaperObjects) -> PaperObjects:
+def repeated_root(o: PaperObjects) -> PaperObjects:
     """A + (lambda_2 - lambda_1) E_1, E_1 the projector to lambda_1: still skew-Hamiltonian, H still in its space."""
     A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
     return o.changed(A=A, roots=(o.lam[1], *o.lam[1:]), known_chi=None)
 
 
-def _linear_f(o: PaperObjects) -> PaperObjects:
+def linear_f(o: PaperObjects) -> PaperObjects:
     """H with its quadratic part only: linear maps that are functions of one matrix commute with any steps."""
     zero = o.zeros(o.n * o.n, o.n)
     return o.inhomogeneous().changed(third=zero, gradient_of_linear_part=o.zeros(o.n, 1), base=None, draw=o.vector)
@@ -66,12 +66,12 @@ def _rank_1(o: PaperObjects) -> Any:
 
 CONTROLS: dict[str, Control] = {
     "A": Control("A is not skew-Hamiltonian", lambda o: o.changed(A=o.A + _rank_1(o))),  # H, J and the roots stay
-    "H": Control("H is outside the space of A", _broken_H),
-    "J": Control("J is not the standard structure, and A^T J = J A fails", _broken_J),
-    "f": Control("f is not Hamiltonian", _broken_f),
+    "H": Control("H is outside the space of A", broken_H),
+    "J": Control("J is not the standard structure, and A^T J = J A fails", broken_J),
+    "f": Control("f is not Hamiltonian", broken_f),
     # f'' v gains a random matrix times the first component of v.
     "f''": Control("f'' is not the derivative of f'", lambda o: o.changed(error_of_second=_rank_1(o))),
-    "B": Control("B^2 = I fails: B_i(lambda_i) = 2", _broken_B),
+    "B": Control("B^2 = I fails: B_i(lambda_i) = 2", broken_B),
     # B_i takes the value 1 at its own root as well, so that all associated systems are f.
     "B=I": Control(
         "all B_i are I", lambda o: o.changed(minus=o.K.one, associate_matrices=o.associate_matrices and (o.I,))
@@ -84,11 +84,11 @@ CONTROLS: dict[str, Control] = {
         "the lambda_i are not the eigenvalues of A",
         lambda o: o.changed(roots=tuple(root + o.scalar(f"break {i}") for i, root in enumerate(o.lam))),
     ),
-    "repeated": Control("chi has a repeated root", _repeated_root, least_m=2),
+    "repeated": Control("chi has a repeated root", repeated_root, least_m=2),
     # A := B_1, so that H_1 is associated to H_0.
     "A=B": Control("A itself has A^2 = I", lambda o: o.changed(A=o.B(0)), least_m=2),
     "H0": Control("H = 0", lambda o: o.changed(third=o.zeros(o.n * o.n, o.n), base=None)),
-    "linear": Control("f is linear", _linear_f),
+    "linear": Control("f is linear", linear_f),
     # With quadratic and linear terms, such that A nabla^2 H = nabla^2 H A^T still holds.
     "inhomogeneous": Control("H is not homogeneous", PaperObjects.inhomogeneous),
     "unvaried": Control(

@@ -174,19 +174,19 @@ def division_polynomials(o: PaperObjects) -> Pairs:
         yield five * det(0, 1, 6) * det(2, 3, 5), six * det(0, 2, 5) * det(1, 3, 6)
 
 
-def _commuting(o: PaperObjects) -> Pairs:
+def commuting(o: PaperObjects) -> Pairs:
     """The maps of the class commute"""
     for B in o.associates():
         yield o.step(o.f, o.step(o.g(B), o.x)), o.step(o.g(B), o.x_tilde)
 
 
-def _measure(o: PaperObjects) -> Pairs:
+def measure(o: PaperObjects) -> Pairs:
     """The map of f has its invariant measure"""
     determinant = o.det(o.jacobian_of_step(o.f, o.x))
     yield determinant * o.det(o.minus_eps_jac(o.f, o.x)), o.det(o.minus_eps_jac(o.f, o.x_tilde))
 
 
-def _shared_measure(o: PaperObjects) -> Pairs:
+def shared_measure(o: PaperObjects) -> Pairs:
     """All maps of the class have that measure"""
     for B in o.associates():
         determinant = o.det(o.jacobian_of_step(o.g(B), o.x))
@@ -194,19 +194,19 @@ def _shared_measure(o: PaperObjects) -> Pairs:
         yield determinant * o.det(o.minus_eps_jac(o.f, o.x)), o.det(o.minus_eps_jac(o.f, x_hat))
 
 
-def _modified(o: PaperObjects) -> Pairs:
+def modified(o: PaperObjects) -> Pairs:
     """The map of f conserves modified H"""
     yield o.modified_H(o.x_tilde), o.modified_H(o.x)
 
 
-def _shared_modified(o: PaperObjects) -> Pairs:
+def shared_modified(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians are shared by all maps of the class"""
     for B in o.associates():
         yield o.modified_H(o.step(o.g(B), o.x)), o.modified_H(o.x)
         yield o.modified(B, o.x_tilde), o.modified(B, o.x)
 
 
-def _paper_integral(o: PaperObjects) -> Pairs:
+def paper_integral(o: PaperObjects) -> Pairs:
     """The map of f conserves the paper's form eps^{-1} x^T J^{-1} x~"""
     images = [o.solve(o.J, o.step(o.f, x)) for x in (o.x_tilde, o.x)]
     yield o.dot(o.x_tilde, images[0]), o.dot(o.x, images[1])
@@ -217,7 +217,7 @@ def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
     return lambda o, x: o.modified(list(o.associates())[k], x)
 
 
-def _gradients(o: PaperObjects) -> Pairs:
+def gradients(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians satisfy the same differential equation as H and K"""
     v = o.vector("v")
     for k, B in enumerate(o.associates()):
@@ -225,7 +225,7 @@ def _gradients(o: PaperObjects) -> Pairs:
         yield left, o.slope(lambda o, x: o.modified_H(x), o.x, B.transpose() * v)
 
 
-def _involution(o: PaperObjects) -> Pairs:
+def involution(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians are in involution for Pi"""
     gradient = o.gradient(lambda o, x: o.modified_H(x), o.x)
     for k, _ in enumerate(o.associates()):
@@ -233,7 +233,7 @@ def _involution(o: PaperObjects) -> Pairs:
         yield o.dot(gradient, o.Pi(o.x) * other), o.K.zero
 
 
-def _formula(o: PaperObjects) -> Pairs:
+def formula(o: PaperObjects) -> Pairs:
     """The formula (106) for the integral through H and the K_i"""
     right = o.P0(o.x) * o.H(o.x)
     for i in o.each:
@@ -246,12 +246,12 @@ def _formula(o: PaperObjects) -> Pairs:
 # asked that concerns f alone.
 _ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
 STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
-    (_commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),
-    (_measure, "dx/det(I - eps f') is invariant for f", "map", _ALONE, "+++ ++"),
-    (_shared_measure, "dx/det(I - eps f') is invariant for g", "B map", _BOTH, "++--++"),
-    (_modified, "modified H is conserved by f", "map", _ALONE, "+++ ++"),
-    (_shared_modified, "modified H is conserved by g, modified K by f", "B map", _BOTH, "++--++"),
-    (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", "map", _ALONE, "-++ ++"),
+    (commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),
+    (measure, "dx/det(I - eps f') is invariant for f", "map", _ALONE, "+++ ++"),
+    (shared_measure, "dx/det(I - eps f') is invariant for g", "B map", _BOTH, "++--++"),
+    (modified, "modified H is conserved by f", "map", _ALONE, "+++ ++"),
+    (shared_modified, "modified H is conserved by g, modified K by f", "B map", _BOTH, "++--++"),
+    (paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", "map", _ALONE, "-++ ++"),
     (
         perturbed_hamiltonians_are_conserved,
         "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m",
@@ -262,9 +262,9 @@ STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
     (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", "map", _ALONE, "++- +-"),
     (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", "B map", _BOTH, "++--+-"),
     (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", "f''", {"pairwise": True, "least_m": 2}, "++- +-"),
-    (_gradients, "nabla (modified K) = B nabla (modified H)", "B", _BOTH, "++--++"),
-    (_involution, "{modified H, modified K} = 0 for Pi", "B", {"pairwise": True, "needs_g": True}, "++--++"),
-    (_formula, "modified H = P_0 H + eps^2 sum Q_i K_i", "B", {}, "-+-   "),
+    (gradients, "nabla (modified K) = B nabla (modified H)", "B", _BOTH, "++--++"),
+    (involution, "{modified H, modified K} = 0 for Pi", "B", {"pairwise": True, "needs_g": True}, "++--++"),
+    (formula, "modified H = P_0 H + eps^2 sum Q_i K_i", "B", {}, "-+-   "),
 ]
 
 
