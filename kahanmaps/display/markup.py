@@ -50,6 +50,18 @@ def markdown(text: object) -> str:
     return marked.replace("&", "&amp;").replace("<", "&lt;")
 
 
+def code(text: object) -> str:
+    """Text as a span of code in Markdown, fenced by more backticks than it has in a row.
+
+    >>> code("x < y"), code("`a`")
+    ('`x < y`', '`` `a` ``')
+    """
+    line = re.sub(r"\s", " ", printable(str(text)))
+    fence = "`" * (1 + max(map(len, re.findall("`+", line)), default=0))
+    margin = " " if len(fence) > 1 else ""
+    return f"{fence}{margin}{line}{margin}{fence}"
+
+
 def shortened(text: object, width: int = _SHORTENED) -> str:
     """The text with its middle left out where it is longer than `width`, and its length told; not yet escaped.
 

@@ -173,7 +173,7 @@ def companion_matrix(chi: fmpq_poly) -> fmpq_mat:
 
 def two_blocks(first: fmpq_mat, second: fmpq_mat) -> fmpq_mat:
     """diag(first, second) of two square matrices of the same size."""
-    zeros = [0] * first.nrows()
+    zeros = [fmpq(0)] * first.nrows()
     return fmpq_mat([[*row, *zeros] for row in first.tolist()] + [[*zeros, *row] for row in second.tolist()])
 
 
