@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from hashlib import sha256
+from itertools import chain
 from threading import Lock
 from typing import Any
 
@@ -21,14 +22,16 @@ from kahanmaps.algebra.matrices import EntryMatrix
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.printing import format_rational_function
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count, counted
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
 _MOST_KEPT, _MOST_KEPT_TERMS = 100, 500_000  # matrices whose minors are kept, and terms: 30 MB
 _BY_MINORS = 7  # rows: products with single entries, of which there are 2^n n/2, are cheaper than those of elimination
 
-_kept: dict[bytes, tuple[list[fmpq_mpoly], int]] = {}  # by matrices: their minors, and the products of terms
+_TOO_MANY = "expanding the identity would take too many products of terms"
+_Key = bytes | tuple[bytes, int]  # of a matrix, with the budget where this was too small
+_kept: dict[_Key, tuple[list[fmpq_mpoly] | None, int, int]] = {}  # minors, products of terms that they took, and units
 _keeping = Lock()
 
 
@@ -106,9 +109,9 @@ class FunctionField(Field):
     def pay(self, products: int) -> None:
         """Take so many products of terms from the budget. Raises BudgetExceeded where it has not as many."""
         self.budget -= products
-        count(products)
         if self.budget < 0:
-            raise BudgetExceeded("expanding the identity would take too many products of terms")
+            raise BudgetExceeded(_TOO_MANY)
+        count(1 + products / 100)
 
     def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
         """Raise BudgetExceeded where the budget cannot pay for the products of all these pairs: none need be begun."""
@@ -120,6 +123,7 @@ class FunctionField(Field):
         if self.reduces and not below.is_constant():
             if above.is_zero():
                 return self.zero
+            count(10 + (len(above) + len(below)) / 2)
             common = above.gcd(below)
             if not common.is_constant():
                 return Function(self, above / common, below / common)
@@ -320,15 +324,22 @@ class FunctionMatrix(EntryMatrix):
 def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
     """The signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th is without column k.
 
-    Many identities contain the same image of the same map: the last minors are kept. They are paid for as if they were
-    computed again, so that no verdict depends on what was expanded before.
+    Many identities contain the same image of the same map: the last minors are kept. They are paid and counted as if
+    they were computed again, so that no verdict depends on what was expanded before. Those that a budget was too small
+    for are known for this budget only: with another one, other work is done until it is exceeded.
     """
+    count(sum(map(len, chain(*rows))))  # of the text that they are known by
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
-    minors, products = _kept.get(key, ([], 0))
-    if minors or products > field.budget:
-        field.pay(products)
-        return minors
-    budget = field.budget
+    budget, before = field.budget, counted()
+    for known in (key, (key, budget)):
+        minors, products, units = _kept.get(known, (None, 0, 0))
+        if known in _kept and products <= budget:
+            count(units)
+            if minors is None:
+                field.budget = -1
+                raise BudgetExceeded(_TOO_MANY)
+            field.budget -= products
+            return minors
     try:
         if len(rows) > _BY_MINORS:
             columns = range(len(rows) + 1)
@@ -338,17 +349,19 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
             found = kernel_minors(entries, field.times, field.require)
             minors = [field.context.constant(0) if minor is None else minor for minor in found]
     except BudgetExceeded:
-        _keep(key, [], budget + 1)
+        _keep((key, budget), None, 0, counted() - before)
         raise
-    _keep(key, minors, budget - field.budget)
+    _keep(key, minors, budget - field.budget, counted() - before)
     return minors
 
 
-def _keep(key: bytes, minors: list[fmpq_mpoly], products: int) -> None:
-    """Keep minors in place of the oldest; none of a matrix that takes at least so many products, and was given up."""
+def _keep(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
+    """Keep minors in place of the oldest; None where they were given up."""
     with _keeping:
-        _kept[key] = minors, products
-        while len(_kept) > _MOST_KEPT or sum(len(P) for kept, _ in _kept.values() for P in kept) > _MOST_KEPT_TERMS:
+        _kept[key] = minors, products, units
+        while (
+            len(_kept) > _MOST_KEPT or sum(len(P) for kept, *_ in _kept.values() for P in kept or ()) > _MOST_KEPT_TERMS
+        ):
             del _kept[next(iter(_kept))]
 
 

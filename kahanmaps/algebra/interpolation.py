@@ -30,7 +30,7 @@ from flint import nmod_mat, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.residues import chinese, random_prime, rational_reconstruction, rational_vector
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.errors import BadPrime, InputError
 
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
@@ -70,7 +70,7 @@ class Samples:
         if self.spent + wanted > self.max_samples:
             raise Stop(f"{self.spent} values were taken and {wanted} more are needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
-            raise Stop(f"the budget is spent, after {self.spent} values")
+            raise Stop(f"the budget was spent after {self.spent} values (--effort)")
 
 
 class SampledValues:
@@ -320,10 +320,10 @@ def _along_line(
         where.append(t)
         return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
 
-    count = len(values.values[0])
+    entries = range(len(values.values[0]))
     vanishing = nmod_poly([-start, 1], p)
     through = [nmod_poly([v], p) for v in values.values[0]]
-    found: list[tuple[nmod_poly, nmod_poly] | None] = [None] * count
+    found: list[tuple[nmod_poly, nmod_poly] | None] = [None for _ in entries]
     n = 1
     while any(pair is None for pair in found):
         if n > 2 * max_degree + 2:
@@ -331,12 +331,13 @@ def _along_line(
         values.take(draw)
         t, n = where[-1], n + 1
         slope = 1 / vanishing(t)
-        for i in range(count):
+        for i in entries:
             if found[i] is None:
                 values.samples.check()
+                count(5 + n * (1 + n / 100))
                 through[i] += vanishing * ((values.values[-1][i] - through[i](t)) * slope)
         vanishing *= nmod_poly([-t, 1], p)
-        for i in range(count):
+        for i in entries:
             if found[i] is None:
                 found[i] = _least_fraction(through[i], vanishing, n)
     return [pair for pair in found if pair is not None]
@@ -451,6 +452,7 @@ def _solve(
     width = sum(widths) + (len(below) if known is None else 1)
     if height == 0:
         return max(1, -(-(width - 1) // len(members)))
+    count(20 + len(rows) * (0.5 + min(height, width) / 1500))
     kernel, nullity = nmod_mat(height, width, rows, p).nullspace()
     if nullity > 1:
         return int(-(-(nullity - 1) // len(members)))
@@ -527,6 +529,7 @@ def _recognised(
     context = ring(names)
     functions = []
     for shape, entries in zip(shapes, residues, strict=True):
+        count((20 + 5 * len(entries)) * modulus.bit_length() / 60)
         coefficients = rational_vector(entries, modulus)
         if coefficients is None:
             return None

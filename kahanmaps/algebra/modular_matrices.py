@@ -20,13 +20,30 @@ def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
 
 def reduced(A: nmod_mat) -> tuple[nmod_mat, int]:
     """The reduced echelon form of a matrix modulo a prime, and its rank."""
-    count(20 + A.nrows() * A.ncols() * min(A.nrows(), A.ncols()) / 1500)
+    _count_elimination(A)
     form, rank = A.rref()
     return form, int(rank)
 
 
+def _count_elimination(A: nmod_mat) -> None:
+    count(10 + A.nrows() * A.ncols() * min(A.nrows(), A.ncols()) / 1500)
+
+
+def multiply(A: nmod_mat, B: nmod_mat) -> nmod_mat:
+    """The product of two matrices modulo a prime."""
+    count(1 + A.nrows() * A.ncols() * B.ncols() / 1000)
+    return A * B
+
+
+def determinant(A: nmod_mat) -> int:
+    """The determinant of a square matrix modulo a prime."""
+    _count_elimination(A)
+    return int(A.det())
+
+
 def integers(A: nmod_mat) -> list[list[int]]:
     """The rows of a matrix modulo a prime as residues."""
+    count(A.nrows() * A.ncols() / 2)
     return [list(map(int, row)) for row in A.tolist()]
 
 
@@ -60,6 +77,7 @@ def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
     [[5, 1, 0]]
     """
     prime, (first, free) = form.modulus(), split_columns(form, rank)
+    count(len(free) * (len(first) / 3 + form.ncols() / 50))
     found = []
     for k in free:
         vector = [0] * form.ncols()
@@ -82,7 +100,7 @@ def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
 
 def combine(weights: Sequence[Sequence[int]], vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
     """The combinations sum_k w_k v_k of vectors modulo a prime, one for each row w of weights."""
-    return integers(matrix(weights, prime) * matrix(vectors, prime)) if weights and vectors else []
+    return integers(multiply(matrix(weights, prime), matrix(vectors, prime))) if weights and vectors else []
 
 
 def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
@@ -96,4 +114,8 @@ def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
 
 def rank(vectors: Sequence[Sequence[Any]], prime: int) -> int:
     """The rank of vectors modulo a prime."""
-    return int(matrix(vectors, prime).rank()) if vectors else 0
+    if not vectors:
+        return 0
+    A = matrix(vectors, prime)
+    _count_elimination(A)
+    return int(A.rank())

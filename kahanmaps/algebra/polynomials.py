@@ -35,6 +35,7 @@ from flint import (
 )
 
 from kahanmaps.algebra.integers import content, over_one
+from kahanmaps.algebra.work import count
 from kahanmaps.errors import InputError, quoted
 
 
@@ -183,7 +184,8 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     own = field.value(polynomial, point)
     if own is not None:
         return own
-    powers = [[field.one, entry] for entry in point]
+    count(1 + 3 * len(polynomial))
+    powers: list[list[Any]] = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():
         for monomial, coefficient in polynomial.terms():

@@ -25,6 +25,7 @@ from typing import Any, Protocol
 
 from flint import fmpq
 
+from kahanmaps.algebra import work
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
 from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
@@ -75,9 +76,10 @@ class Identity:
 
         They come from the two sides themselves, computed with bounds in the place of numbers.
         """
-        field = BoundField()
+        field, before = BoundField(), work.counted()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
+        work.count(7 * (work.counted() - before))  # bounds are slower than numbers, of which values count themselves
         # Without values no bound: such an identity is never supported, whatever it does over GF(p).
         return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 

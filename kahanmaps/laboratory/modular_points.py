@@ -16,7 +16,7 @@ from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kahan import KahanMapOver, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
@@ -53,6 +53,7 @@ class ModularMap:
         if eps % prime == 0:
             raise BadPrime(f"found eps = 0 modulo {prime}: take another prime", prime)
         self.map = as_map(system).at(field.convert(eps), field, [field.convert(value) for value in values])
+        count(20 if isinstance(self.map, KahanMapOver) else 200)
 
     def random_point(self) -> Point:
         """A random point modulo the prime."""
@@ -60,7 +61,8 @@ class ModularMap:
 
     def step(self, x: Point) -> Point | None:
         """The image of a point, None where the map has no value."""
-        count(10 + 2 * self.dim**3)
+        # Values of polynomials count themselves.
+        count(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMapOver) else 10)
         try:
             return tuple(int(entry) for entry in self.map.step(x))
         except SingularStep:
@@ -68,6 +70,7 @@ class ModularMap:
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
         """Numerator and denominator of det dPhi(x), as they come: for Kahan maps det(I +- eps f') at x~ and x."""
+        count(25 + 8 * self.dim + self.dim**3 / 10)
         above, below = jacobian_determinant_sides(self.map, x, self.map.point(image))
         return int(above), int(below)
 
@@ -157,7 +160,9 @@ def _layers(dim: int, degree: int) -> list[list[tuple[int, int]]]:
 
 def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
     """The values of all monomials of degree at most `degree` at a point modulo a prime."""
-    return list(map(int, _products(point, _layers(len(point), degree), prime)))
+    values = _products(point, _layers(len(point), degree), prime)
+    count(len(values) / 8)
+    return list(map(int, values))
 
 
 def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> Values:
@@ -172,6 +177,7 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     """The value and the gradient at a point of the polynomial of degree at most `degree` with these coefficients."""
     value, gradient = 0, [0] * len(point)
     powers = monomial_values(point, degree, prime)
+    count(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
     for coefficient, slopes, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
         if coefficient:  # most are 0
             value += coefficient * power
@@ -184,6 +190,7 @@ def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
     """The partial derivatives of all monomials of degree at most `degree` at a point: a row a variable."""
     powers = monomial_values(point, degree, prime)
     rows = [[0] * len(powers) for _ in point]
+    count(len(point) * len(powers) / 5)
     for k, slopes in enumerate(monomial_tables(len(point), degree)):
         for variable, exponent, place in slopes:
             rows[variable][k] = exponent * powers[place] % prime
@@ -198,6 +205,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
     exponents = exponents_up_to(dim, degree)
     places = {exponent: k for k, exponent in enumerate(exponents)}
     row = [0] * len(exponents)
+    count(len(exponents) / 10 + 1.5 * sum(map(bool, P)) * sum(map(bool, Q)))
     for a, p in zip(exponents, P, strict=False):
         if p:
             for b, q in zip(exponents, Q, strict=False):
@@ -212,6 +220,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
     """The polynomial modulo a prime that has these values at different nodes, of a degree below their number."""
     table = list(values)
+    count(len(nodes) ** 2 / 2)
     inverse = cache(lambda difference: pow(difference, -1, prime))
     for k in range(1, len(nodes)):  # Newton's divided differences
         for i in range(len(nodes) - 1, k - 1, -1):
