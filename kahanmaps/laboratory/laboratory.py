@@ -102,7 +102,9 @@ class Laboratory:
             self.field = self.map.of_field
             self.map = euler_map(self.field)
         self.flow = flow
+        # What one search knows already; searches have laboratories of their own, so that no answer depends on others.
         self._too_long: dict[bool, int] = {}  # of integrals and of densities: how many terms the shortest one had
+        self._flow_polynomials: FlowPolynomials | None = None
         if flow and (self.field is None or self.eps is not None):
             what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
             raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
@@ -190,16 +192,19 @@ class Laboratory:
             if darboux_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
         ]
 
-    def flow_polynomials(self) -> FlowPolynomials:
-        """Darboux polynomials of the flow in (variables, symbols, eps)."""
+    def flow_polynomials(self, budget: Budget) -> FlowPolynomials:
+        """Darboux polynomials of the flow in (variables, symbols, eps); they are sought once, within that budget."""
+        if self._flow_polynomials is not None:
+            return self._flow_polynomials
         assert self.field is not None
-        found, context = flow_polynomials(self.field, seed=self.seed), ring(self.map.names)
+        found, context = flow_polynomials(self.field, budget=budget, seed=self.seed), ring(self.map.names)
         gens = context.gens()[:-1]
         functions = [P.compose(*gens, ctx=context) for P in found.functions]
         # With symbols that search ends at a low degree in all names.
         affine = self.affine_cofactors() if self.symbols and self.system is not None else []
         more = [one.polynomial for one in affine if one.polynomial is not None and one.polynomial not in functions]
-        return replace(found, functions=(*functions, *more))
+        self._flow_polynomials = replace(found, functions=(*functions, *more))
+        return self._flow_polynomials
 
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None

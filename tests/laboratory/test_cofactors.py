@@ -4,6 +4,7 @@ import pytest
 from helpers import DIMENSION
 from search_helpers import system
 
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
@@ -74,11 +75,11 @@ def test_polynomials_with_a_given_cofactor():
 def test_the_search_ends_when_enough_is_known():
     laboratory = Laboratory(system("x y", "x", "y"))
     map_, known = laboratory.maps[0], laboratory.cofactors()
-    [(product, _, [space])] = search_cofactors(map_, known, [], [], 1, 3).spaces
+    [(product, _, [space])] = search_cofactors(map_, known, [], [], 1, 3, Budget()).spaces
     assert (product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
-    assert search_cofactors(map_, known, [], [space], 1, 3).spaces == []
-    assert search_cofactors(map_, known, [], [], 1, 3, deadline=0.0).spaces == []
-    assert search_cofactors(map_, known, [], [], 0, 3).spaces == []
+    assert search_cofactors(map_, known, [], [space], 1, 3, Budget()).spaces == []
+    assert search_cofactors(map_, known, [], [], 1, 3, Budget(0)).spaces == []
+    assert search_cofactors(map_, known, [], [], 0, 3, Budget()).spaces == []
 
 
 @pytest.mark.parametrize(("digits", "is_written"), [(800, True), (2400, False)])

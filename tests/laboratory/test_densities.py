@@ -3,7 +3,6 @@
 from fractions import Fraction
 from functools import cache, partial
 from itertools import islice
-from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -12,6 +11,7 @@ from helpers import DIMENSION, quick
 from search_helpers import random_system, system, value_of
 
 from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
@@ -110,9 +110,11 @@ def test_simple_systems(file, texts):
     assert [one.text for one in find_densities(file).densities] == texts
 
 
-def test_too_little_time_is_told():
-    found = find_densities(load("lorenz"), seconds=1e-9)
-    assert (found.densities, found.reason) == ((), "the time was over at degree 0")
+@pytest.mark.parametrize(("units", "degree"), [(0, 0), (50_000, 10)])
+def test_too_small_a_budget_is_told(units, degree):
+    found = find_densities(load("lorenz"), effort=Budget(units), integrals=())
+    reason = f"polynomials of degree {degree} and more were not tried: the budget was spent (--effort)"
+    assert (found.densities, found.reason) == ((), reason)
 
 
 def test_sizes_are_limited(monkeypatch):
@@ -166,7 +168,7 @@ def test_the_least_degree_is_found_though_degrees_are_leapt_over(least, degrees,
     laboratory = Laboratory(load("lorenz"))
     monkeypatch.setattr(module, "_space", space)
     monkeypatch.setattr(laboratory, "formulas", lambda *_: SimpleNamespace(bases=None, reason="too long"))
-    found, degree, reason = module._search(laboratory, None, None, inf, lambda _: None)
+    found, degree, reason = module._search(laboratory, None, None, Budget(), lambda _: None)
     assert (found, tried) == ([], degrees or [0, 1, 2, 4, 6, 9, 12])
     none = "there is a density of degree {} modulo primes, but no closed form: too long".format
     assert (degree, reason) == ((12, "") if degrees is None else (least, none(least)))

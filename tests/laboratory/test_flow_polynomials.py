@@ -8,6 +8,7 @@ from flint import fmpq
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
 from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
@@ -109,9 +110,9 @@ def test_of_a_pencil_no_member_is_taken_for_a_rational_one():
         assert sorted(map(format_polynomial, found)) == known
 
 
-def test_without_time_nothing_is_said_to_be_tried():
-    found = flow_polynomials(load("euler_top").system, 2, 0.0)
-    assert (found.functions, found.degree) == ((), 0)
+def test_without_a_budget_nothing_is_said_to_be_tried():
+    found = flow_polynomials(load("euler_top").system, 2, Budget(0))
+    assert (found.functions, found.degree, found.reason) == ((), 0, "the budget was spent (--effort)")
 
 
 def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():

@@ -4,6 +4,7 @@ import pytest
 from flint import nmod
 
 from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -20,7 +21,9 @@ from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, searc
 
 def searched(file, eps=None):
     laboratory = Laboratory(file, (), eps)
-    return laboratory, search(laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors())
+    return laboratory, search(
+        laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors(), budget=Budget()
+    )
 
 
 @pytest.mark.parametrize(
@@ -62,26 +65,30 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
     known = laboratory.cofactors()
     profile, dim = orbit_profile(laboratory.maps), laboratory.map.dim
     assert profile.codimension == len(origins)
-    over = denominators_among(candidates(laboratory, known), dim)
-    found = search(laboratory.maps[0], profile, known, over)
+    over = denominators_among(candidates(laboratory, known, Budget()), dim)
+    found = search(laboratory.maps[0], profile, known, over, budget=Budget())
     assert [step.text for step in found.steps] == origins
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == len(origins)
     # Without the variables for denominators only the polynomial is found.
     with pytest.raises(pytest.fail.Exception):
-        search(laboratory.maps[0], profile, known)
+        search(laboratory.maps[0], profile, known, budget=Budget())
 
 
 def test_too_much_work_ends_the_search_with_the_degree_before(monkeypatch):
     laboratory = Laboratory(recurrence(*FOURTH_ORDER))
     known = laboratory.cofactors()
-    over = denominators_among(candidates(laboratory, known), 4)
-    every = search_cofactors(laboratory.maps[0], known, over, [], 2, 6)
+    over = denominators_among(candidates(laboratory, known, Budget()), 4)
+    every = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget())
     assert (every.degree, len(every.spaces)) == (5, 2)
     monkeypatch.setattr(cofactors, "_MAX_WORK", 5_000)
-    some = search_cofactors(laboratory.maps[0], known, over, [], 2, 6)
+    some = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget())
     assert (some.degree, some.spaces) == (3, [])
-    late = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, deadline=0.0)
+    assert (every.cut, some.cut) == ("", "")
+    late = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget(700))
     assert (late.degree, late.spaces) == (2, [])  # no relation before degree 3, and nothing to try
+    assert late.cut == (
+        "polynomials of degree 3 and more with known cofactors were not all tried: the budget was spent (--effort)"
+    )
 
 
 # The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.
@@ -107,7 +114,7 @@ def test_the_space_that_shares_numbers_is_taken_of_those_that_look_alike():
 
 
 def test_coefficients_are_interpolated():
-    found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol")
+    found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
     assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
     assert found.reason == ""
 
@@ -118,15 +125,15 @@ def test_special_values_are_passed_over():
             raise NoPoint("not here")
         return None if values[1] % 3 == 0 else pencil_at(prime, values)
 
-    found = closed_forms(MODEL, now_and_then, ["x", "y"], ["a"], "symbol")
+    found = closed_forms(MODEL, now_and_then, ["x", "y"], ["a"], "symbol", budget=Budget())
     assert format_polynomial(found.bases[0][0]) == "x*a^2 + 3*eps - 1"
 
 
-def test_no_value_anywhere_and_no_time_are_told():
-    nowhere = closed_forms(MODEL, lambda prime, values: None, ["x", "y"], ["a"], "symbol", seconds=5)
+def test_no_value_anywhere_and_no_budget_are_told():
+    nowhere = closed_forms(MODEL, lambda prime, values: None, ["x", "y"], ["a"], "symbol", budget=Budget())
     assert (nowhere.bases, bool(nowhere.reason)) == (None, True)
-    late = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", seconds=-1.0)
-    assert (late.bases, bool(late.reason)) == (None, True)
+    late = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget(0))
+    assert (late.bases, late.reason) == (None, "the budget was spent after 0 values (--effort)")
 
 
 def test_eps_by_weight_and_numbers():
@@ -137,5 +144,8 @@ def test_eps_by_weight_and_numbers():
         return [DarbouxSpace(1, 2, [[{(0,): half, (2,): 1}.get(m, 0) for m in support]])]
 
     model = at(2**61 - 1, ())
-    assert format_polynomial(closed_forms(model, at, ["x"], [], "by weight").bases[0][0]) == "2*x^2*eps^2 + 1"
-    assert format_polynomial(closed_forms(model, at, ["x"], [], "not").bases[0][0]) == "2*x^2 + 1"
+    assert (
+        format_polynomial(closed_forms(model, at, ["x"], [], "by weight", budget=Budget()).bases[0][0])
+        == "2*x^2*eps^2 + 1"
+    )
+    assert format_polynomial(closed_forms(model, at, ["x"], [], "not", budget=Budget()).bases[0][0]) == "2*x^2 + 1"

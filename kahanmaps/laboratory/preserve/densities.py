@@ -38,7 +38,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -192,7 +192,18 @@ def find_densities(
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    budget = budget_for("densities", effort)
+    return densities_of(laboratory, max_degree, integrals, budget_for("densities", effort), progress)
+
+
+def densities_of(
+    laboratory: Laboratory,
+    max_degree: int | None,
+    integrals: Sequence[FoundIntegral] | None,
+    budget: Budget,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DensitySearch:
+    """What `find_densities` finds, on the maps of a laboratory."""
+    flow = laboratory.flow
     if laboratory.defect:
         return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
@@ -202,8 +213,11 @@ def find_densities(
         densities, tried = [theorem], theorem.degree(dim)
     else:
         progress("densities that are products")
-        product, turning = _products(laboratory, max_degree)
-        densities, tried, cut = _search(laboratory, product, max_degree, budget, progress)
+        stages = budget.share([1, 2, 2])  # products; polynomials; integrals, for their factors
+        product, turning = _products(laboratory, max_degree, next(stages))
+        # The first search for integrals is worth as much as high degrees; a caller who has done it needs none.
+        second = budget if integrals is not None or product is not None else next(stages)
+        densities, tried, cut = _search(laboratory, product, max_degree, second, progress)
         none_proved = densities and all(one.verdict is not Verdict.PROVED for one in densities)
         if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
             # x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree.
@@ -212,8 +226,9 @@ def find_densities(
             proof = product_density_invariant(laboratory.system, phi)
             densities = densities if proof is None else [FoundDensity(phi, Verdict.PROVED, proof), *densities]
     found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
-    if found.is_open and not budget.is_spent:
+    if found.is_open:
         if integrals is None:
+            file, symbols, eps, seed, _ = laboratory.asked
             searched = find_integrals(file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress)
             integrals = searched.integrals
         progress("densities that are products of factors of integrals")
@@ -230,7 +245,7 @@ def with_factors(
     laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed, algebraic=True)
     if laboratory.defect:
         return found
-    product, turning = _products(laboratory, max_degree, integrals)
+    product, turning = _products(laboratory, max_degree, Budget(), integrals)  # of a map: nothing is sought of a flow
     if product is None:
         return replace(found, turning=turning)
     return replace(found, densities=(product,), degree=product.degree(laboratory.map.dim), turning=turning)
@@ -286,16 +301,20 @@ def _search(
         return [], tried, str(error)
     if product is not None:
         return [product], product.degree(dim), ""
-    return [], tried, "" if tried == top else f"the time was over at degree {tried + 1}"
+    return (
+        [],
+        tried,
+        "" if tried == top else f"polynomials of degree {tried + 1} and more were not tried: {BUDGET_SPENT}",
+    )
 
 
 def _products(
-    laboratory: Laboratory, max_degree: int | None, integrals: Sequence[FoundIntegral] = ()
+    laboratory: Laboratory, max_degree: int | None, budget: Budget, integrals: Sequence[FoundIntegral] = ()
 ) -> tuple[FoundDensity | None, FoundDensity | None]:
     """A density that is a product of powers of known polynomials, or one that changes its sign, as far as there are."""
     parts = [part for one in integrals for part in (one.function.numerator, one.function.denominator)]
     try:
-        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), parts)).density
+        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), budget, parts)).density
     except NoPoint:
         return None, None
     if found is None or (phi := found.function) is None:

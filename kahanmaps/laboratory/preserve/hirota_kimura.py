@@ -25,6 +25,7 @@ from kahanmaps.algebra.modular_matrices import (
     integers,
     kernel,
     matrix,
+    multiply,
     null_space,
     rank,
     reduced,
@@ -32,7 +33,7 @@ from kahanmaps.algebra.modular_matrices import (
 )
 from kahanmaps.algebra.polynomials import evaluate, names_of
 from kahanmaps.algebra.printing import attributes
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.laboratory.modular_points import (
     Exponent,
     ModularMap,
@@ -41,6 +42,7 @@ from kahanmaps.laboratory.modular_points import (
     monomial_tables,
     slope_values,
 )
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
@@ -85,7 +87,8 @@ class Profile:
 
     `codimension` is that of the orbit's variety as far as these polynomials show it, `with_known` the same together
     with the integrals that were known before. `period` is the number of points of orbits that close, else None;
-    `agree` tells whether all maps gave the same numbers, `complete` whether all degrees that were asked for were tried.
+    `agree` tells whether all maps gave the same numbers, `complete` whether all degrees that were asked for were tried;
+    `cut` says why they were not.
     """
 
     dim: int
@@ -95,6 +98,7 @@ class Profile:
     agree: bool
     complete: bool
     with_known: int = 0
+    cut: str = ""
 
     @property
     def codimension(self) -> int:
@@ -144,9 +148,10 @@ def relations_on_orbit(
     if independent > most or not leading <= found:
         return relations_on_orbit(map_, degree)  # what was known is of special orbits
     # The gradient of a relation is that of its last monomial minus what those of the independent ones make of it.
+    count(len(exponents) / 2 + map_.dim * len(support) / 3)
     slopes = [[row[k] for k in support] for row in slope_values(point, degree, map_.prime)]
     of_first = [[row[k] for k in first] + [0] * (form.nrows() - independent) for row in slopes]
-    gradients = matrix(slopes, map_.prime) - matrix(of_first, map_.prime) * form
+    gradients = matrix(slopes, map_.prime) - multiply(matrix(of_first, map_.prime), form)
     normals = echelon(integers(gradients.transpose()), map_.prime)
     return OrbitRelations(form, independent, len(exponents) - independent, normals, period, point, found)
 
@@ -212,18 +217,20 @@ def orbit_profile(
     nullities: list[int] = []
     codimensions: list[int] = []
     with_known = 0
-    agree, period, complete = True, None, True
+    agree, period, cut = True, None, ""
     leading: list[frozenset[Exponent]] = [frozenset()] * len(maps)
     top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
         top = max((d for d in range(1, top + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
     largest = MAX_UNKNOWNS if max_degree is not None else MAX_INDEPENDENT
     for degree in range(1, top + 1):
-        is_too_large = comb(dim + degree, degree) > MAX_UNKNOWNS or any(
+        if comb(dim + degree, degree) > MAX_UNKNOWNS or any(
             len(_not_multiples(dim, degree, lower)) > largest for lower in leading
-        )
-        if is_too_large or budget.is_spent:
-            complete = False
+        ):
+            cut = "too many unknowns"
+        elif budget.is_spent:
+            cut = BUDGET_SPENT
+        if cut:
             break
         progress(f"relations of degree {degree} along orbits")
         found = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
@@ -241,7 +248,7 @@ def orbit_profile(
         # Orbits that close are points, whatever curves of lower degree go through them.
         if codimensions[-1] >= (dim - 1 if period is None else dim):
             break
-    return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, complete, with_known)
+    return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, not cut, with_known, cut)
 
 
 @dataclass(frozen=True)

@@ -276,8 +276,18 @@ def find_integrals(
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    budget = budget_for("integrals", effort)
-    collected = _Collected(laboratory, budget, progress)
+    return integrals_of(laboratory, max_degree, budget_for("integrals", effort), progress)
+
+
+def integrals_of(
+    laboratory: Laboratory, max_degree: int | None, budget: Budget, progress: Callable[[str], None]
+) -> IntegralSearch:
+    """What `find_integrals` finds, on the maps of a laboratory."""
+    flow, seed = laboratory.flow, laboratory.asked[3]
+    # Orbits; cheap searches and their formulas; products; larger relations and their formulas; iterates. What a stage
+    # leaves goes to those after it, and none can take what belongs to these.
+    stages = budget.share([3, 4, 1, 3, 3])
+    collected = _Collected(laboratory, progress)
     # What theorems say of the integrals of a Kahan map, on each of the maps: without symbols these have one system.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
@@ -308,47 +318,53 @@ def find_integrals(
     def known(map_: ModularMap, x: Point) -> list[list[int]]:
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
 
+    cut = ""
     empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
         return result(empty, laboratory.defect)
     try:
-        profile = orbit_profile(laboratory.maps, max_degree=max_degree, budget=budget, known=known, progress=progress)
+        profile = orbit_profile(
+            laboratory.maps, max_degree=max_degree, budget=next(stages), known=known, progress=progress
+        )
+        stage = next(stages)
         cofactors = laboratory.cofactors()
         # Of a system these would be too many, and few integrals of its map have other denominators than those.
         factors = [one.polynomial for one in cofactors if one.polynomial is not None]
-        factors = factors if laboratory.field is not None else candidates(laboratory, cofactors)
+        factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, stage)
         denominators = denominators_among(factors, laboratory.map.dim)
 
         def quickly(map_: ModularMap) -> SpaceSearch:
-            return search(map_, profile, cofactors, denominators, budget=budget, progress=progress)
+            # Half of what is left, on each map: the rest is for formulas.
+            return search(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
 
         base = laboratory.maps[0]
-        base, found, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, budget, progress)
+        base, found, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, stage, progress)
     except NoPoint as error:
         return result(empty, str(error))
     collected.offer(formulas)
     if inherited and not laboratory.symbols:
         collected.add_by_theorems(inherited[0])
+    stage = next(stages)
     if len(collected.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
-        collected.add_products(cofactors)
-    done = result(profile, "")
+        collected.add_products(cofactors, stage)
+    done, stage = result(profile, ""), next(stages)
     if not done.is_complete:
         # This may take longer than all that went before, whose formulas are therefore known by now.
         steps = len(found.steps)
-        take_relations(base, profile, found, LARGEST_SPAN, budget, progress)
+        cut = take_relations(base, profile, found, LARGEST_SPAN, stage.part(0.5), progress)
         if len(found.steps) > steps:
 
             def thoroughly(map_: ModularMap) -> SpaceSearch:
-                again = quickly(map_)
-                take_relations(map_, profile, again, LARGEST_SPAN, budget, progress)
+                again = search(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
+                take_relations(map_, profile, again, LARGEST_SPAN, stage.part(0.5), progress)
                 return again
 
-            _, found, formulas, reason = _formulas(laboratory, base, found, thoroughly, budget, progress)
+            _, found, formulas, reason = _formulas(laboratory, base, found, thoroughly, stage, progress)
             collected.offer(formulas)
             done = result(profile, "")
     if not flow and not done.is_complete and laboratory.root is None:
-        collected.add_in_iterates(done.codimension)
+        collected.add_in_iterates(done.codimension, next(stages))
         done = result(profile, "")
     missing = done.codimension - done.found
     if missing <= 0:
@@ -356,10 +372,8 @@ def find_integrals(
     elif not reason:
         have = "has" if missing == 1 else "have"
         reason = f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q {found.tried}"
-        if budget.is_spent:
-            reason += ", and then the budget was spent (--effort)"
         reason += ": coefficients of Hirota-Kimura bases are such integrals"
-    reasons = [reason]
+    reasons = [reason, *([found.cut, cut, collected.cut] if missing > 0 else [])]
     if at_values is not None:
         # Formulas with symbols may depend on each other, or vanish, at the values of the file.
         there = Independent(at_values)
@@ -371,8 +385,7 @@ def find_integrals(
             how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
             reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
     if not profile.complete and (max_degree is not None or not profile.is_settled):
-        why = "too many unknowns" if not budget.is_spent else "the budget was spent (--effort)"
-        reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {why}")
+        reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
     elif not profile.agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")
     return replace(done, reason="; ".join(filter(None, reasons)))
@@ -410,10 +423,14 @@ def _formulas(
 
 
 class _Collected:
-    """Integrals that do not depend on each other, with verdicts; none that was refuted."""
+    """Integrals that do not depend on each other, with verdicts; none that was refuted.
 
-    def __init__(self, laboratory: Laboratory, budget: Budget, progress: Callable[[str], None]) -> None:
-        self._laboratory, self._budget, self._progress = laboratory, budget, progress
+    `cut` says which ratios in iterates were not tried for lack of budget.
+    """
+
+    def __init__(self, laboratory: Laboratory, progress: Callable[[str], None]) -> None:
+        self._laboratory, self._progress = laboratory, progress
+        self.cut = ""
         self._gradients = Independent(laboratory.maps[0])
         self.integrals: list[FoundIntegral] = []
         self.in_time: list[TimedIntegral] = []
@@ -478,8 +495,6 @@ class _Collected:
             field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
             eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
             try:
-                if self._budget.is_spent:
-                    continue
                 value = inherited.modified(k - affine, field, eps, field.variables[:-1])
             except BudgetExceeded:
                 continue  # too long to be written out
@@ -493,11 +508,11 @@ class _Collected:
             formula = self._normalized((function, "modified Hamiltonian (cmoq-2013)", ""))
             self._add(row, *formula[:2], Verdict.PROVED, evidence)
 
-    def add_products(self, cofactors: Sequence[Cofactor]) -> None:
+    def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
         """Products of powers of known polynomials, and such that depend on time."""
         laboratory, origin = self._laboratory, "product of powers of known polynomials"
         try:
-            products = products_of(laboratory, candidates(laboratory, cofactors))
+            products = products_of(laboratory, candidates(laboratory, cofactors, budget))
         except NoPoint:
             return
         written = ((one, one.function) for one in products.integrals)
@@ -516,12 +531,12 @@ class _Collected:
                 one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
                 self.in_time.append(TimedIntegral(name, one, product.constant, laboratory.flow))
 
-    def add_in_iterates(self, wanted: int) -> None:
+    def add_in_iterates(self, wanted: int, budget: Budget) -> None:
         """Those in iterates of x, and more of them in x, until there are as many as wanted."""
         laboratory = self._laboratory
         self._gradients = Independent(laboratory.maps[0], [one.function for one in self.integrals])  # free of time
         try:
-            plain, ratios = integrals_in_iterates(laboratory, wanted, self._gradients, self._budget, self._progress)
+            plain, ratios, self.cut = integrals_in_iterates(laboratory, wanted, self._gradients, budget, self._progress)
         except NoPoint:
             return
         self.offer(plain)

@@ -39,6 +39,7 @@ from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, 
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of, pattern
 from kahanmaps.maps.implicit import BirationalMap
 
@@ -181,7 +182,7 @@ def integrals_in_iterates(
     known: Independent,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
-) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]]]:
+) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]], str]:
     """Integrals that do not depend on known ones: those in x alone, and those in iterates, each with its origin.
 
     Args:
@@ -192,7 +193,8 @@ def integrals_in_iterates(
         progress: is told what is being tried.
 
     Returns:
-        Formulas that are to be put to the proof, those in x with an empty text for their factors. Raises NoPoint.
+        Formulas that are to be put to the proof, those in x with an empty text for their factors; and what was not
+        tried for lack of budget. Raises NoPoint.
 
     Source: petrera-suris-2018.
     """
@@ -202,8 +204,12 @@ def integrals_in_iterates(
     level = _level(laboratory)
     inside, back = (laboratory, None) if level is None else level
     base = inside.maps[0]
+    cut = ""
     for lift in LIFTS if level is not None else LIFTS[1:]:
-        if len(known.rows) >= wanted or budget.is_spent:
+        if len(known.rows) >= wanted:
+            break
+        if budget.is_spent:
+            cut = f"{lift.text} were not tried: {BUDGET_SPENT}"
             break
         for one, spaces in lifts_with_spaces(base, [lift]):
             progress(one.text)
@@ -228,7 +234,7 @@ def integrals_in_iterates(
                         gens, n = context.gens(), laboratory.map.dim
                         P, Q = (F.compose(*gens[:n], *gens, ctx=context) for F in ratio.functions)
                         plain.append((RationalFunction(P, Q), one.text, ""))
-    return plain, ratios
+    return plain, ratios, cut
 
 
 def _letters(map_: BirationalMap, shift: int) -> tuple[str, ...]:

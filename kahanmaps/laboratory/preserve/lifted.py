@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, Values, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span_of_relations
@@ -63,6 +64,7 @@ class Lifted(ModularMap):
 
     def _values(self, x: Point, y: Point) -> list[int]:
         p, sign, X, Y = self.prime, self.lift.sign, (1, *x), (1, *y)
+        count_work(len(pairs_of(self.dim)) / 2)
         # Squares have no Wronskian. Random numbers in their place are in no relation, as zeros would be.
         return [
             self.rng.randrange(p) if sign < 0 and i == j else (X[i] * Y[j] + sign * X[j] * Y[i]) % p

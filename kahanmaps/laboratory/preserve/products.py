@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import reduce
 from itertools import accumulate, repeat
 from math import prod
 from operator import mul
@@ -38,6 +38,7 @@ from kahanmaps.algebra.polynomials import (
     ring,
 )
 from kahanmaps.algebra.printing import format_product
+from kahanmaps.algebra.work import Budget, count, counted_cache
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -95,16 +96,16 @@ class Products:
 
 
 def candidates(
-    laboratory: Laboratory, cofactors: Sequence[Cofactor], more: Sequence[fmpq_mpoly] = ()
+    laboratory: Laboratory, cofactors: Sequence[Cofactor], budget: Budget, more: Sequence[fmpq_mpoly] = ()
 ) -> list[fmpq_mpoly]:
     """Irreducible polynomials over Q in (variables, symbols, eps) that integrals and densities may be products of.
 
     They are the variables, the polynomials of the cofactors (affine Darboux functions of a system, and factors of
     Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long, and of `more`;
-    for a flow its Darboux polynomials.
+    for a flow its Darboux polynomials, as far as the budget goes.
     """
     if laboratory.flow:
-        return list(laboratory.flow_polynomials().functions)
+        return list(laboratory.flow_polynomials(budget).functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     known = [one.polynomial for one in cofactors if one.polynomial is not None]
     found = _irreducible((*context.gens()[:n], *known), n, laboratory.eps)
@@ -120,6 +121,7 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
         if eps is not None:
             at: dict[str | int, int | fmpz | fmpq] = {"eps": eps}
             P = P.subs(at)
+        count(20 + 8 * len(P))
         for factor, _ in [] if P.is_zero() else P.factor()[1]:
             if degree_in(factor, n):
                 one = primitive_part(factor)[1]
@@ -127,7 +129,7 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
     return found
 
 
-@lru_cache(maxsize=4)  # searches for integrals and densities ask for the same, which may take half a second
+@counted_cache(4)  # searches for integrals and densities ask for the same, which may take half a second
 def _jacobians(map_: BirationalMap, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
     """Factors of numerators and denominators of det dPhi^-1 and, with `both`, of det dPhi."""
     n, sides = map_.dim, list[Function]()
@@ -165,6 +167,7 @@ class _Line:
 
         def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
             """A point of the curve, its image and Z."""
+            count(30 + 15 * n)
             *X, Z = (one.field.convert(int(entry(t))) for entry in curve)
             if Z == 0:
                 raise SingularStep("a point of a curve is at infinity", (), one.eps)
@@ -199,6 +202,7 @@ class _Line:
         for row, c in zip(powers, place, strict=True):
             row += accumulate(repeat(c, top), mul)
         total = nmod_poly([0], p)
+        count(50 + 15 * len(g))
         for monomial, coefficient in g.terms():
             value = field.convert(coefficient)
             for c, e in zip(rest, monomial[n:], strict=True):
@@ -241,6 +245,7 @@ def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
             continue
         for k, Q in enumerate(base):
             common = P.gcd(Q)
+            count(2 + (P.degree() + Q.degree()) / 3)
             if common.degree() > 0:
                 base.pop(k)
                 waiting += [P // common, Q // common, common]
@@ -254,12 +259,12 @@ def _exponents(P: nmod_poly, base: Sequence[nmod_poly]) -> list[int]:
     """How often the elements of a coprime base divide a polynomial."""
     found = []
     for B in base:
-        count = 0
+        power = 0
         quotient, rest = divmod(P, B)
         while rest.is_zero():
-            count, P = count + 1, quotient
+            power, P = power + 1, quotient
             quotient, rest = divmod(P, B)
-        found.append(count)
+        found.append(power)
     return found
 
 
@@ -269,10 +274,11 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     >>> relations([[2, 0], [3, 0], [0, 1]])
     [[3, -2, 0]]
     """
-    count, width = len(rows), len(rows[0]) if rows else 0
-    if not count:
+    if not rows:
         return []
-    wide = fmpz_mat([[*row, *(int(i == k) for i in range(count))] for k, row in enumerate(rows)]).hnf()
+    size, width = len(rows), len(rows[0])
+    count(10 + size**2 * (size + width) / 50)
+    wide = fmpz_mat([[*row, *(int(i == k) for i in range(size))] for k, row in enumerate(rows)]).hnf()
     return [[int(e) for e in row[width:]] for row in wide.tolist() if not any(row[:width])]
 
 
@@ -291,7 +297,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("lotka_volterra"))
-    >>> products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density.function.numerator
+    >>> products_of(laboratory, candidates(laboratory, laboratory.cofactors(), Budget())).density.function.numerator
     x*y
     """
     weights = [_FIRST, *map(len, polynomials)]  # short formulas before long ones
@@ -329,6 +335,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         p, residues, found = map_.prime, GF(map_.prime), list[int]()
         at = [residues.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
+            count(50 + 10 * n)
             total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
             for g, k in zip(polynomials, vector[1:], strict=True):
                 if k:

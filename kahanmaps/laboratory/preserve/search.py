@@ -31,6 +31,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator
 from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
@@ -53,6 +54,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.lifted import Lift, lifted_spaces
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.maps.kahan import KahanMapOver
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
@@ -111,7 +113,7 @@ class SpaceSearch:
     """What a search found on one map: a list of spaces for each step.
 
     The products of the steps are of the `cofactors`, which were tried up to a degree; `searched` are the degrees of
-    relations along orbits whose span was searched.
+    relations along orbits whose span was searched. `cut` says which cofactors were not tried for lack of budget.
     """
 
     steps: list[SearchStep] = field(default_factory=list)
@@ -119,6 +121,7 @@ class SpaceSearch:
     cofactors: Sequence[Cofactor] = ()
     cofactor_degree: int = 0
     searched: list[int] = field(default_factory=list)
+    cut: str = ""
 
     @property
     def all_spaces(self) -> list[DarbouxSpace]:
@@ -163,7 +166,7 @@ def search(
     """Spaces whose ratios are as many independent integrals as the profile shows, as far as cheap searches find them.
 
     These are the span of few relations along orbits, and polynomials with known cofactors or over known denominators.
-    Nothing is begun when the `budget` is spent. Raises NoPoint.
+    Nothing but affine integrals is begun when the `budget` is spent. Raises NoPoint.
     """
     found, wanted = SpaceSearch(), profile.codimension
     is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver)
@@ -172,7 +175,7 @@ def search(
         found.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
     if is_of_field:  # whose denominators are factors of a determinant, which is longer than few relations
         take_relations(map_, profile, found, SMALL_SPAN, budget, progress)
-    if gradient_rank(map_, found.all_spaces) >= wanted or budget.is_spent:
+    if gradient_rank(map_, found.all_spaces) >= wanted:
         return found
     dim, top = map_.dim, _COFACTOR_DEGREE.get(map_.dim, 2)
     while comb(dim + top, top) > _MOST_TERMS:
@@ -180,7 +183,7 @@ def search(
     progress(f"polynomials of degree up to {top} with {comb(dim + top, top)} terms and known cofactors")
     known = found.all_spaces
     result = search_cofactors(map_, cofactors, denominators, known, wanted, top, budget)
-    found = replace(found, cofactors=result.cofactors, cofactor_degree=result.degree)
+    found = replace(found, cofactors=result.cofactors, cofactor_degree=result.degree, cut=result.cut)
     for product, scaled, spaces in result.spaces:
         text = f"{product.origin(found.cofactors)}{', up to a number' * scaled}"
         step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
@@ -197,17 +200,22 @@ def take_relations(
     largest: int,
     budget: Budget,
     progress: Callable[[str], None],
-) -> None:
+) -> str:
     """Add the spaces that are seen in the span of the relations of a degree, until there are as many as wanted.
 
-    Taken are the degrees in which the relations of all orbits span at most `largest` dimensions.
+    Taken are the degrees in which the relations of all orbits span at most `largest` dimensions. Returns what was not
+    tried for lack of budget.
     """
     few = takewhile(lambda size: size < largest, profile.nullities)
     for degree in [degree for degree, size in enumerate(few, 1) if size]:
         known = found.all_spaces
         independent = gradient_rank(map_, known)
-        if independent >= profile.codimension or degree in found.searched or budget.is_spent:
+        if independent >= profile.codimension:
+            break
+        if degree in found.searched:
             continue
+        if budget.is_spent:
+            return f"relations of degree {degree} and more were not searched: {BUDGET_SPENT}"
         progress(f"closed forms from the relations of degree {degree}")
         spaces = darboux_spaces(map_, degree, known, largest)
         if spaces is not None:
@@ -215,6 +223,7 @@ def take_relations(
         if spaces and gradient_rank(map_, [*known, *spaces]) > independent:
             step = SearchStep("relations", degree, None, f"relations of degree {degree} along orbits")
             found.add(step, sorted(spaces, key=pattern))
+    return ""
 
 
 def repeat(
@@ -310,6 +319,7 @@ def _most_alike(
         for space in waiting:
             rows = zip(space.basis, model.basis, strict=True)
             pairs = [(a, b) for row in rows for a, b in zip(*row, strict=True) if b and b != 1]
+            count_work(60 * len(pairs))
             residues = chinese([a for a, _ in pairs], prime, [b for _, b in pairs], reference)
             counts.append(sum(simple_fraction(c, prime * reference, _CHANCE) is not None for c in residues))
         found.append(waiting.pop(counts.index(max(counts))))

@@ -16,6 +16,7 @@ from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.algebra.residues import chinese, simple_fraction
+from kahanmaps.algebra.work import count
 from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 
@@ -128,6 +129,7 @@ def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) 
             [entry * pow(at.eps, -power, at.prime) % at.prime] for entry, at in ((one, map_), (other, other_map))
         ]
         [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
+        count(60)
         value = simple_fraction(residue, map_.prime * other_map.prime, _SPARE_BITS)
         if value is not None:
             number, q = format_number(value), "" if value.q == 1 else f"{value.q}*"

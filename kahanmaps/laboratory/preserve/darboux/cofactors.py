@@ -25,14 +25,16 @@ from flint import fmpq, fmpq_mpoly, fmpz, nmod, nmod_mpoly, nmod_mpoly_ctx
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
-from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
+from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.singular.jets import modulo
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
@@ -218,6 +220,7 @@ class Sample:
         found = [(1, 1)] * min(count, len(self.pairs))
         for k, (power, one) in enumerate(zip(product.powers, self.cofactors, strict=True)):
             if power:
+                count_work(4 * len(found))
                 if k not in self.sides:
                     self.sides[k] = [one.sides(self.map, x, image) for x, image in self.pairs]
                 found = [
@@ -259,24 +262,26 @@ def cofactor_spaces(
     # M P, M M P, ... as well: K M^j P = 0, of which the first j leave next to nothing as a rule.
     count = len(places)
     before, after = _values(sample, product, degree, places)
+    count_work(count**3 / 500)
     M = matrix(before[:count], prime).solve(matrix(after[:count], prime))
-    K = matrix(after[count:], prime) - matrix(before[count:], prime) * M
+    K = matrix(after[count:], prime) - multiply(matrix(before[count:], prime), M)
     entries = list[nmod]()
     for _ in range(count // _SPARE + 2):
         entries += K.entries()
-        K = K * M
+        K = multiply(K, M)
     basis, dimension = null_space([entries[k : k + count] for k in range(0, len(entries), count)], count, prime), -1
     while basis and len(basis) != dimension:  # of the space the part that M keeps in it
         dimension = len(basis)
-        moved = integers(matrix(basis, prime) * M.transpose())
+        moved = integers(multiply(matrix(basis, prime), M.transpose()))
         inside = null_space(list(zip(*basis, *moved, strict=True)), 2 * dimension, prime)
         basis = combine([weights[dimension:] for weights in inside], basis, prime)
     if not basis:
         return []
     basis = echelon(basis, prime)
-    moved = integers(matrix(basis, prime) * M.transpose())
+    moved = integers(multiply(matrix(basis, prime), M.transpose()))
     action = matrix([[row[k] for k in pivots(basis)] for row in moved], prime)
     found = []
+    count_work(10 + 2 * len(basis) ** 3)
     for factor, _ in action.charpoly().factor()[1]:
         if factor.degree() == 1:
             c = int(-factor[0] / factor[1])
@@ -291,6 +296,7 @@ def _values(
 ) -> tuple[list[list[Any]], list[list[Any]]]:
     """The values of monomials times C at the points, and at their images, both times the denominators of C."""
     here, there, count = [], [], len(places) + _SPARE
+    count_work(count * len(places) / 8)
     for (x, image), sides in zip(sample.pairs[:count], sample.values(product, count), strict=True):
         before, after = sample.map.moved(x, image, degree, sides)
         here.append([before[k] for k in places])
@@ -333,12 +339,14 @@ def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofa
 class CofactorSearch:
     """Spaces with a common cofactor by their cofactor, a product of `cofactors`; all degrees up to `degree`.
 
-    Beside the product stands whether the cofactors of its spaces are that product times numbers.
+    Beside the product stands whether the cofactors of its spaces are that product times numbers. `cut` says what was
+    not tried for lack of budget.
     """
 
     cofactors: list[Cofactor]
     spaces: list[tuple[CofactorProduct, bool, list[DarbouxSpace]]]
     degree: int
+    cut: str = ""
 
 
 def search_cofactors(
@@ -372,6 +380,9 @@ def search_cofactors(
     for degree in range(1, max_degree + 1):
         if independent >= wanted:
             break
+        cut = f"polynomials of degree {degree} and more with known cofactors were not all tried: {BUDGET_SPENT}"
+        if budget.is_spent:
+            return replace(found, cut=cut)
         orbit = relations_on_orbit(map_, degree)
         relations, places = orbit.vectors, {e: k for k, e in enumerate(exponents_up_to(dim, degree))}
         if relations:
@@ -390,13 +401,14 @@ def search_cofactors(
             sample = Sample.of(map_, every, points_needed(dim, degree))
             basis = matrix(relations, prime).transpose()
             moved = zip(*(map_.moved(x, image, degree) for x, image in sample.pairs[:count]), strict=True)
-            here, there = ((matrix(list(values), prime) * basis).tolist() for values in moved)
+            here, there = (multiply(matrix(list(values), prime), basis).tolist() for values in moved)
         for product in tried if relations else ():
             if independent >= wanted:
                 break
             work += count**2
             if work > _MAX_WORK or budget.is_spent:
-                return found
+                return replace(found, cut=cut) if budget.is_spent else found
+            count_work(count * len(relations) / 3)
             equations = [
                 [b * v - a * u for u, v in zip(before, after, strict=True)]
                 for (a, b), before, after in zip(sample.values(product, count), here, there, strict=True)
@@ -424,7 +436,10 @@ def search_cofactors(
         if product.weight > degree + 1:
             continue
         work += 3 * points_needed(dim, degree) ** 2
-        if work > 2 * _MAX_WORK or budget.is_spent:
+        if budget.is_spent:
+            cut = f"polynomials of degree {degree} and more with known cofactors up to numbers were not all tried"
+            return replace(found, cut=f"{cut}: {BUDGET_SPENT}")
+        if work > 2 * _MAX_WORK:
             break
         product = replace(product, powers=(*product.powers, *[0] * len(denominators)))
         some = [space for _, space in cofactor_spaces(sample, product, degree) if len(space.basis) > 1]
@@ -439,11 +454,13 @@ def search_cofactors(
 def _is_spanned(polynomial: nmod_mpoly, places: dict[Exponent, int], rows: dict[int, list[int]], prime: int) -> bool:
     """Whether a polynomial is in the span of rows of an echelon form, each under the place of its first entry."""
     left = {places[exponents]: int(c) for exponents, c in polynomial.terms()}
+    count_work(5 + 2 * len(left))
     while left:
         first = min(left)
         if first not in rows:
             return False
         factor = left[first]
+        count_work(len(rows[first]) / 10)
         for k, entry in enumerate(rows[first][first:], first):
             if entry:
                 left[k] = (left.get(k, 0) - factor * entry) % prime

@@ -25,7 +25,8 @@ from dataclasses import dataclass
 from flint import nmod_mat
 
 from kahanmaps.algebra.matrices import combination_of
-from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, null_space, pivots, rank
+from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, gradient_values, product_of
 from kahanmaps.laboratory.preserve.hirota_kimura import span_of_relations
 
@@ -79,6 +80,7 @@ def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
     """The two sparsest elements of a pencil: among those that lack a monomial which others have."""
     degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
     P, Q = basis
+    count_work(len(P) + 2 * len(degrees))
     used = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
     zeros: dict[int | None, set[int]] = {}  # of the members that lack something
     for k in used:
@@ -122,13 +124,13 @@ def darboux_spaces(
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
-def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
+def _values(map_: ModularMap, basis: Vectors, degree: int, points: int) -> tuple[nmod_mat, nmod_mat]:
     """The values of the polynomials at random points and at their images: one row a point."""
     prime = map_.prime
     polynomials = matrix(basis, prime).transpose()
     here, there = (
-        matrix(rows, prime) * polynomials
-        for rows in zip(*(map_.moved(x, image, degree) for x, image in map_.pairs(count)), strict=True)
+        multiply(matrix(rows, prime), polynomials)
+        for rows in zip(*(map_.moved(x, image, degree) for x, image in map_.pairs(points)), strict=True)
     )
     return here, there
 
@@ -146,6 +148,7 @@ def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_m
     size, prime = len(basis), map_.prime
     places = [(a, b) for a in range(size) for b in range(a + 1, size)]
     here, there = _values(map_, basis, degree, len(places) + _SPARE)
+    count_work(len(places) ** 2 / 2)
     rows = []
     for x, y in zip(integers(here), integers(there), strict=True):
         rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
@@ -167,16 +170,19 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, pri
     k, size, rng = len(fresh), len(fresh) + len(explained), random.Random(prime)
     # Columns of the fresh-fresh parts span the fresh parts of the spaces, in coordinates: a basis in echelon form, in
     # terms of which sum A'_ij b_i b_j^T has the entries at the pivots.
+    count_work(len(solutions) * k**2)
     coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
     n, places = len(coordinates), pivots(coordinates)
     if n < 2:
         return []
+    count_work(len(solutions) * n**2)
     forms = [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
     if len(forms) > _ENOUGH:  # what all satisfy can be read off a few random combinations
         forms = [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
     algebra = _intertwining(forms, n, prime)
     E = combination_of([rng.randrange(prime) for _ in algebra], algebra)
     found = []
+    count_work(10 + 2 * n**3)
     for factor, _ in E.charpoly().factor()[1]:
         if factor.degree() != 1:
             continue  # spaces that are conjugate over an extension of the field
@@ -193,6 +199,7 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, pri
 def _intertwining(forms: list[nmod_mat], n: int, prime: int) -> list[nmod_mat]:
     """A basis of the n x n matrices E with E A = A E^T for all of these antisymmetric A."""
     rows = []
+    count_work(n**3 + n**4 / 100)
     for A in forms[:2]:  # few E are left to which the others apply
         for i in range(n):
             for j in range(i, n):
@@ -203,6 +210,7 @@ def _intertwining(forms: list[nmod_mat], n: int, prime: int) -> list[nmod_mat]:
                 rows.append(row)
     found = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
     for A in forms[2:]:
+        count_work(len(found) * (n**3 / 500 + n**2))
         differences = [(E * A - A * E.transpose()).entries() for E in found]
         weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(found), prime)
         found = [combination_of(each, found) for each in weights]
@@ -222,6 +230,7 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     size = len(fresh)
     pairs = [(s, t) for s in range(count) for t in range(s, count)]
     rows = []
+    count_work(2 * len(pairs) * (2 * size + count * (3 + size**2 / 100) + 5 * len(pairs)))
     for _ in range(2 * len(pairs)):
         mix = nmod_mat(4, size, [rng.randrange(prime) for _ in range(4 * size)], prime)
         small = [mix * A * mix.transpose() for A in solutions]
@@ -259,6 +268,7 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     first = pivots(block)
     others = [i for i in range(k) if i not in first]
     conditions = []
+    count_work(k * len(others) * len(solutions) * len(first) / 2)
     for b in range(k):
         for i in others:
             # entry (i, b) must be what the block makes of the entries (pivot, b)

@@ -18,6 +18,7 @@ from flint import fmpq_mpoly, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.work import count
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
@@ -86,6 +87,7 @@ class ModularFlow(ModularMap):
     def step(self, x: Point) -> Point:
         """x + f(x)."""
         here = monomial_values(x, self.degree, self.prime)
+        count(5 + sum(map(len, self._f)) / 6)
         return tuple((a + sum(c * here[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
@@ -97,6 +99,7 @@ class ModularFlow(ModularMap):
         """The values of all monomials P up to a degree, and of P + f . grad P; each times its number of `by`."""
         p = self.prime
         here = monomial_values(x, degree, p)
+        count(len(here) * self.dim / 4)
         f = [after - before for before, after in zip(x, image, strict=True)]
         there = [
             (value + sum(e * here[place] * f[k] for k, e, place in slopes)) * by[1] % p
@@ -111,16 +114,19 @@ class ModularFlow(ModularMap):
         start = self.random_point()
         return self.series(start, degree, count, support), start, None
 
-    def series(self, start: Point, degree: int, count: int, support: Sequence[int] | None = None) -> list[list[int]]:
-        """The first `count` Taylor coefficients of all monomials, or some, along the solution from a point.
+    def series(self, start: Point, degree: int, orders: int, support: Sequence[int] | None = None) -> list[list[int]]:
+        """The first `orders` Taylor coefficients of all monomials, or some, along the solution from a point.
 
         A row has the coefficients of one order.
         """
-        p = self.prime
+        p, factors = self.prime, monomial_tables(self.dim, degree)
+        columns = len(factors) if support is None else len(support)
+        in_rows = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
+        count(orders * (in_rows + columns / 2) + 3 * columns)
         # By the numbers of their monomials: 0 is that of 1, k + 1 that of the k-th variable.
         known = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
         known |= {place: list[int]() for place, _ in self._products}
-        for order in range(1, count):
+        for order in range(1, orders):
             for place, (variable, lower) in self._products:
                 known[place].append(sum(map(mul, known[variable + 1], reversed(known[lower]))) % p)
             slopes = [sum(c * known[place][-1] for c, place in f) for f in self._f]
@@ -128,17 +134,16 @@ class ModularFlow(ModularMap):
             known[0].append(0)
             for k, slope in enumerate(slopes, 1):
                 known[k].append(slope * inverse % p)
-        factors = monomial_tables(self.dim, degree)
         table = {0: nmod_poly([1], p)}
 
         def monomial(place: int) -> nmod_poly:
             if place not in table:
                 variable, _, lower = factors[place][-1]
-                table[place] = monomial(lower).mul_low(nmod_poly(known[variable + 1], p), count)
+                table[place] = monomial(lower).mul_low(nmod_poly(known[variable + 1], p), orders)
             return table[place]
 
-        columns = [monomial(place) for place in (range(len(factors)) if support is None else support)]
-        return [[int(column[k]) for column in columns] for k in range(count)]
+        series = [monomial(place) for place in (range(len(factors)) if support is None else support)]
+        return [[int(one[k]) for one in series] for k in range(orders)]
 
 
 def is_kept_by_flow(
@@ -161,6 +166,7 @@ def is_kept_by_flow(
     """
     P, Q = function.numerator, function.denominator
     context = P.context()
+    count(10 + len(P) * len(Q) * sum(map(len, system.rhs)) / 10)
     change = system.derivative(P) * Q - P * system.derivative(Q)
     if is_density:
         change -= P * Q * system.divergence.compose(*context.gens()[: system.dim + len(system.symbols)], ctx=context)

@@ -33,14 +33,15 @@ from flint import fmpq_mat, fmpq_mpoly, fmpz_mat, fmpz_poly, nmod_mat, nmod_poly
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
-from kahanmaps.algebra.modular_matrices import combine, echelon, matrix, null_space, pivots, rank
+from kahanmaps.algebra.modular_matrices import combine, determinant, echelon, matrix, multiply, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.modular_points import Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.systems.polynomial import PolynomialField
 
 _MOST_MONOMIALS = 21  # of the degree that is gone to unasked, within a second
@@ -182,7 +183,7 @@ class _Search:
         joined: list[tuple[list[int], int]] = []  # residues of what is not lifted yet, and their moduli
         for prime in list(primes):
             if budget.is_spent:
-                return "the time was over"
+                return BUDGET_SPENT
             try:
                 flow = ModularFlow(self.field, prime, (), self.rng.getrandbits(64))
             except BadPrime:
@@ -291,6 +292,7 @@ class _Search:
             rest = along(P) - total(K_known, cofactor) * P
             if any(int(c.p) % modulus for c in rest.coeffs()):
                 return []
+            count(len(terms) * sum(map(len, f)))  # and solving counts itself
             step = solved(columns, rest / -modulus)
             if step is None:
                 return []
@@ -315,6 +317,7 @@ def _is_irrational(residue: int, modulus: int) -> bool:
         powers = [pow(residue, k, modulus) for k in range(1, degree + 1)]
         rows = [[modulus, *[0] * degree]]
         rows += [[-power, *(int(k == j) for j in range(1, degree + 1))] for k, power in enumerate(powers, 1)]
+        count(50 * degree**3)
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
         # By chance the entries have 1/(degree + 1) of the bits of the modulus.
         if max(map(abs, shortest)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
@@ -351,6 +354,7 @@ class _Line:
         Only where that is more than from as many random points: there products of integrals less a number do.
         """
         points = []
+        count(max(0, int(along.degree())) ** 2)
         for factor, _ in along.factor()[1] if along.degree() > 0 else ():
             if factor.degree() <= self.degree:
                 space = null_space(self._conjugates(factor), self.count, self.flow.prime)
@@ -409,6 +413,7 @@ class _Line:
             return self._rows(self.at(int(-factor[0] / factor[1])))
         nodes = range(self.degree + (orders - 1) * max(0, flow.degree - 1) + 1)
         values = [[c for row in self._rows(self.at(t)) for c in row] for t in nodes]
+        count(len(nodes) ** 2 / 5)
         whole = reduce(mul, (nmod_poly([-t, 1], p) for t in nodes))
         basis = []
         for t in nodes:
@@ -436,8 +441,8 @@ class _Line:
         values: list[tuple[int, ...]] = []
         for t in range(top + 1):
             *rows, last, following = flow.series(self.at(t), self.degree, size + 1, self.support)
-            minors = (matrix([*rows, one], p) * mix for one, mix in zip((last, following), mixes, strict=True))
-            values.append(tuple(int(minor.det()) for minor in minors))
+            minors = (multiply(matrix([*rows, one], p), mix) for one, mix in zip((last, following), mixes, strict=True))
+            values.append(tuple(map(determinant, minors)))
         first, second = (interpolated(range(top + 1), column, p) for column in zip(*values, strict=True))
         return first.gcd(second)
 

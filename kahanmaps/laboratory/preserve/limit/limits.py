@@ -31,8 +31,8 @@ from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, find_densities
-from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, find_integrals
+from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, densities_of
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, integrals_of
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 
@@ -204,6 +204,7 @@ def flow_and_map(
         The flow beside the map, exact apart from what it says to be measured; None for other maps and for one eps.
 
     >>> from kahanmaps.documents.catalog import load
+    >>> from kahanmaps.laboratory.preserve.integrals import find_integrals
     >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines()[0])
     proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow that the map deforms: I1 = L1 + ...
     """
@@ -214,29 +215,20 @@ def flow_and_map(
     if search.eps is not None or not (is_kahan or (isinstance(given, ImplicitMap) and given.of_field is not None)):
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
-    budget = budget_for("limits", effort)
+    stages = budget_for("limits", effort).share([2, 2, 1])  # Darboux polynomials; integrals; densities
+    progress("Darboux polynomials of the flow")
+    sought = laboratory.flow_polynomials(next(stages))
     limits = _limits(search, laboratory) if is_kahan else _limits_on_solutions(search, laboratory)
     independent, dim = Independent(laboratory.maps[0], [one.leading for one in limits]), laboratory.map.dim
+    stage = next(stages)
     if flow is None and len(limits) < dim - 1:
-        flow = find_integrals(
-            search.file,
-            symbols=search.symbols,
-            flow=True,
-            max_degree=_TOP.get(dim, 3),
-            effort=budget,
-            seed=search.seed,
-            progress=progress,
-        )
+        flow = integrals_of(laboratory, _TOP.get(dim, 3), stage, progress)
     offered = flow.integrals if flow is not None else ()
     others = [one for one in offered if independent.add(independent.gradient(one.function))]
     functions = [*(one.leading for one in limits), *(one.function for one in others)]
     count = max(known, search.codimension)
     without = max(0, count - len(limits))
-    progress("Darboux polynomials of the flow")
-    sought = laboratory.flow_polynomials()
-    found = find_densities(
-        laboratory.file, symbols=laboratory.symbols, flow=True, max_degree=_DENSITY_DEGREE, effort=budget
-    )
+    found = densities_of(laboratory, _DENSITY_DEGREE, None, next(stages))
     density = next(iter(found.densities), None)
     functions += [] if density is None else [density.function]
     polynomials = _polynomials(laboratory, sought.functions, functions)

@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
@@ -256,21 +256,24 @@ def find_poisson(
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
     if not reason:
         progress(f"tensors of degree up to {degree}")
-        forms, reason = _tensors(laboratory, degree, denominator, budget)
+        # Tensors, those of one kind, those over a density, verification, and brackets.
+        stages = budget.share([3, 1, 2, 2, 3])
+        forms, reason = _tensors(laboratory, degree, denominator, next(stages))
+        logarithmic, over_density = next(stages), next(stages)
         if not forms and degree < 2 <= asked and dim <= _MOST_LOGARITHMIC and denominator is None:
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
-            forms, _ = _tensors(laboratory, 2, None, budget, log_canonical(dim))
+            forms, _ = _tensors(laboratory, 2, None, logarithmic, log_canonical(dim))
         if not forms and denominator is None:
             # Over the factors of a known density, each once, with numerators as much higher in degree.
             density = None
             with suppress(NoPoint):
-                density = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+                density = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), over_density)).density
             factors = [g for g, _ in density.factors] if density is not None else []
             higher = degree + sum(degree_in(g, dim) for g in factors)
             if factors and pairs * comb(dim + higher, dim) <= _MAX_UNKNOWNS // 2:
                 psi = reduce(lambda a, b: a * b, factors)
                 over = RationalFunction(psi, psi.context().constant(1))
-                forms, _ = _tensors(laboratory, higher, over, budget)
+                forms, _ = _tensors(laboratory, higher, over, over_density)
                 denominator = over if forms else None
                 more = f", and none of degree at most {higher} over {format_rational_function(over)}"
                 reason = "" if forms else reason + more
@@ -419,6 +422,7 @@ def tensor_space(
     for x, image in map_.pairs(max(by_pair, default=0) + _SPARE):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
         here, there = map_.moved(x, image, degree, (factor(image), factor(x)))
+        count(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
             rows.append([minors[p] * here[m] - there[m] if p == row else minors[p] * here[m] for _, p, m in unknowns])
