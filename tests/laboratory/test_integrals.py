@@ -128,6 +128,19 @@ def test_too_small_a_budget_is_told():
     assert "relations of degree 1 and more were not tried" in found.reason
 
 
+@pytest.mark.parametrize("name", ["euler_top", "volterra_periodic_4", "lotka_volterra", "lyness"])
+def test_a_search_finds_all_or_says_that_its_budget_was_spent(name):
+    file = load(name)
+    whole = find_integrals(file).to_json()
+    ended = 0
+    for units in (100, 3000, 10_000, 30_000, 100_000, 10_000_000):
+        found = find_integrals(file, effort=Budget(units))
+        told = "the budget was spent" in found.reason
+        assert told or found.to_json() == whole
+        ended += told
+    assert 3 <= ended < 6
+
+
 def test_the_same_seed_gives_the_same():
     documents = [find_integrals(load("zander_111"), seed=seed).to_json() for seed in (3, 3, 4)]
     assert documents[0] == documents[1]

@@ -99,11 +99,11 @@ class DensitySearch(Search):
 
     @property
     def reason(self) -> str:
-        """Why the search ended without a density."""
+        """Why the search ended without a density, or before all that was asked for was tried."""
         if self.none_there:
             degree = f"no polynomial of degree at most {self.degree}"
             return f"{degree}, and no product of powers of known ones, is a density"
-        return "" if self.densities else self.cut
+        return self.cut
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
@@ -295,17 +295,12 @@ def _search(
                     found += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
                     reason = f"a density of degree {degree} that was found modulo primes did not pass as an identity"
                 if found or product is None:
-                    return found, degree, reason
+                    return found, degree, "" if found else reason
             tried = degree
     except NoPoint as error:
         return [], tried, str(error)
-    if product is not None:
-        return [product], product.degree(dim), ""
-    return (
-        [],
-        tried,
-        "" if tried == top else f"polynomials of degree {tried + 1} and more were not tried: {BUDGET_SPENT}",
-    )
+    cut = "" if tried == top else f"polynomials of degree {tried + 1} and more were not tried: {BUDGET_SPENT}"
+    return ([], tried, cut) if product is None else ([product], product.degree(dim), cut)
 
 
 def _products(

@@ -40,7 +40,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
     SpaceSearch,
@@ -384,7 +384,7 @@ def integrals_of(
             at = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
             how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
             reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
-    if not profile.complete and (max_degree is not None or not profile.is_settled):
+    if profile.cut and (profile.cut == BUDGET_SPENT or max_degree is not None or not profile.is_settled):
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
     elif not profile.agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")

@@ -359,6 +359,7 @@ def bases_of(
             known = tell_apart(model, alike, names, laboratory.seed, budget, laboratory.root)
             if known is None:
                 why = f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
+                why = BUDGET_SPENT if budget.is_spent else why
                 return [], f"integrals were found modulo primes, but no closed form: {why}"
             branches.setdefault(number, {})[kind] = known
 

@@ -52,7 +52,7 @@ from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.casimirs import casimir_candidates
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search
+from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -315,6 +315,9 @@ def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], budg
     if tensors and integrals:
         laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed)
         tensors = tuple(_with_brackets(laboratory, one, integrals, budget) for one in tensors)
+    if tensors and budget.is_spent:
+        cut = f"not all identities were multiplied out, or all Casimirs sought: {BUDGET_SPENT}"
+        found = replace(found, reason="; ".join(filter(None, [found.reason, cut])))
     return replace(found, tensors=tensors, integrals=tuple(integrals))
 
 
