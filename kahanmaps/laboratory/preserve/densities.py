@@ -179,7 +179,7 @@ def find_densities(
         A `DensitySearch`; formulas are exact, proved or supported. Finding none up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols, symbols in a [family] file, eps = 0, less than no time or degree.
+        InputError: for unknown symbols, symbols in a [family] file, eps = 0, and a negative degree.
 
     Source: celledoni-2019.
 

@@ -28,6 +28,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, evaluate, linear_combinations, primitive_part
+from kahanmaps.algebra.work import count
 from kahanmaps.maps.kahan import Kahan, SystemLike
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver, as_system
@@ -200,6 +201,7 @@ def _determinant_along(
 ) -> fmpq_poly:
     """The extactic determinant at start + t direction, by interpolation in t."""
     m = len(free)
+    count(1000 + 3 * m**5)  # of a search for hyperplanes, for which the rest is short
     nodes = range(m * (m + 3) // 2 + 1)
     values = [
         _taylor_rows(local, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes

@@ -24,6 +24,7 @@ from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_inte
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.printing import all_fields, format_polynomial, plain
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
@@ -127,6 +128,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
 def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.Random) -> tuple[fmpq_mat, ...]:
     """A basis of the skew K for which K f_y is a gradient with respect to the coordinates y of the quotient."""
     m, n = len(quotient.free), system.dim
+    count_work(n**4 + 5 * n**3)
     local = system.over(QQ)
     units = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
     # The symmetry at one random point leaves few forms; then at the origin and in each direction.

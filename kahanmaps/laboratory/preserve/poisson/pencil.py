@@ -30,6 +30,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import budget_for
@@ -121,7 +122,7 @@ def pencil_of(
         effort: 1, or more: each more doubles the work after which it is given up, each less halves it.
 
     Returns:
-        None where the degree is above 12, where the time was over, and where anything was not as it has to be.
+        None where the degree is above 12, where the budget was spent, and where anything was not as it has to be.
 
     Source: docs/mathematics.md.
 
@@ -150,7 +151,7 @@ def pencil_of(
 
 
 class _Unclear(Exception):
-    """Something is not as it is for generic curves, or the time is over."""
+    """Something is not as it is for generic curves, or the budget was spent."""
 
 
 def _require(condition: bool) -> None:
@@ -173,6 +174,7 @@ class _Reduced:
         forms = (modulo(f, self.field) for f in (integral.numerator, integral.denominator))
         flat = [f.compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
         top, zero = int(max(f.total_degree() for f in flat)), self.ring.constant(0)
+        count_work(500 + 60 * top**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
         X, Y, Z = (
             [line**k for k in range(top + 1)]
             for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
@@ -242,6 +244,7 @@ class _Reduced:
         The curves meet there at most `most` times, or `exact`ly so often: terms of a higher degree make no difference.
         """
         _require(not self._budget.is_spent)
+        count_work(50 + 10 * (len(f) + len(g)) * K.degree())
         m = min(map(sum, f), default=most + 1)
         _require(m == min(map(sum, g), default=most + 1) and m * m <= most)
         if m == 0:

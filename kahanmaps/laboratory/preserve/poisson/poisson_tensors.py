@@ -220,8 +220,8 @@ def find_poisson(
         tensors span is left out. Finding none up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols, eps = 0, a negative degree, less than no time, and a denominator that is
-            identically 0 at this eps.
+        InputError: for unknown symbols, eps = 0, a negative degree, and a denominator that is identically 0 at this
+            eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = find_poisson(load("lotka_volterra"))
@@ -483,7 +483,7 @@ def _with_brackets(
 
 
 def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Verdict, Evidence]:
-    """The verdict on an identity, which is not multiplied out when the time is over."""
+    """The verdict on an identity, which is not multiplied out when the budget is spent."""
     return judged(identity, laboratory.seed, expands=not budget.is_spent)
 
 
