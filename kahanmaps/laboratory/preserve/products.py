@@ -33,6 +33,7 @@ from kahanmaps.algebra.polynomials import (
     RationalFunction,
     degree_in,
     evaluate,
+    irreducible_factors,
     over_one_denominator,
     primitive_part,
     ring,
@@ -121,8 +122,7 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
         if eps is not None:
             at: dict[str | int, int | fmpz | fmpq] = {"eps": eps}
             P = P.subs(at)
-        count(20 + 8 * len(P))
-        for factor, _ in [] if P.is_zero() else P.factor()[1]:
+        for factor, _ in [] if P.is_zero() else irreducible_factors(P):
             if degree_in(factor, n):
                 one = primitive_part(factor)[1]
                 found.setdefault(str(one), one)

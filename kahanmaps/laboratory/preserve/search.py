@@ -27,7 +27,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import null_space
-from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, ring, substitute
+from kahanmaps.algebra.polynomials import RationalFunction, irreducible_factors, over_one_denominator, ring, substitute
 from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget
@@ -418,7 +418,7 @@ def tell_apart(
             continue
         numerators, denominator = over_one_denominator(answer.functions, context, gens)
         chi = sum((P * T ** (count - k) for k, P in enumerate(numerators, 1)), denominator * T**count)
-        linear = [factor for factor, _ in chi.factor()[1] if factor.degrees()[-1] == 1]
+        linear = [factor for factor, _ in irreducible_factors(chi) if factor.degrees()[-1] == 1]
         roots = tuple(
             RationalFunction(-substitute(factor, origin), substitute(factor.derivative(len(gens)), origin))
             for factor in linear

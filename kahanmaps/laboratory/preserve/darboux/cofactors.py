@@ -26,7 +26,7 @@ from flint import fmpq, fmpq_mpoly, fmpz, nmod, nmod_mpoly, nmod_mpoly_ctx
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
-from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
+from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_factors, ring
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
@@ -124,7 +124,7 @@ def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
     degree_of_map = max(degree_in(part, n) for entry in image for part in (entry.above, entry.below))
     found = []
     for kind, polynomials in (("factor", [J.above]), ("pole", [J.below, D])):
-        factors = {str(factor): factor for polynomial in polynomials for factor, _ in polynomial.factor()[1]}
+        factors = {str(factor): factor for polynomial in polynomials for factor, _ in irreducible_factors(polynomial)}
         for factor in factors.values():
             if weight := -(-degree_in(factor, n) // max(1, degree_of_map)):
                 found.append(Cofactor(format_polynomial(factor), weight, factor, kind))
@@ -139,7 +139,7 @@ def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
         return (Cofactor("det dPhi", n, None),)
     found = []
     origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
-    for factor, _ in D.factor()[1]:
+    for factor, _ in irreducible_factors(D):
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a number that depends on eps

@@ -223,7 +223,8 @@ class _Search:
                 break
             if k:
                 pairs = (_intersection(A, B, flow.prime) for A in common for B in here)
-                here = [list(map(list, key)) for key in {tuple(map(tuple, space)) for space in pairs if space}]
+                different = dict.fromkeys(tuple(map(tuple, space)) for space in pairs if space)
+                here = [list(map(list, key)) for key in different]
             common = here
             if all(len(space) == 1 for space in common):
                 return [_monic(vector, flow.prime) for [vector] in common], True

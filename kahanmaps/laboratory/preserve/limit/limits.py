@@ -22,7 +22,14 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.parsing import wrong_kind
-from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, primitive_part, ring
+from kahanmaps.algebra.polynomials import (
+    RationalFunction,
+    degree_in,
+    evaluate,
+    irreducible_factors,
+    primitive_part,
+    ring,
+)
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Verdict
@@ -402,7 +409,7 @@ def _polynomials(
     for function in functions:
         for part, other in permutations((function.numerator, function.denominator)):
             # An irreducible P of the degree of Q is any member of the pencil P - c Q.
-            factors = part.factor()[1]
+            factors = irreducible_factors(part)
             is_any = [k for _, k in factors] == [1] and degree_in(part, n) == degree_in(other, n)
             for factor, _ in [] if is_any else factors:
                 P = primitive_part(factor)[1]
