@@ -373,7 +373,7 @@ def integrals_of(
         have = "has" if missing == 1 else "have"
         reason = f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q {found.tried}"
         reason += ": coefficients of Hirota-Kimura bases are such integrals"
-    reasons = [reason, *([found.cut, cut, collected.cut] if missing > 0 else [])]
+    reasons = [reason, *([found.cut, cut] if missing > 0 else []), *collected.cut]
     if at_values is not None:
         # Formulas with symbols may depend on each other, or vanish, at the values of the file.
         there = Independent(at_values)
@@ -425,12 +425,12 @@ def _formulas(
 class _Collected:
     """Integrals that do not depend on each other, with verdicts; none that was refuted.
 
-    `cut` says which ratios in iterates were not tried for lack of budget.
+    `cut` says what was not tried for lack of budget.
     """
 
     def __init__(self, laboratory: Laboratory, progress: Callable[[str], None]) -> None:
         self._laboratory, self._progress = laboratory, progress
-        self.cut = ""
+        self.cut: list[str] = []
         self._gradients = Independent(laboratory.maps[0])
         self.integrals: list[FoundIntegral] = []
         self.in_time: list[TimedIntegral] = []
@@ -511,6 +511,9 @@ class _Collected:
     def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
         """Products of powers of known polynomials, and such that depend on time."""
         laboratory, origin = self._laboratory, "product of powers of known polynomials"
+        if budget.is_spent:
+            self.cut.append(f"products of powers of known polynomials were not tried: {BUDGET_SPENT}")
+            return
         try:
             products = products_of(laboratory, candidates(laboratory, cofactors, budget))
         except NoPoint:
@@ -536,9 +539,10 @@ class _Collected:
         laboratory = self._laboratory
         self._gradients = Independent(laboratory.maps[0], [one.function for one in self.integrals])  # free of time
         try:
-            plain, ratios, self.cut = integrals_in_iterates(laboratory, wanted, self._gradients, budget, self._progress)
+            plain, ratios, cut = integrals_in_iterates(laboratory, wanted, self._gradients, budget, self._progress)
         except NoPoint:
             return
+        self.cut += filter(None, [cut])
         self.offer(plain)
         too_long = set[int]()
         for found, origin in ratios:
