@@ -536,8 +536,7 @@ def _recognised(
         size = len(shape.above)
         N = context.from_dict({m: c for m, c in zip(shape.above, coefficients[:size], strict=True) if c != 0})
         D = context.from_dict({m: c for m, c in zip(shape.below, coefficients[size:], strict=True) if c != 0})
-        common = N.gcd(D)
-        functions.append(RationalFunction(N / common, D / common))
+        functions.append(RationalFunction.reduced(N, D))
     return tuple(functions)
 
 

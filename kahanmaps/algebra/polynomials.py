@@ -277,6 +277,18 @@ class RationalFunction:
         object.__setattr__(self, "numerator", self.numerator / factor)
         object.__setattr__(self, "denominator", primitive)
 
+    @classmethod
+    def reduced(cls, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> RationalFunction:
+        """The quotient in lowest terms.
+
+        >>> x, y = ring(["x", "y"]).gens()
+        >>> RationalFunction.reduced(x * y, 2 * y**2).denominator
+        y
+        """
+        count(10 + (len(numerator) + len(denominator)) / 2)
+        common = numerator.gcd(denominator)
+        return cls(numerator / common, denominator / common)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RationalFunction):
             return NotImplemented

@@ -498,8 +498,7 @@ class _Collected:
                 value = inherited.modified(k - affine, field, eps, field.variables[:-1])
             except BudgetExceeded:
                 continue  # too long to be written out
-            common = value.above.gcd(value.below)
-            function = RationalFunction(value.above / common, value.below / common)
+            function = RationalFunction.reduced(value.above, value.below)
             is_hamiltonian = inherited.forms[k - affine].rank() == len(inherited.quotient.free)
             what = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
             summary = f"{what} a constant skew matrix {'J' if is_hamiltonian else 'K'}"

@@ -370,8 +370,7 @@ def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
         terms = {(*monomial[:-1], 0): c for monomial, c in P.terms() if monomial[-1] == order}
         lowest.append((order, P.context().from_dict(terms)))
     (order_of_P, P), (order_of_Q, Q) = lowest
-    common = P.gcd(Q)
-    function = RationalFunction(P / common, Q / common)
+    function = RationalFunction.reduced(P, Q)
     content, primitive = primitive_part(function.numerator)
     return order_of_P - order_of_Q, content, RationalFunction(primitive, function.denominator)
 

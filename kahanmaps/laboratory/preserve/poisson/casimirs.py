@@ -68,8 +68,7 @@ def casimir_candidates(
             value = evaluate(one.numerator, field, place) / evaluate(one.denominator, field, place)
         except BudgetExceeded:
             continue
-        common = value.above.gcd(value.below)
-        yield format_rational_function(one), RationalFunction(value.above / common, value.below / common)
+        yield format_rational_function(one), RationalFunction.reduced(value.above, value.below)
 
 
 def _products(
@@ -151,8 +150,7 @@ def _fractions(
             sum(((w.get((k, c), zero) - w.get((c, k), zero)) * J for c, J in enumerate(letters)), start=zero)
             for k in (a, b)
         )
-        common = u.gcd(v)
-        yield RationalFunction(u / common, v / common)
+        yield RationalFunction.reduced(u, v)
 
 
 def _forms(

@@ -19,7 +19,7 @@ from itertools import combinations
 from math import comb
 from typing import Any
 
-from flint import fmpq_mpoly, nmod
+from flint import nmod
 
 from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
@@ -374,7 +374,7 @@ def _tensors(
         upper = {pair: context.from_dict(terms) * times for pair, terms in entries.items()}
         zero = context.constant(0)
         matrix = [[upper.get((i, j), zero) - upper.get((j, i), zero) for j in range(n)] for i in range(n)]
-        found.append(GivenTensor([[_reduced(P, over) for P in row] for row in matrix]))
+        found.append(GivenTensor([[RationalFunction.reduced(P, over) for P in row] for row in matrix]))
     return found, ""
 
 
@@ -382,11 +382,6 @@ def log_canonical(dim: int) -> frozenset[Exponents]:
     """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
     pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
     return frozenset((*pair, *pair) for pair in pairs)
-
-
-def _reduced(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
-    common = P.gcd(Q)
-    return RationalFunction(P / common, Q / common)
 
 
 def tensor_space(
@@ -528,7 +523,7 @@ def _pencil(tensors: Sequence[GivenTensor]) -> GivenTensor:
         for symbol, entry in zip(symbols, entries, strict=True):
             N, D = (part.compose(*old, ctx=context) for part in (entry.numerator, entry.denominator))
             numerator, denominator = numerator * D + symbol * N * denominator, denominator * D
-        return _reduced(numerator, denominator)
+        return RationalFunction.reduced(numerator, denominator)
 
     n = tensors[0].dim
     return GivenTensor([[total(one.rows[i][j] for one in tensors) for j in range(n)] for i in range(n)])
