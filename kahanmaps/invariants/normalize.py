@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.printing import format_rational_function
+from kahanmaps.algebra.work import count
 from kahanmaps.documents.files import SystemFile
 
 
@@ -66,6 +67,7 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     if P.is_zero():
         return unchanged
     while True:
+        count(20 + len(P) + len(Q))
         # A factor that is free of x does not help to conserve anything.
         above, below = _content(P, dim), _content(Q, dim)
         P, Q = P / above, Q / below
