@@ -31,7 +31,7 @@ def test_the_series_of_a_solution_solve_the_equation():
     rows, (a, b), period = flow.along_orbit(2, 8)
     assert period is None
     support = exponents_up_to(2, 2)
-    x, y, xy = ([row[support.index(e)] for row in rows] for e in ((1, 0), (0, 1), (1, 1)))
+    x, y, xy = ([int(row[support.index(e)]) for row in rows] for e in ((1, 0), (0, 1), (1, 1)))
     assert [(k + 1) * x[k + 1] % PRIME for k in range(7)] == y[:7]
     assert [-(k + 1) * y[k + 1] % PRIME for k in range(7)] == x[:7]
     assert xy == [sum(x[i] * y[k - i] for i in range(k + 1)) % PRIME for k in range(8)]

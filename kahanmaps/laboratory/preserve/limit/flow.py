@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from itertools import islice, zip_longest
 from math import lcm
 from operator import mul
 from random import Random
 
-from flint import fmpq_mpoly, nmod_poly
+from flint import fmpq_mpoly, nmod, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
@@ -114,7 +115,7 @@ class ModularFlow(ModularMap):
         start = self.random_point()
         return self.series(start, degree, count, support), start, None
 
-    def series(self, start: Point, degree: int, orders: int, support: Sequence[int] | None = None) -> list[list[int]]:
+    def series(self, start: Point, degree: int, orders: int, support: Sequence[int] | None = None) -> list[Values]:
         """The first `orders` Taylor coefficients of all monomials, or some, along the solution from a point.
 
         A row has the coefficients of one order.
@@ -134,16 +135,17 @@ class ModularFlow(ModularMap):
             known[0].append(0)
             for k, slope in enumerate(slopes, 1):
                 known[k].append(slope * inverse % p)
+        solution = [nmod_poly(known[k + 1], p) for k in range(self.dim)]
         table = {0: nmod_poly([1], p)}
 
         def monomial(place: int) -> nmod_poly:
             if place not in table:
                 variable, _, lower = factors[place][-1]
-                table[place] = monomial(lower).mul_low(nmod_poly(known[variable + 1], p), orders)
+                table[place] = monomial(lower).mul_low(solution[variable], orders)
             return table[place]
 
-        series = [monomial(place) for place in (range(len(factors)) if support is None else support)]
-        return [[int(one[k]) for one in series] for k in range(orders)]
+        series = [monomial(place).coeffs() for place in (range(len(factors)) if support is None else support)]
+        return list(islice(zip_longest(*series, fillvalue=nmod(0, p)), orders))
 
 
 def is_kept_by_flow(

@@ -38,7 +38,7 @@ from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluat
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
 from kahanmaps.algebra.work import Budget, count
 from kahanmaps.errors import BadPrime, counted
-from kahanmaps.laboratory.modular_points import Point, exponents_up_to, interpolated
+from kahanmaps.laboratory.modular_points import Point, Values, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
@@ -399,11 +399,11 @@ class _Line:
                 return None
         return found
 
-    def _rows(self, x: Point | None) -> Vectors:
+    def _rows(self, x: Point | None) -> Sequence[Values]:
         """The Taylor coefficients along the solution from a point, or a random one."""
         return self.flow.series(x or self.flow.random_point(), self.degree, self.count + _SPARE, self.support)
 
-    def _conjugates(self, factor: nmod_poly) -> Vectors:
+    def _conjugates(self, factor: nmod_poly) -> Sequence[Values]:
         """The Taylor coefficients from a zero of an irreducible polynomial in t, in the powers of the zero.
 
         They are polynomials in t: with their values at nodes j, the sum of value * L_j(t) modulo the polynomial, where
