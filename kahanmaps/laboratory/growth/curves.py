@@ -24,9 +24,10 @@ from functools import reduce
 from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomial_work import counted_product, gcd_units, minpoly_units, product_units, series_units
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget
-from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel
+from kahanmaps.algebra.work import Budget, count
+from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel, row_units
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 
@@ -42,7 +43,7 @@ class Ended(StrEnum):
     PROVED = "proved"  # the degrees are those of powers of a matrix
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, and the patterns of the singularities are not known to the end
     TERMS = "terms"  # as many as asked for
-    TIME = "time"
+    BUDGET = "budget"
     DEGREE = "degree"  # the next is over the limit
     CONSTANT = "constant"  # the iterate is a constant map
     SINGULAR = "singular"  # the next iterate exists nowhere
@@ -101,7 +102,7 @@ class Line:
             most = 2 * self._max_degree + _MARGIN + 1
             length = min(2 * guess + _MARGIN + 1, most)
             while curve is None:
-                self._require_time()
+                self._require_budget()
                 curve = self._curve(self._image(equation, length), length)
                 if curve is None and length == most:
                     raise too_large
@@ -114,16 +115,18 @@ class Line:
 
     def _by_minors(self, equation: Equation) -> list[nmod_poly]:
         def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
-            self._require_time()
-            return left * right
+            self._require_budget()
+            return counted_product(left, right)
 
         *above, below = equation.image(self._X, nmod_poly([0], self.prime), times)
         if below.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
         common = below.gcd(self._mixture(above))
-        self._require_time()
+        count(gcd_units(len(below), len(common)))
+        self._require_budget()
         curve, t = [], nmod(self._rng.randrange(self.prime), self.prime)
         for entry in (*above, below):
+            count(product_units(len(common), len(entry) - len(common) + 1) + len(entry) / 20)
             quotient = entry // common
             if quotient(t) * common(t) != entry(t):  # a mixture with a factor that is not in all: once in about p
                 common = reduce(nmod_poly.gcd, above, below)
@@ -135,20 +138,22 @@ class Line:
         zero = nmod_poly([0], self.prime)
         return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
 
-    def _require_time(self) -> None:
+    def _require_budget(self) -> None:
         if self._budget.is_spent:
-            raise Stopped(Ended.TIME, f"the time was over at iterate {self.steps + 1}")
+            raise Stopped(Ended.BUDGET, f"the budget was spent at iterate {self.steps + 1} (--effort)")
 
     def _image(self, equation: Equation, length: int) -> list[nmod_poly]:
         """The coordinates of the next curve as power series, to `length` terms."""
         X = [entry.truncate(length) for entry in self._X]
-        values = [entry.truncate(length) for entry in equation.monomials(X)]
+        values = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
+        count(row_units(equation, length))
         try:
-            *x, below = kernel(equation.rows(values, nmod_poly([0], self.prime)), 1, length, [], self._require_time)
+            *x, below = kernel(equation.rows(values, nmod_poly([0], self.prime)), 1, length, [], self._require_budget)
         except PrecisionTooLow:
             raise ZeroDivisionError("the point t = 0 of the line has no image") from None
         if not int(below[0]):
             raise ZeroDivisionError("the point t = 0 of the line has no image")
+        count(series_units(length) + len(x) * product_units(length, length))
         inverse = below.inverse_series_trunc(length)
         return [entry.mul_low(inverse, length) for entry in x]
 
@@ -160,6 +165,7 @@ class Line:
             )
             if int(below[0]) == 0:
                 continue
+            count(series_units(length) + minpoly_units(length) + (2 + len(x)) * product_units(length, length))
             inverse = below.inverse_series_trunc(length)
             values = [int(c) for c in above.mul_low(inverse, length).coeffs()]
             # The quotient may be as high above as below: without its first term it is a proper fraction over t.

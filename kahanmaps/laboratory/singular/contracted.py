@@ -27,8 +27,10 @@ from flint import Ordering, fmpq, fmpq_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_pol
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomial_work import counted_product, factored, gcd_units
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range, divided
 from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
@@ -77,15 +79,16 @@ def components(
         ring.from_dict({(k, 0): int(c) for k, c in enumerate(entry.coeffs())}) + ring.gen(1) * w
         for entry, w in zip(curve, direction, strict=True)
     ]
-    image = equation.image(X, ring.constant(0))
+    image = equation.image(X, ring.constant(0), counted_product)
+    count(2 * sum(map(len, image)))
     common = reduce(nmod_mpoly.gcd, image)
     image = [entry / common for entry in image]
     found: dict[str, tuple[nmod_mpoly, list[int]]] = {}
     for k, (form, is_there) in enumerate(forms):
         value = modulo(form, field).compose(*(image if is_there else X), ctx=ring)
-        for factor, exponent in value.factor()[1]:
+        for factor, exponent in factored(value):
             _, exponents = found.setdefault(str(factor), (factor, [0] * len(forms)))
-            exponents[k] = int(exponent)
+            exponents[k] = exponent
     return [
         HypersurfaceComponent(
             tuple(exponents),
@@ -174,7 +177,7 @@ class _Curve:
         """
         run = self.course(self).steps(_FIRST)[0]
         if not run:
-            raise OrdersUnknown("the time was over, or a curve touches a hypersurface in too high an order")
+            raise OrdersUnknown("the budget was spent (--effort), or a curve touches a hypersurface in too high an order")
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
 
@@ -286,8 +289,8 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     here = map_.at(eps)
 
     def factors(one: Equation) -> tuple[Any, ...]:
-        form = kernel_minors([[*row[:-1], None] for row in one.polynomials()])[-1]
-        return (form,) if map_.digits > _MOST_DIGITS else tuple(factor for factor, _ in form.factor()[1])
+        form = kernel_minors([[*row[:-1], None] for row in one.polynomials()], counted_product)[-1]
+        return (form,) if map_.digits > _MOST_DIGITS else tuple(factor for factor, _ in factored(form))
 
     infinity = here.equations[0].polynomials()[0][0].context().gens()[-1]
     poles = tuple(form for form in factors(here.equations[0]) if form != infinity)
@@ -379,7 +382,8 @@ def _on_line(
     equation, p = map_.equation, map_.field.characteristic
     a, b, across = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
-    image = equation.image(line, nmod_poly([], p))
+    image = equation.image(line, nmod_poly([], p), counted_product)
+    count(sum(gcd_units(len(entry)) for entry in image))
     common = reduce(nmod_poly.gcd, image)
     image = [entry // common for entry in image]
     degree = max(int(entry.degree()) for entry in image)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import chain
+from itertools import count as integers
 from typing import Any
 
 from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import PrimeField
+from kahanmaps.algebra.polynomial_work import product_units, roots_units, series_units
+from kahanmaps.algebra.work import count
 from kahanmaps.maps.equation import Equation
 
 # The order in t at the point with these coordinates, known below t^precision; None where it is not seen there.
@@ -109,7 +112,7 @@ def images_of_curve(
     far = nmod_poly([0] * apart + [1], prime)
     curves = [line, *([x + far * w for x, w in zip(line, tangent, strict=True)] for tangent in tangents)]
     curves = [[entry.truncate(apart + precision) for entry in curve] for curve in curves]
-    for number in count(1):
+    for number in integers(1):
         divided, denominators = 0, list[int | None]()
         for equation in equations_of(equations, number):
             places: list[Place] = []
@@ -146,9 +149,11 @@ def _moved(
 
     They are empty for a curve, and those of the curve for its neighbours. Raises PrecisionTooLow.
     """
-    zero = X[0] * 0
+    zero, unit = X[0] * 0, product_units(known, known)
+    count(row_units(equation, known))
 
     def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
+        count(unit)
         return left.mul_low(right, known)
 
     if equation.dim >= _ELIMINATED and equation.explicit is None:
@@ -172,6 +177,7 @@ def kernel(
     The exponents are below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     left_rows, left = list(range(len(rows))), list(range(len(rows) + 1))
+    inversion, product = series_units(known), 0.3 + product_units(known, known)
     solved: list[tuple[int, dict[int, nmod_poly]]] = []
     for k in range(len(rows)):
         if len(places) == k:
@@ -179,12 +185,14 @@ def kernel(
         power, i, j = places[k]
         left_rows.remove(i)
         left.remove(j)
+        count(inversion + product * len(left) * 2)  # with those of the kernel
         inverse = rows[i][j].right_shift(power).inverse_series_trunc(known - power)
         normal = {c: rows[i][c].right_shift(power).mul_low(inverse, known - power) for c in left}
         for r in left_rows:
             check()
             factor = rows[r][j]
             if not factor.is_zero():
+                count(product * sum(not entry.is_zero() for entry in normal.values()))
                 for c in left:
                     if not normal[c].is_zero():
                         rows[r][c] = rows[r][c] - factor.mul_low(normal[c], known)
@@ -220,7 +228,9 @@ def roots_modulo(polynomial: nmod_poly) -> list[int]:
     [2, 3]
     """
     t = nmod_poly([0, 1], polynomial.modulus())
+    count(roots_units(len(polynomial)))
     linear = polynomial.gcd(t.pow_mod(polynomial.modulus(), polynomial) - t) if polynomial.degree() > 1 else polynomial
+    count(roots_units(1, len(linear)))
     return [-int(factor[0]) % polynomial.modulus() for factor, _ in linear.factor()[1]]
 
 
@@ -234,12 +244,16 @@ def form_order(form: Any, field: PrimeField) -> Function:
     """The order of a form over Q in (X : Z), along curves modulo the prime of `field`. Raises BadPrime."""
     p, reduced = field.prime, modulo(form, field)
     terms = [(exponents, nmod_poly([int(c)], p)) for exponents, c in reduced.terms()]
+    products = sum(map(bool, chain.from_iterable(exponents for exponents, _ in terms)))
+    count(20 + 2 * len(terms))
 
     def order(X: Sequence[nmod_poly], precision: int) -> int | None:
+        count(2 + len(terms) / 5)
         if int(reduced(*(int(entry[0]) for entry in X))):
             return 0
         if precision > _FEW and (found := order([entry.truncate(_FEW) for entry in X], _FEW)) is not None:
             return found
+        count(products * (0.3 + product_units(precision, precision)))
         powers = [[nmod_poly([1], p), entry] for entry in X]
         total = nmod_poly([], p)
         for exponents, term in terms:
@@ -254,10 +268,16 @@ def form_order(form: Any, field: PrimeField) -> Function:
     return order
 
 
+def row_units(equation: Equation, length: int) -> float:
+    """The units of work for the matrix of an equation at polynomials or series of this length."""
+    return 1 + sum(len(entry) for row in equation.terms for entry in row) * (0.5 + length / 100)
+
+
 def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] | None:
     """The image of a point of projective space modulo p; None where all forms vanish: there only curves have one."""
     prime, X = equations[0].over.characteristic, list(point)
     for equation in equations:
+        count(row_units(equation, 1) + equation.dim**2 / 2)
         values = [nmod(x, prime) for x in X]
         if equation.explicit is not None:
             X = [int(x) for x in equation.image(values, nmod(0, prime))]

@@ -10,21 +10,22 @@ of the inverse map. So away from poles and infinity contracted hypersurfaces are
 
 from __future__ import annotations
 
-import operator
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import partial, reduce
+from functools import reduce
 from typing import Any
 
 from flint import fmpq, nmod_poly
 
 from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.minors import Product, kernel_minors
+from kahanmaps.algebra.polynomial_work import counted_product, product_units
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import NO_ORDERS, NOTHING, AlongCurves, Course, Orders, Range, Tracked
 from kahanmaps.laboratory.singular.jets import (
@@ -94,7 +95,7 @@ def critical_points(
                 excluded = excluded * X[-1] if is_line else excluded
         return total
 
-    value = function(line, operator.mul, is_line=True)
+    value = function(line, counted_product, is_line=True)
     while (shared := value.gcd(excluded)).degree() > 0:
         value = value // shared
     if value.degree() < 1:
@@ -111,8 +112,13 @@ def critical_points(
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             far = nmod_poly([0] * apart + [1], p)
             moved = [curve, *([x + far if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))]
-            values = [function(X, partial(nmod_poly.mul_low, n=apart + power)) for X in moved]
-            here, *there = (int(on[apart + power - 1]) for on in values)
+            terms = apart + power
+
+            def times(left: nmod_poly, right: nmod_poly, terms: int = terms) -> nmod_poly:
+                count(product_units(terms, terms))
+                return left.mul_low(right, terms)
+
+            here, *there = (int(function(X, times)[terms - 1]) for X in moved)
             gradient = [(c - here) % p for c in there]
             if any(gradient):
                 found.append(CriticalPoint(tuple(point), tuple(gradient), power))

@@ -21,8 +21,10 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomial_work import counted_product, factored
 from kahanmaps.algebra.polynomials import degree_in, ring
 from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.algebra.work import count
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Hypersurface, Tracking, Written, outcome_of
@@ -61,7 +63,7 @@ def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
     """
     forms, _, below = map_
     found: dict[str, Written] = {}
-    for factor, _ in below.factor()[1]:
+    for factor, _ in factored(below):
         if not is_infinity(factor):
             found[str(factor)] = Written(factor, True, 0)
     if map_.degree <= 1:
@@ -73,15 +75,15 @@ def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
         poles = [Written(one.form, one.is_pole, None) for one in found.values()]
         return [*poles, Written(infinity, False, None)], None
     for factor, multiplicity in critical:
-        found[str(factor)] = Written(factor, str(factor) in found, int(multiplicity))
+        found[str(factor)] = Written(factor, str(factor) in found, multiplicity)
     return list(found.values()), critical_degree
 
 
 def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -> tuple[list[Written], list[Written]]:
     """Of the forms of a map those that it contracts, and those in the common factor of the minors of its equation."""
     contracted = [replace(one, stage=stage) for one in among if one.multiplicity]
-    common = [] if map_.factor.is_constant() else map_.factor.factor()[1]
-    return contracted, [Written(factor, False, None, int(k), stage) for factor, k in common]
+    common = [] if map_.factor.is_constant() else factored(map_.factor)
+    return contracted, [Written(factor, False, None, k, stage) for factor, k in common]
 
 
 def followed_map_by_map(
@@ -143,7 +145,7 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
     zero, infinity = context.constant(0), context.gen(size - 1)
     if _is_short(size, degree):
         rows = [[*(form.derivative(j) for j in range(size)), zero] for form in forms]
-        return [(factor, int(k)) for factor, k in kernel_minors(rows)[-1].factor()[1]]
+        return factored(kernel_minors(rows, counted_product)[-1])
     finite = factors_at_finite_points(forms)
     if finite is None:
         return None
@@ -169,9 +171,9 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
     multiplicities: dict[str, tuple[Any, int]] = {}
 
     def multiply(polynomial: Any, power: int) -> None:
-        for factor, k in polynomial.factor()[1]:
+        for factor, k in factored(polynomial):
             _, before = multiplicities.get(str(factor), (factor, 0))
-            multiplicities[str(factor)] = factor, before + power * int(k)
+            multiplicities[str(factor)] = factor, before + power * k
 
     multiply(denominator, n + 1)
     rows = []
@@ -185,7 +187,7 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
         rows.append([*(None if entry.is_zero() else entry / content for entry in row), None])
     products = 0
 
-    def count_products(pairs: list[tuple[Any, Any]]) -> None:
+    def require_few(pairs: list[tuple[Any, Any]]) -> None:
         nonlocal products
         products += sum(len(entry) * len(minor) for entry, minor in pairs)
         if products > _MAX_PRODUCTS:
@@ -193,7 +195,7 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
 
     try:
         rows.sort(key=lambda row: sum(len(entry) for entry in row if entry is not None))
-        determinant = kernel_minors(rows, foresee=count_products)[-1]
+        determinant = kernel_minors(rows, counted_product, require_few)[-1]
     except TooLarge:
         return None
     if len(determinant) > _MAX_TERMS:
@@ -255,7 +257,7 @@ def _named(map_: BirationalMap, eps: fmpq, stage: int | None) -> dict[str, str]:
         if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
             continue
         value = factor.compose(*at_eps.gens(), at_eps.constant(eps), ctx=at_eps)
-        parts = value.factor()[1]
+        parts = factored(value)
         if len(parts) == 1 and parts[0][1] == 1:
             text = format_polynomial(affine.from_dict({(*m[:n], m[-1]): c for m, c in factor.terms()}))
             found[name_of(parts[0][0], map_)] = text
@@ -277,6 +279,7 @@ def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None
         terms = {(*m[:n], degree - sum(m[:n]), m[-1]): c for m, c in entry.terms()}
         return context.from_dict(terms).compose(*X, value, ctx=context)
 
-    minors = kernel_minors([[form(entry) for entry in row] for row in rows])
+    minors = kernel_minors([[form(entry) for entry in row] for row in rows], counted_product)
+    count(5 * sum(map(len, minors)))
     common = reduce(fmpq_mpoly.gcd, minors)
     return [minor / common for minor in minors]
