@@ -56,4 +56,3 @@ def factored(polynomial: Any) -> list[tuple[Any, int]]:
     """
     count(50 + 10 * len(polynomial))
     return [(factor, int(k)) for factor, k in polynomial.factor()[1]]
-

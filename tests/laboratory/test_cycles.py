@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -15,6 +16,7 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.time_limit import TimeLimit
 
 
 def system_of(*rhs: str) -> QuadraticSystem:
@@ -158,9 +160,24 @@ def test_a_map_that_is_singular_everywhere_has_no_cycle():
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
-def test_where_the_clock_stops_the_images_nothing_is_said_of_points():
-    found = cycle_census(load("lotka_volterra").system, "1/7", 997, seconds=0)
+def test_where_a_time_limit_stops_the_images_nothing_is_said_of_points():
+    def stop(sentence):
+        if sentence != "p = 997: the images of 0 of 995007 points":
+            raise TimeLimit
+
+    found = cycle_census(load("lotka_volterra").system, "1/7", 997, progress=stop)
     assert (found.stopped, found.complete, found.looked_at, found.cycles, found.lengths) == (True, False, 0, None, {})
+
+
+def test_a_time_limit_keeps_the_complete_steps_of_random_points():
+    def stop(sentence):
+        if sentence == "p = 997: step 3 of at most 10000":
+            raise TimeLimit
+
+    system = load("lotka_volterra").system
+    found = cycle_census(system, "1/7", 997, samples=50, progress=stop)
+    whole = cycle_census(system, "1/7", 997, samples=50, steps=3)
+    assert found == replace(whole, stopped=True)
 
 
 def test_spaces_of_high_dimension_are_sampled_earlier():

@@ -11,12 +11,14 @@ import pytest
 from degree_helpers import polynomial_degrees
 from helpers import DIMENSION, quick
 
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import curves
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.time_limit import TimeLimit
 
 DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "paper_m3"]
 OPEN = Patterns((), None, False, "not looked at")
@@ -132,18 +134,33 @@ def test_degenerate_maps_are_values(rhs, eps, degrees, ended):
     assert found.growth is {"constant": Growth.ZERO, "singular": Growth.UNKNOWN}.get(ended, Growth.BOUNDED)
 
 
-def test_the_time_and_the_degree_are_limits():
+def test_the_budget_and_the_degree_are_limits():
     henon_heiles = load("henon_heiles").system
-    found = degree_growth(henon_heiles, seconds=0.05)
-    assert (found.ended, found.degrees[:2]) == ("time", (1, 3))
-    found = degree_growth(load("riccati").system, seconds=0.05, max_terms=10_000)
-    assert (found.ended, found.growth) == ("time", Growth.BOUNDED)
+    found = degree_growth(henon_heiles, effort=Budget(100_000))
+    assert (found.ended, found.degrees, found.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
+    assert found.message == "the budget was spent at iterate 8 (--effort)"
+    assert found.to_json() == degree_growth(henon_heiles, effort=Budget(100_000)).to_json()
+    found = degree_growth(load("riccati").system, effort=Budget(20_000), max_terms=10_000)
+    assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)
     found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
     assert (found.ended, found.degrees, found.message) == (
         "degree",
         (1, 3, 7, 17, 39),
         "the degree of iterate 5 is above 50",
     )
+
+
+def test_a_time_limit_keeps_the_degrees_that_were_measured():
+    def stop(sentence):
+        if sentence.startswith("degrees: iterate 5"):
+            raise TimeLimit("the time limit of 1 s is over")
+
+    found = degree_growth(load("henon_heiles").system, progress=stop)
+    assert (found.ended, found.degrees) == ("stopped", (1, 3, 7, 17, 39))
+    assert found.message == "the time limit of 1 s is over at iterate 5"
+    assert len(found.to_json()["lines"]) == 2
+    with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
+        degree_growth(load("henon_heiles").system, effort=Budget(1e9), progress=stop)
 
 
 def test_lines_in_special_position_are_replaced(monkeypatch):

@@ -53,7 +53,7 @@ def test_the_affine_jacobian_of_kahan_maps(name):
 
 
 def test_the_hypersurfaces_of_a_map_of_dimension_5_are_written():
-    run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1, seconds=200)
+    run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1)
     assert (str(run.verdict), run.critical_degree) == ("confined", 24)
     assert [(h.polynomial, h.multiplicity) for h in run.hypersurfaces] == [(x, 6) for x in "edcb"]
 
@@ -70,20 +70,20 @@ def test_exceptional_hypersurfaces_are_named_over_eps_by_the_affine_jacobian():
     [("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"), ("a,b,c,d,e", DIMENSION_5)],
 )
 def test_published_maps_of_dimension_4_and_5_have_derived_quadratic_growth(variables, image):
-    found = degree_growth(by_formulas(variables, image), max_terms=20, seconds=200)
+    found = degree_growth(by_formulas(variables, image), max_terms=20)
     assert (str(found.growth), found.explained is not None) == ("quadratic", True)
 
 
 @pytest.mark.parametrize(("k", "rate"), [(3, "3"), (5, "5"), (4, "t^2 - 4*t + 1"), (6, "t^2 - 6*t + 1")])
 def test_the_published_rates_of_a_planar_family(k, rate):
-    found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), seconds=200, enclosed=False)
+    found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
     assert found.explained is not None
     assert found.dynamical_degree.text.endswith(rate)
 
 
-def test_orders_that_are_cut_by_the_time_do_not_differ():
+def test_orders_that_are_cut_by_the_budget_do_not_differ():
     one, other = Hypersurface(contracted_at=1), Hypersurface(contracted_at=2)
     assert [_agreed(one, other, is_over)[1] for is_over in (True, False)] == [NO_TIME, POINTS_DIFFER]
     assert _agreed(one, one, True) == (one, "")
-    late = patterns(by_formulas("x,y", "y; -x + 1/y^3"), None, seconds=1e-6)
-    assert late.running == "the time was over before all singularities were followed (--seconds)"
+    late = patterns(by_formulas("x,y", "y; -x + 1/y^3"), None, effort=-20)
+    assert late.running == "the budget was spent before all singularities were followed (--effort)"

@@ -19,7 +19,7 @@ def conics(*signs):
 
 
 def contracted(map_, eps):
-    return [h for h in singularities(map_, eps, seconds=20).hypersurfaces if h.multiplicity]
+    return [h for h in singularities(map_, eps).hypersurfaces if h.multiplicity]
 
 
 def test_names_by_hand():

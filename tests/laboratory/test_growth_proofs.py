@@ -42,10 +42,10 @@ def by_formulas(variables: str, image: str):
 )
 def test_the_growth_of_monomial_maps_is_proved(variables, image, growth, rate, monkeypatch):
     map_ = by_formulas(variables, image)
-    found = degree_growth(map_, seconds=60)
+    found = degree_growth(map_)
     assert (str(found.growth), found.dynamical_degree.text, found.known) == (growth, rate, Known.PROVED)
     monkeypatch.setattr(degrees, "exponent_matrix", lambda map_, eps: None)
-    measured = degree_growth(map_, max_terms=6, seconds=60, patterns=OPEN, enclosed=False)
+    measured = degree_growth(map_, max_terms=6, patterns=OPEN, enclosed=False)
     assert (measured.degrees, bool(measured.primes)) == (found.degrees[:7], True)
 
 
@@ -104,7 +104,7 @@ def test_a_map_that_is_monomial_at_one_eps_only():
     ],
 )
 def test_maps_of_finite_order_are_proved_periodic(image, period):
-    found = degree_growth(by_formulas("x,y", image), max_terms=12, seconds=60, patterns=OPEN)
+    found = degree_growth(by_formulas("x,y", image), max_terms=12, patterns=OPEN)
     assert (found.proof and found.proof.period) == period
     assert period is None or (found.proof.is_identity and found.known is Known.PROVED)
 

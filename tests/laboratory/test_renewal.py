@@ -55,7 +55,7 @@ OF_ONE_FORM = {
 
 @pytest.mark.parametrize("name", quick(WRITTEN, DAILY))
 def test_the_degrees_of_the_catalogue_are_explained(name):
-    found = degree_growth(load(name).map, seconds=30, max_degree=500)
+    found = degree_growth(load(name).map, max_degree=500)
     if found.degrees[1] > 1 and found.proof is None:
         assert found.explained is not None
         assert tuple(coefficients(found.patterns.fraction, len(found.degrees))) == found.degrees
@@ -67,7 +67,7 @@ def test_hypersurfaces_of_one_form_are_told_apart_and_explain_degrees(name):
     found = patterns(load(name).map, fmpq(2, 7))
     sizes = [h.degree for h in found.contracted]
     assert sorted(sizes) == OF_ONE_FORM[name]
-    measured = degree_growth(load(name).map, seconds=60, max_terms=6, patterns=found)
+    measured = degree_growth(load(name).map, max_terms=6, patterns=found)
     assert measured.explained is not None
     # Each degree counts: with another one in its place the degrees of the map are other ones.
     every = [h.orders for h in found.contracted]

@@ -7,17 +7,20 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.scan import scan as scan_module
 from kahanmaps.laboratory.scan.members import Scanned
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, _goes_on, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
 from kahanmaps.maps.residues import families
+from kahanmaps.time_limit import TimeLimit
 
 THREE_LINES = """variables = ["x", "y"]
 parameters = { g1 = 1, g2 = 1 }
@@ -173,9 +176,10 @@ def test_a_family_without_special_members_says_so():
     assert "found\tno condition" in found.text
 
 
-def test_the_time_may_be_over_before_anything_is_known():
-    found = scan(load("henon_heiles"), ["c"], seconds=1e-6)
-    assert (found.ended, found.components, found.height) == ("time", (), 0)
+def test_the_budget_may_be_spent_before_anything_is_known():
+    found = scan(load("henon_heiles"), ["c"], effort=Budget(1))
+    assert (found.ended, found.components, found.height) == ("budget", (), 0)
+    assert "open\tthe budget was spent (--effort) before members modulo 10" in found.text
 
     def over():
         raise TimeOver
@@ -202,8 +206,28 @@ def test_what_was_left_out_is_named_stage_by_stage():
     found = scan(parse_system(THREE_LINES), ["g1", "g2"], primes=(17, 19, 23), terms=3, progress=stop)
     assert found.ended == "interrupted"
     assert found.omitted
-    assert f"no time for {found.omitted[0]}" in found.text
+    assert f"it was interrupted before {found.omitted[0]}" in found.text
     assert found.to_json()["omitted"] == list(found.omitted)
+
+
+@pytest.mark.parametrize("stage", ["_confirmed", "_growth", "symmetries", "conditions"])
+def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
+    def stop(*_):
+        raise TimeLimit
+
+    monkeypatch.setattr(scan_module, stage, stop)
+    found = scan(parse_system(THREE_LINES), ["g1"], primes=(17, 19, 23), terms=3)
+    left_out = {
+        "conditions": "all conditions for",
+        "_confirmed": "the confirmation of",
+        "_growth": "the growth on",
+        "symmetries": "changes of parameters",
+    }
+    known = list(left_out)
+    assert found.ended == "interrupted"
+    assert found.omitted[0].startswith(left_out[stage])
+    assert bool(found.components) is (stage != "conditions")
+    assert any(one.tried for one in found.components) is (known.index(stage) > 1)
 
 
 def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow():

@@ -9,6 +9,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.singular import outcomes
@@ -16,11 +17,12 @@ from kahanmaps.laboratory.singular.jets import (
     image_of,
     images_of_curve,
 )
-from kahanmaps.laboratory.singular.outcomes import NOT_CONFINED, critical_points
+from kahanmaps.laboratory.singular.outcomes import NO_TIME, NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.time_limit import TimeLimit
 
 PRIME = 2_305_843_009_213_693_951
 
@@ -95,10 +97,27 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
 
 
-def test_the_clock_stops_it():
-    run = singularities(load("euler_top").system, "1/7", seconds=0.0)
+def test_a_budget_that_is_spent_stops_it():
+    top, before = load("euler_top").system, counted()
+    whole = singularities(top, "1/7")
+    run = singularities(top, "1/7", effort=Budget((counted() - before) / 2))
     assert run.stopped
     assert run.verdict == "undecided"
+    assert run.hypersurfaces[0] == whole.hypersurfaces[0]
+    assert run.hypersurfaces[-1].note == NO_TIME
+
+
+def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():
+    top, whole = load("euler_top").system, singularities(load("euler_top").system, "1/7")
+
+    def stop(sentence):
+        if sentence == f"following {whole.hypersurfaces[1].polynomial[:40]}":
+            raise TimeLimit("the time limit of 1 s is over")
+
+    run = singularities(top, "1/7", progress=stop)
+    assert (run.stopped, run.hypersurfaces) == (True, whole.hypersurfaces[:1])
+    with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
+        singularities(top, "1/7", effort=Budget(1e9), progress=stop)
 
 
 def test_large_dimensions_are_refused():

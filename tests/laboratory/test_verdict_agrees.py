@@ -73,12 +73,12 @@ def test_fields_that_disagree_would_be_noticed():
 
 
 def test_growth_is_exponential_where_positive_entropy_is_proved_and_no_recurrence_confirmed():
-    # Degrees 2^n of lotka_volterra, whose singularities there was no time for.
+    # Degrees 2^n of lotka_volterra, whose singularities the budget left out.
     degrees = tuple(2**n for n in range(9))
     bounds = enclose(km.load("lotka_volterra").map, None)
-    found = DegreeGrowth(degrees[:3], None, "time", "", 0, (), (), enclosure=bounds)
+    found = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), enclosure=bounds)
     assert (str(found.growth), found.recurrence) == ("exponential", None)
-    control = DegreeGrowth(degrees[:3], None, "time", "", 0, (), ())
+    control = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), ())
     assert (str(control.growth), str(control.known)) == ("unknown", "undecided")
 
 

@@ -1,11 +1,11 @@
 """Compositions that are too long to be multiplied out are followed map by map, and their degrees explained."""
 
 import random
-import time
 
 import pytest
 from flint import fmpq, fmpz_poly
 
+from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -29,7 +29,7 @@ def word(*letters, power=1):
 
 def explained(map_, terms, eps=None):
     """The word of a composition, and its degrees as its maps explain them, followed one by one."""
-    limits = Range(12, 60, 40, time.monotonic() + 60, 40)
+    limits = Range(12, 60, 40, Budget(), 40)
     found, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
     pairs = [(h.degree, h.orders) for h in hypersurfaces]
     series = degree_series(found.degrees, pairs, [h.stage for h in hypersurfaces])
@@ -60,7 +60,7 @@ def test_words_explain_the_measured_degrees(letters, power, terms, expected):
 def test_a_hypersurface_of_another_map_explains_other_degrees():
     """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
-    limits = Range(12, 60, 40, time.monotonic() + 60, 40)
+    limits = Range(12, 60, 40, Budget(), 40)
     found, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
     pairs = [(h.degree, h.orders) for h in hypersurfaces]
     right, wrong = (

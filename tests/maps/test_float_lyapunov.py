@@ -14,6 +14,7 @@ from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.time_limit import TimeLimit
 
 
 def system_of(*rhs: str) -> QuadraticSystem:
@@ -81,6 +82,22 @@ def test_orbits_that_leave_are_counted_and_left_out():
     assert nobody.ended == 1
     assert np.isnan(nobody.mean).all()
     assert not nobody.stopped
+
+
+def test_a_time_limit_keeps_the_complete_portions():
+    told = []
+
+    def stop(sentence):
+        told.append(sentence)
+        if len(told) == 4:
+            raise TimeLimit
+
+    system, starts = load("lorenz").system, [[1.0, 2.0, 3.0]]
+    found = lyapunov_exponents(system, starts, "1/100", 5000, progress=stop)
+    assert (told[-1], found.stopped, found.steps) == ("step 1536 of 5000", True, 1536)
+    whole = lyapunov_exponents(system, starts, "1/100", 1536)
+    assert found.exponents == pytest.approx(whole.exponents, abs=1e-9)
+    assert np.isnan(found.half).all()
 
 
 @pytest.mark.parametrize(

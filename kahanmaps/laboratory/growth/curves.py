@@ -43,7 +43,8 @@ class Ended(StrEnum):
     PROVED = "proved"  # the degrees are those of powers of a matrix
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, and the patterns of the singularities are not known to the end
     TERMS = "terms"  # as many as asked for
-    BUDGET = "budget"
+    BUDGET = "budget"  # is spent
+    STOPPED = "stopped"  # by a TimeLimit
     DEGREE = "degree"  # the next is over the limit
     CONSTANT = "constant"  # the iterate is a constant map
     SINGULAR = "singular"  # the next iterate exists nowhere

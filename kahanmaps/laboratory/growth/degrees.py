@@ -52,6 +52,7 @@ from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike, as_map
+from kahanmaps.time_limit import TimeLimit
 
 _MOST_TERMS = 10_000
 _LINES = 2
@@ -283,10 +284,12 @@ def degree_growth(
     Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and it is explained by
     the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
     d_1, ..., d_max_terms. Stops in any case when the budget is spent, which doubles with each more of `effort`, or
-    before a degree above `max_degree`. `patterns` are those of the singularities, which are followed here, for `steps`
-    steps, where they are not given. Unless `enclosed` is false, exponential growth in the plane is proved. Modulo
-    random primes of 61 bits, so the answer is measured and not proved, but for the bounds of the dynamical degree of
-    planar maps; the same for the same `seed`. Raises InputError for wrong values.
+    before a degree above `max_degree`; a TimeLimit ends it with the degrees measured so far, unless `effort` is a
+    Budget: then this is a stage of something else, which the TimeLimit ends. `patterns` are those of the
+    singularities, which are followed here, for `steps` steps, where they are not given. Unless `enclosed` is false,
+    exponential growth in the plane is proved. Modulo random primes of 61 bits, so the answer is measured and not
+    proved, but for the bounds of the dynamical degree of planar maps; the same for the same `seed`. Raises InputError
+    for wrong values.
 
     Source: bellon-viallet-1999.
 
@@ -305,9 +308,13 @@ def degree_growth(
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     if max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    return _Search(as_map(system), exact, budget_for("degrees", effort), max_degree, seed, steps, patterns).run(
-        max_terms, enclosed, progress
-    )
+    search = _Search(as_map(system), exact, budget_for("degrees", effort), max_degree, seed, steps, patterns)
+    try:
+        return search.run(max_terms, enclosed, progress)
+    except TimeLimit as end:
+        if isinstance(effort, Budget):
+            raise
+        return search.result(Ended.STOPPED, f"{end} at iterate {len(search.degrees)}")
 
 
 @dataclass
@@ -323,8 +330,8 @@ class _Search:
     patterns: Patterns | None
     degrees: list[int] = field(default_factory=lambda: [1])
     notes: list[str] = field(default_factory=list)
+    lines: list[Line] = field(default_factory=list)
     replaced: int = 0
-    is_explicit: bool = False
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
         """Step after step until something ends it."""
@@ -346,7 +353,7 @@ class _Search:
                 power = power * matrix
             iterates = counted(len(self.degrees) - 1, "iterate")
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
-            return self._result(ended, message, proof=periodic or proof)
+            return self.result(ended, message, proof=periodic or proof)
 
         rng = random.Random(f"degrees {seed_for(self.seed, self.map.subject, self.eps)}")
 
@@ -357,8 +364,7 @@ class _Search:
                 except BadPrime:
                     continue
 
-        lines = [line() for _ in range(_LINES)]
-        self.is_explicit = lines[0].is_explicit
+        self.lines = [line() for _ in range(_LINES)]
         try:
             while True:
                 self._look_at_fit(max_terms is None)
@@ -367,15 +373,14 @@ class _Search:
                 if len(self.degrees) > _MOST_TERMS:
                     raise Stopped(Ended.TERMS, f"{_MOST_TERMS} iterates, and no more are worked out")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
-                self._step(lines, line)
+                self._step(line)
                 if self.degrees[-1] == 0 and max_terms is None:
                     raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as end:
             ended, message = end.ended, end.message
         if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
             self._follow()
-        primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
-        found = self._result(ended, message, primes=primes, residues=residues, notes=tuple(self.notes))
+        found = self.result(ended, message)
         contracted = self.patterns
         if contracted is not None and contracted.at and self.eps is None and not self.budget.is_spent:
             named = with_eps(self.map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
@@ -389,9 +394,10 @@ class _Search:
             found, enclosure=enclose(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
         )
 
-    def _result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
-        known: dict[str, Any] = {"primes": (), "residues": (), "patterns": self.patterns, **more}
-        return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, **known)
+    def result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
+        primes, residues = tuple(line.prime for line in self.lines), tuple(line.eps for line in self.lines)
+        known: dict[str, Any] = {"patterns": self.patterns, "notes": tuple(self.notes), **more}
+        return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, primes, residues, **known)
 
     def _look_at_fit(self, may_stop: bool) -> None:
         """Follow the singularities in good time, and stop where a recurrence is certain."""
@@ -400,14 +406,14 @@ class _Search:
             return
         found = find_recurrence(self.degrees)
         # Above dimension 4 series of maps without short forms are slow and wait until degrees say something.
-        soon = self.map.dim <= WRITTEN_DIMENSION or found is not None or self.is_explicit
+        soon = self.map.dim <= WRITTEN_DIMENSION or found is not None or self.lines[0].is_explicit
         if soon:
             self._follow()
         if not may_stop:
             return
         known = self.patterns
         enough = found is not None and found.checked >= max(6, found.order)
-        explained = self._result(Ended.TERMS, "").explained
+        explained = self.result(Ended.TERMS, "").explained
         if explained is not None:
             last = max(known.lengths, default=0) if known is not None else 0
             same = found is not None and found.characteristic == explained.characteristic
@@ -429,7 +435,7 @@ class _Search:
             given: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
             self.patterns = patterns_of_map(self.map, self.eps, **given)
 
-    def _step(self, lines: list[Line], line: Callable[[], Line]) -> None:
+    def _step(self, line: Callable[[], Line]) -> None:
         """All lines one step on; those in special position are replaced by others."""
         n, known = len(self.degrees), self.degrees
 
@@ -451,7 +457,7 @@ class _Search:
             return one.degree
 
         while True:
-            found = [degree_on(one) for one in lines]
+            found = [degree_on(one) for one in self.lines]
             best = max(found)
             if best >= 0 and min(found) == best:
                 self.degrees.append(best)
@@ -467,4 +473,4 @@ class _Search:
                 self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")
             for k, degree in enumerate(found):
                 if degree < best or best < 0:
-                    lines[k] = line()
+                    self.lines[k] = line()

@@ -26,6 +26,7 @@ from kahanmaps.invariants.heights import HeightGrowth, height_growth
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike, as_map
+from kahanmaps.time_limit import TimeLimit
 
 DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
 DEFAULT_STARTS = 3
@@ -60,7 +61,8 @@ class SurveyedOrbit:
 
 @dataclass(frozen=True)
 class HeightSurvey(Printed):
-    """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it.
+    """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where the budget
+    or a TimeLimit ended it.
 
     For a map that has no eps that of the orbits means nothing. `heights.height` says what heights over a field are.
     """
@@ -129,11 +131,11 @@ def height_survey(
 ) -> HeightSurvey:
     """The growth of heights along exact orbits over Q from given starts, or so many random ones, for one or two eps.
 
-    A system stands for its Kahan map.
-    `eps` is one exact number (or `time_step` = 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a
-    number; when the budget is spent, which doubles with each more of `effort`, no orbit is
-    begun, and the one in flight ends. A random start whose orbit meets a singular
-    point is replaced by another. Raises InputError for wrong values.
+    A system stands for its Kahan map. `eps` is one exact number (or `time_step` = 2 eps) or None for 1/10 and 3/11.
+    Orbits end at `max_digits` digits a number; when the budget is spent, which doubles with each more of `effort`, no
+    orbit is begun, and the one in flight ends. A TimeLimit leaves the orbits before that one, unless `effort` is a
+    Budget: then this is a stage of something else, which the TimeLimit ends. A random start whose orbit meets a
+    singular point is replaced by another. Raises InputError for wrong values.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
@@ -147,7 +149,7 @@ def height_survey(
         raise InputError("found no starts, expected at least one")
     if not isinstance(starts, int) and not all(hasattr(start, "__len__") for start in starts):
         starts = [starts]  # one of them
-    budget = budget_for("heights", effort)
+    is_stage, budget = isinstance(effort, Budget), budget_for("heights", effort)
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
     field = "" if map_.root is None else map_.root.number_field.name
@@ -166,9 +168,14 @@ def height_survey(
                     fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS))
                     for _ in range(map_.dim)
                 )
-                found = height_growth(
-                    over, candidate, steps, normal_form=normal_form, max_digits=max_digits, budget=budget
-                )
+                try:
+                    found = height_growth(
+                        over, candidate, steps, normal_form=normal_form, max_digits=max_digits, budget=budget
+                    )
+                except TimeLimit:
+                    if is_stage or not orbits:
+                        raise
+                    return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
                 if found.end.status != "singular" or budget.is_spent:
                     break
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))

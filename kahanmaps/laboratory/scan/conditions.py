@@ -7,32 +7,22 @@ from collections.abc import Callable, Iterable, Sequence
 
 from kahanmaps.algebra.modular_matrices import pivots
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.laboratory.scan.lift import flat_equations, lifted_conjugates, lifted_flats, lifted_forms, residues
 from kahanmaps.laboratory.scan.pieces import Pieces, pieces
 from kahanmaps.laboratory.scan.result import Component
-from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep, TimeOver
+from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
 _SHARE = 0.5  # of the prime, points of a curve at least
 
 
 def conditions(
-    sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
-) -> tuple[list[Component], int]:
-    """The components, and for how many sequences of degrees there was no time; those with smaller degrees first."""
-    found: list[Component] = []
-    classes = sorted({degrees for one in sweeps for degrees in one.classes})
-    for k, degrees in enumerate(classes):
-        try:
-            found += _of_class(degrees, sweeps, names, rng, check)
-        except TimeOver:
-            return found, len(classes) - k
-    return found, 0
-
-
-def _of_class(
     degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
 ) -> list[Component]:
-    """Hypersurfaces first, from random lines, which hardly meet anything smaller; then what is smaller, beside them."""
+    """The components of the slow members with these degrees. Raises what `check` raises, which is called now and then.
+
+    Hypersurfaces first, from random lines, which hardly meet anything smaller; then what is smaller, beside them.
+    """
     found: list[Component] = []
     count = len(names)
 
@@ -89,6 +79,8 @@ def beside(points: Sequence[Point], components: Iterable[Component], prime: int)
 
     rest = np.array(points, dtype=np.int64)
     for one in components:
+        terms = sum(map(len, one.equations))
+        count_work(10 * terms * (1 + len(rest) / 200))
         on = np.ones(len(rest), dtype=bool)
         for equation in one.equations:
             total = np.zeros(len(rest), dtype=np.int64)

@@ -23,6 +23,7 @@ from flint import fmpq, fmpq_mpoly, fmpz_mat
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.algebra.residues import chinese, rational_reconstruction, rational_vector
+from kahanmaps.algebra.work import count
 from kahanmaps.laboratory.modular_points import exponents_up_to, product_of
 from kahanmaps.laboratory.scan.members import solutions
 from kahanmaps.laboratory.scan.pieces import Rows
@@ -62,10 +63,12 @@ def lifted_flats(found: Mapping[int, Sequence[Rows]], everywhere: bool = True) -
         spent += len(found[p]) * len(found[q])
         if spent > _MOST_PAIRS:
             break
+        count(15 * len(found[p]) * len(found[q]))
         for one, other in product(found[p], found[q]):
             lifted = _lifted_rows(one, p, other, q)
             if lifted is None or lifted in done:
                 continue
+            count(15 * len(sets))
             at = tuple(r for r in sorted(sets) if residues(lifted, r) in sets[r])
             height = max((max(abs(int(x.p)), int(x.q)) for row in lifted for x in row), default=0)
             missing = sum(r not in at and residues(lifted, r) is not None for r in sets)
@@ -166,14 +169,15 @@ def _factors(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
     return [primitive_part(factor)[1] for factor, _ in ring(names).from_dict(terms).factor()[1]]
 
 
-def _product(forms: Sequence[Sequence[int]], p: int, count: int) -> list[int]:
+def _product(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[int]:
     """The coefficients of the product of polynomials, up to its degree, the first that is not 0 being 1."""
 
     def degree_of(form: Sequence[int]) -> int:
-        return next(d for d in range(100) if len(exponents_up_to(count, d)) == len(form))
+        return next(d for d in range(100) if len(exponents_up_to(variables, d)) == len(form))
 
     top = sum(map(degree_of, forms))
-    row = reduce(lambda a, b: product_of(a, b, count, top, p) or [], forms, [1])
+    count(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variables, top))) * len(forms))
+    row = reduce(lambda a, b: product_of(a, b, variables, top, p) or [], forms, [1])
     scale = pow(next(c for c in row if c), -1, p)
     return [c * scale % p for c in row]
 
@@ -243,6 +247,7 @@ def _relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | 
     size = len(residues)
     rows = [[modulus, *[0] * (size - 1)]]
     rows += [[-r, *(int(i == k) for i in range(1, size))] for k, r in enumerate(residues[1:], 1)]
+    count(20 * size + size**3 * modulus.bit_length() / 500)
     shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest)
     small = (2 * height + 1) ** size << spare <= modulus
@@ -251,9 +256,9 @@ def _relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | 
 
 def _residues(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:
     """The solutions modulo a prime; none where it divides a leading coefficient."""
-    count = len(equations)
+    size = len(equations)
     for k, one in enumerate(equations):
-        highest = tuple(int(one.degrees()[k]) * (i == k) for i in range(count))
+        highest = tuple(int(one.degrees()[k]) * (i == k) for i in range(size))
         if int(one[highest].p) % p == 0:
             return set()
-    return {tuple(map(int, x)) for x in solutions(equations, range(count), [0] * count, GF(p))}
+    return {tuple(map(int, x)) for x in solutions(equations, range(size), [0] * size, GF(p))}

@@ -12,6 +12,7 @@ from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
@@ -44,6 +45,7 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
         pivots.append(min((k for k, d in enumerate(degrees) if d and k not in pivots), key=lambda k: degrees[k]))
     height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
     for _ in range(_TRIES if len(equations) < count else 1):
+        count_work(10 + 20 * sum(map(len, equations)))
         found = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
         if found:
             return rng.choice(found)

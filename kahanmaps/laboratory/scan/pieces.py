@@ -15,6 +15,7 @@ from typing import Any
 from flint import Ordering, nmod_mpoly_ctx
 
 from kahanmaps.algebra.modular_matrices import echelon, null_space, pivots
+from kahanmaps.algebra.work import count as count_work
 from kahanmaps.laboratory.modular_points import Point, exponents_up_to, monomial_tables
 
 Rows = tuple[tuple[int, ...], ...]
@@ -74,6 +75,7 @@ def pieces(
             check()
             if len(rest) < needed:
                 return
+            count_work(10 + len(rest) * (count - dimension) / 100)
             sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
             rows = null_space(sample, count + 1, prime)
             if len(rows) == count - dimension:
@@ -123,6 +125,7 @@ def _hypersurfaces(
             check()
             if len(here) < max(enough, needed):
                 break
+            count_work(size * len(here) / 500)
             chosen = rng.sample(range(len(here)), size - 1 if attempt else enough)
             basis = null_space(table[chosen].tolist(), size, prime)
             if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(enough, needed):
@@ -149,6 +152,7 @@ def _monomials(points: Any, degree: int, prime: int) -> Any:
     import numpy as np
 
     slopes = monomial_tables(points.shape[1], degree)
+    count_work(len(slopes) * (5 + len(points) / 100))
     table = np.ones((len(points), len(slopes)), dtype=np.int64)
     for k, some in enumerate(slopes[1:], 1):
         variable, _, place = some[-1]
@@ -161,6 +165,7 @@ def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[t
     context = nmod_mpoly_ctx.get([f"a{k}" for k in range(count)], modulus=prime, ordering=Ordering.degrevlex)
     terms = {e: c for e, c in zip(exponents_up_to(count, degree), form, strict=True) if c}
     found = []
+    count_work(50 + 5 * len(terms))
     for factor, _ in context.from_dict(terms).factor()[1]:
         values = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
         power = max(map(sum, values))

@@ -99,7 +99,7 @@ class Scan(Printed):
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
     the number of slow members on no component modulo each of them: points over number fields, of a height above
     `height`, or there by chance. `symmetric` are changes of parameters that permute the slow members, by their
-    images. `ended` is "complete", "time" or "interrupted"; `omitted` says what was left out.
+    images. `ended` is "complete", "budget" or "interrupted"; `omitted` says what was left out.
     """
 
     file: SystemFile
@@ -248,7 +248,8 @@ class Scan(Printed):
 
     @property
     def _open(self) -> list[tuple[str, str]]:
-        return [("open", f"there was no time for {', '.join(self.omitted)}")] if self.omitted else []
+        why = "it was interrupted before" if self.ended == "interrupted" else "the budget was spent (--effort) before"
+        return [("open", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

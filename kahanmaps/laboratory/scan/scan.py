@@ -36,10 +36,11 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import processors
+from kahanmaps.time_limit import TimeLimit
 
 Progress = Callable[[str], None]
 
-UNITS = 120e6  # of counted work at effort 1; the kernel that sweeps does about one a processor and microsecond
+UNITS = 240e6  # of counted work at effort 1, most of it that of the kernel, which sweeps on all processors
 MAX_PARAMETERS = 8
 # By the number of parameters the primes modulo which all members are tried: the ones that are wished, then those for
 # families that take their time. A polynomial of degree 3 in one parameter has all its zeros modulo one prime in 6.
@@ -62,12 +63,7 @@ _MORE = 4  # times as many, where hypersurfaces were missed
 _MANY_LINES = (150, 60)
 _PLANES, _OF_PLANES = 24, (19, 23, 29, 31)  # random ones, for what lines do not meet, and the primes
 _PART = 0.3  # of the budget, for all members on their first line
-_UNTIL = (
-    0.6,
-    0.75,
-    0.85,
-    0.9,
-)  # of the budget: when members, conditions, their confirmation and growth are done
+_UNTIL = (0.6, 0.75, 0.85, 0.9)  # of the budget: when members, conditions, their confirmation and growth end
 _ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed: up to 2 parameters, and more
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
@@ -108,7 +104,8 @@ def scan(
         jobs: threads, by default as many as processors; they need numba.
         analysis: the effort of an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
-        progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known.
+        progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known, and so
+            does a TimeLimit.
 
     Returns:
         A `Scan`. Found modulo primes and confirmed at members, which is evidence and no proof.
@@ -156,14 +153,14 @@ def scan(
     most = _PART * budget.units / cost
     run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs}, budget, cost, progress)
     run.take(_plan(len(names), primes, most))
-    known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
+    known, missed = run.components(rng)
     for more in (run.more_lines, run.more_primes):
         if not (missed or run.omitted) and (further := more(known, primes, most)):
             run.take(further)
-            known, missed = conditions(run.sweeps, names, rng, run.until(_UNTIL[1]))
+            known, missed = run.components(rng)
     run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
     before = known
-    known, missed = run.each(
+    known, missed = run.improved(
         before, "confirms component", _UNTIL[2], lambda one, check: _confirmed(one, family, before, rng, check)
     )
     run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
@@ -178,7 +175,7 @@ def scan(
             enough[one.degrees] = growth
         return replace(one, growth=growth)
 
-    known, missed = run.each(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
+    known, missed = run.improved(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
     run.omit(missed, f"the growth on {missed} components")
     kinds = {one.degrees: one.growth.growth for one in reversed(known) if one.growth is not None}
     kinds |= {one.degrees: Growth.UNKNOWN for one in known if one.degrees not in kinds}
@@ -196,19 +193,24 @@ def scan(
             told = analyze(member, eps=step, effort=analysis, seed=family.seed)
             return replace(one, verdict=told.conclusion)
 
-        known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
+        known, missed = run.improved(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     sweeps = tuple(run.sweeps)
     left = tuple(_left(one, known) for one in sweeps)
-    symmetric = tuple(symmetries(sweeps, known, names))
-    ended = "interrupted" if run.is_interrupted else "time" if run.omitted else "complete"
+    symmetric: tuple[tuple[str, ...], ...] = ()
+    try:
+        symmetric = tuple(symmetries(sweeps, known, names))
+    except TimeLimit:
+        run.is_interrupted = True
+        run.omit(1, "changes of parameters that permute the slow members")
+    ended = "interrupted" if run.is_interrupted else "budget" if run.omitted else "complete"
     found = file, names, exact, seed, sweeps[0].generic if sweeps else (), tuple(known)
     return Scan(*found, sweeps, left, symmetric, ended, tuple(run.omitted))
 
 
 @dataclass
 class _Sweeping:
-    """The sweeps of one scan as they are made, the time for it, and what was left out."""
+    """The sweeps of one scan as they are made, the budget for it, and what was left out."""
 
     family: Scanned
     start: str  # of the seeds
@@ -271,7 +273,8 @@ class _Sweeping:
                 self.sweeps.append(one)
             except BadPrime:
                 continue
-            except TimeOver:
+            except (TimeOver, TimeLimit) as end:
+                self.is_interrupted |= isinstance(end, TimeLimit)
                 self.omit(1, f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
                 break
         generic = max((one.generic for one in self.sweeps), default=())
@@ -302,19 +305,35 @@ class _Sweeping:
         totals = accumulate((_size(len(self.family.names), [one]) for one in further), initial=self.total)
         return [one for one, total in zip(further, islice(totals, 1, None), strict=True) if total <= most]
 
-    def each(
+    def each(self, items: Sequence[Any], what: str, part: float, work: Callable[..., Any]) -> list[Any]:
+        """What `work` makes of each within a part of the budget, None where that is spent."""
+        done, check = [], self.until(part)
+        for k, one in enumerate(items):
+            try:
+                self.doing = f"scan: {what} {k + 1} of {len(items)}"
+                check()
+                done.append(work(one, check))
+            except (TimeOver, TimeLimit) as end:
+                self.is_interrupted |= isinstance(end, TimeLimit)
+                done.append(None)
+        return done
+
+    def components(self, rng: random.Random) -> tuple[list[Component], int]:
+        """The components, those with smaller degrees first, and how many sequences of degrees they are missing for."""
+        names, classes = self.family.names, sorted({degrees for one in self.sweeps for degrees in one.classes})
+
+        def of(degrees: Degrees, check: Callable[[], None]) -> list[Component]:
+            return conditions(degrees, self.sweeps, names, rng, check)
+
+        found = self.each(classes, "conditions for sequence of degrees", _UNTIL[1], of)
+        return [one for some in found if some is not None for one in some], found.count(None)
+
+    def improved(
         self, known: Sequence[Component], what: str, part: float, work: Callable[..., Component]
     ) -> tuple[list[Component], int]:
-        """The components with what `work` makes of each in a part of the time, and for how many there was none."""
-        done, missed, check = list(known), 0, self.until(part)
-        for k, one in enumerate(known):
-            try:
-                self.doing = f"scan: {what} {k + 1} of {len(known)}"
-                check()
-                done[k] = work(one, check)
-            except TimeOver:
-                missed += 1
-        return done, missed
+        """The components with what `work` makes of each within a part of the budget, and how many are as before."""
+        found = self.each(known, what, part, work)
+        return [one if new is None else new for one, new in zip(known, found, strict=True)], found.count(None)
 
 
 def _growth(one: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:

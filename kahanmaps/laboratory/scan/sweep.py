@@ -28,7 +28,7 @@ _LINES = (3, 12)  # of a slow member: at least, at most
 
 
 class TimeOver(Exception):
-    """There is no time left for what is being done, or it was interrupted."""
+    """The budget for what is being done is spent, or it was interrupted."""
 
 
 @dataclass(frozen=True)

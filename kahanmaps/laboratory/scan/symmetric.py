@@ -14,6 +14,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.algebra.work import count
 from kahanmaps.laboratory.scan.lift import residues
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
@@ -59,8 +60,10 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
 def _permutes(change: Change, p: int, slow: Mapping[Point, Degrees]) -> bool:
     """Whether all slow members modulo a prime go to such with the same degrees, or to infinity."""
     rows = residues(change, p)
+    count(20)
     for point, degrees in slow.items() if rows is not None else ():
         *image, below = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows or ())
+        count(5)
         if below and slow.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
             return False
     return True

@@ -177,7 +177,9 @@ class _Curve:
         """
         run = self.course(self).steps(_FIRST)[0]
         if not run:
-            raise OrdersUnknown("the budget was spent (--effort), or a curve touches a hypersurface in too high an order")
+            raise OrdersUnknown(
+                "the budget was spent (--effort), or a curve touches a hypersurface in too high an order"
+            )
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
 

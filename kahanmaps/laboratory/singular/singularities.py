@@ -60,6 +60,7 @@ from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.time_limit import TimeLimit
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
@@ -178,9 +179,10 @@ def singularities(
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
     modulo two random primes; "not confined" means within so many steps. Stops when the budget is spent, which doubles
-    with each more of `effort`. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of
-    steps, and an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the
-    budget. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    with each more of `effort`, and at a TimeLimit, which ends a stage of something else, where `effort` is a Budget, as
+    a whole. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or
+    coefficients of more than 10,000 digits, or so long that writing formulas would exceed the budget.
+    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -240,12 +242,22 @@ def singularities(
             return run
     tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
     found: list[Hypersurface] = []
+    is_cut = False
     for one in every:
-        if limits.is_over:
-            return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), True, False, True)
-        text = name_of(one.form, map_)
-        progress(f"following {text[:40]}")
-        found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
+        is_cut = limits.is_over
+        try:
+            if is_cut:
+                break
+            text = name_of(one.form, map_)
+            progress(f"following {text[:40]}")
+            found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
+        except TimeLimit:
+            if isinstance(effort, Budget):  # a stage of something else, which ends, too
+                raise
+            is_cut = True
+            break
+    if is_cut:
+        return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), True, False, True)
     if critical_degree is None:
         progress("following critical points")
         too_large = "the hypersurfaces that this map contracts are too large to be written down"

@@ -116,9 +116,12 @@ class Family:
         return found
 
     def units(self, degrees: Sequence[int]) -> float:
-        """The work for one member whose iterates, from the 0th on, have these degrees, in units (algebra/work.py)."""
-        lengths = [self.dim * self.degree * d + 1 for d in degrees[:-1]]
-        return float(sum((len(self.terms) + self.dim**3) * length**2 for length in lengths)) / 2000
+        """The work for one member whose iterates, from the 0th on, have these degrees, in units (algebra/work.py).
+
+        Fitted to the compiled kernel, in dimensions 2 to 5; the other one counts as much and takes longer.
+        """
+        lengths = (self.dim * self.degree * d + 1 for d in degrees[:-1])
+        return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)
 
     def coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
         """The coefficients of the equation, an array (members, 2, places)."""
