@@ -171,7 +171,7 @@ def test_two_eps_that_differ_leave_the_patterns_open():
     runs = [singularities(planar("1", "x*y"), eps, steps=80) for eps in ("1/7", "2/7")]
     assert patterns_of(runs).running == "the singularities at two values of eps differ (--eps)"
     assert patterns_of(runs[:1]).running == ""
-    assert "was over" in patterns_of([replace(runs[0], stopped=True)]).running
+    assert "was spent" in patterns_of([replace(runs[0], stopped=True)]).running
     assert "not dominant" in patterns_of([replace(runs[0], is_dominant=False)]).running
 
 
