@@ -45,7 +45,7 @@ def counted_product(left: Any, right: Any) -> Any:
     if isinstance(left, nmod_poly):
         count(product_units(len(left), len(right)))
     elif isinstance(left, fmpq_mpoly | nmod_mpoly):
-        count(1 + len(left) * len(right) / 20)
+        count(1 + len(left) * len(right) / 100)
     return left * right
 
 

@@ -23,7 +23,7 @@ from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.defaults import budget_for
@@ -208,6 +208,7 @@ def singularities(
         if is_long(over):
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(over)
+        count(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: map by map, or hypersurfaces are told by random points
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)

@@ -178,9 +178,11 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
     multiply(denominator, n + 1)
     rows = []
     for numerator in numerators:
+        count(10 * (len(numerator) + len(denominator)))
         common = numerator.gcd(denominator)
         P, Q = numerator / common, denominator / common
-        row = [Q * P.derivative(j) - P * Q.derivative(j) for j in range(n)]
+        row = [counted_product(Q, P.derivative(j)) - counted_product(P, Q.derivative(j)) for j in range(n)]
+        count(sum(map(len, row)))
         content = reduce(lambda left, right: left.gcd(right), row)
         multiply(Q, -2)
         multiply(content, 1)
