@@ -274,13 +274,14 @@ def decimal_text(value: Fraction, digits: int = 6) -> str:
 
 def _within(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[OrbitPoint, int]]:
     """The points at multiples of `every` with their heights, until the budget is spent, which is charged by these."""
-    bits = 0
+    bits = rise = 0
     for point in orbit:
         if point.step % every == 0:
-            bits = height_of(point)
+            before, bits = bits, height_of(point)
+            rise = max(0, bits - before)
             yield point, bits
-        # Where relations hold along the orbit a step takes a third of this, and where heights multiply three times it.
-        count(20 + len(orbit.start) ** 2 * bits / 50)
+        # Steps that multiply heights need gcds of longer numbers than those along which relations hold.
+        count(20 + len(orbit.start) ** 2 * (bits / 100 + rise / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()
 
