@@ -37,7 +37,7 @@ from __future__ import annotations
 
 import decimal
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -208,10 +208,10 @@ def height_growth(
 
     It is interrupted after the step in flight when the `budget` is spent.
 
-    With a `normal_form` (family.system_normal_form) the orbit is walked in normal form, and
-    for large `every` its points are reached directly; the numbers are the same. Then every height costs a gcd of
-    large numbers, which for long orbits is most of the work: three planes take about 0.2 s for 100 steps, 2 s for 200
-    and 8 s for 300, but 0.8 s with `every` = 15, which tells nearly as much.
+    With a `normal_form` (family.system_normal_form) the orbit is walked in normal form, and for large `every` its
+    points are reached directly; the numbers are the same. Then every height costs a gcd of large numbers, which for
+    long orbits is most of the work: three planes take about 0.2 s for 100 steps, 2 s for 200 and 8 s for 300, but
+    0.8 s with `every` = 15, which tells nearly as much.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -258,6 +258,8 @@ def height_growth(
         heights = [bits for _, bits in _within(orbit, every, budget)]
         assert orbit.end is not None
         end = orbit.end
+    if end.status == "interrupted":
+        end = replace(end, message=f"the budget was spent after step {end.steps} (--effort)")
     return HeightGrowth(tuple(heights), end, every, method)
 
 

@@ -16,15 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planar_helpers import over_members, side_by_side, structure_and_system
 
+from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, decimal_text, height, height_growth
+from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.maps.normal_form.planes_point import NormalSteps
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.time_limit import TimeLimit
 
 START = ["1/2", "1/3", "-1/5", "2/7", "3/4", "-2/3"]
 P, B, LOG, LIN, Q, E, U = (
@@ -225,3 +228,35 @@ def test_few_heights_decide_nothing(heights):
     assert found.kind is U
     assert found.constant is None
     assert "expected 9 or more" in found.reason
+
+
+def test_a_budget_that_is_spent_ends_an_orbit_and_a_survey_and_says_so():
+    top = load("euler_top").system
+    whole = height_survey(top, "1/10", starts=3, steps=20)
+    assert (whole.is_whole, "early" in whole.text) == (True, False)
+    before = counted()
+    height_survey(top, "1/10", starts=1, steps=20)
+    one = counted() - before
+    found = height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1.5 * one))
+    assert (found.is_whole, len(found.orbits)) == (False, 2)
+    assert found.orbits[0] == whole.orbits[0]
+    cut = found.orbits[1].growth
+    assert cut.end.message == f"the budget was spent after step {cut.end.steps} (--effort)"
+    assert cut.heights == whole.orbits[1].growth.heights[: len(cut.heights)]
+    assert 9 < len(cut.heights) < 21
+    assert found.text.endswith("; the survey ended early (--effort)")
+
+
+def test_a_time_limit_leaves_the_orbits_that_were_finished():
+    top, told = load("euler_top").system, []
+
+    def stop(sentence):
+        told.append(sentence)
+        if len(told) == 3:
+            raise TimeLimit
+
+    found = height_survey(top, "1/10", starts=3, steps=20, progress=stop)
+    assert (found.is_whole, found.orbits) == (False, height_survey(top, "1/10", starts=3, steps=20).orbits[:2])
+    told.clear()
+    with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
+        height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1e9), progress=stop)

@@ -140,6 +140,10 @@ def test_the_budget_and_the_degree_are_limits():
     assert (found.ended, found.degrees, found.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
     assert found.message == "the budget was spent at iterate 8 (--effort)"
     assert found.to_json() == degree_growth(henon_heiles, effort=Budget(100_000)).to_json()
+    known = degree_growth(load("lotka_volterra").system).patterns
+    found = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
+    assert (found.ended, found.enclosure) == ("explained", None)
+    assert found.notes == ("the budget was spent before bounds of the dynamical degree were proved (--effort)",)
     found = degree_growth(load("riccati").system, effort=Budget(20_000), max_terms=10_000)
     assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)
     found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
@@ -159,6 +163,14 @@ def test_a_time_limit_keeps_the_degrees_that_were_measured():
     assert (found.ended, found.degrees) == ("stopped", (1, 3, 7, 17, 39))
     assert found.message == "the time limit of 1 s is over at iterate 5"
     assert len(found.to_json()["lines"]) == 2
+    whole = degree_growth(load("lotka_volterra").system)
+
+    def stop_later(sentence):
+        if sentence.startswith("dynamical degree"):
+            raise TimeLimit("the time limit of 1 s is over")
+
+    found = degree_growth(load("lotka_volterra").system, progress=stop_later)
+    assert found == replace(whole, enclosure=None, message=f"{whole.message}; the time limit of 1 s is over")
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         degree_growth(load("henon_heiles").system, effort=Budget(1e9), progress=stop)
 

@@ -314,6 +314,8 @@ def degree_growth(
     except TimeLimit as end:
         if isinstance(effort, Budget):
             raise
+        if search.measured is not None:  # the bounds of the dynamical degree alone were cut
+            return replace(search.measured, message=f"{search.measured.message}; {end}")
         return search.result(Ended.STOPPED, f"{end} at iterate {len(search.degrees)}")
 
 
@@ -332,6 +334,7 @@ class _Search:
     notes: list[str] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     replaced: int = 0
+    measured: DegreeGrowth | None = None  # all but the bounds of the dynamical degree
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
         """Step after step until something ends it."""
@@ -390,9 +393,12 @@ class _Search:
             found = replace(found, proof=linear_iterate(self.map, self.eps, period))
         if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
             return found
-        return replace(
-            found, enclosure=enclose(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
-        )
+        self.measured = found
+        enclosure = enclose(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
+        if enclosure is None and self.map.dim == 2 and self.budget.is_spent:
+            unproved = "the budget was spent before bounds of the dynamical degree were proved (--effort)"
+            return replace(found, notes=(*found.notes, unproved))
+        return replace(found, enclosure=enclosure)
 
     def result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
         primes, residues = tuple(line.prime for line in self.lines), tuple(line.eps for line in self.lines)

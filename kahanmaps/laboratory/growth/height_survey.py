@@ -87,22 +87,22 @@ class HeightSurvey(Printed):
 
     @property
     def text(self) -> str:
-        """One sentence: the kind, and how many orbits say so; or where they disagree."""
-        total = len(self.orbits)
+        """One sentence: the kind, and how many orbits say so; or where they disagree; and that it was cut, if so."""
+        total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early (--effort)"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
             # Each eps may have a kind of its own, the same for all its starts.
             known = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
             which = "the eps" if len(known) == len({value for value, _ in known}) else "the starts"
-            return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)})"
+            return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)}){cut}"
         decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
-            return f"heights of exact orbits are undecided: {decided} of {counted(total, 'orbit')} decided"
+            return f"heights of exact orbits are undecided: {decided} of {counted(total, 'orbit')} decided{cut}"
         eps = {orbit.eps for orbit in self.orbits}
         many = f"{decided} of {total}" if decided < total else f"all {total}" if total > 1 else "the"
         at = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
         of = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
-        return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}"
+        return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}{cut}"
 
     def rows(self) -> list[dict[str, str]]:
         """A row for each orbit, for `pandas.DataFrame(found.rows())` and the like."""
@@ -160,24 +160,24 @@ def height_survey(
         for k, start in enumerate(wanted):
             if orbits and budget.is_spent:
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
-            progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
-            for _ in range(_DRAWS if start is None else 1):
-                # Off the invariant curves of small equation that many maps have, such as eps^2 x^2 = 1: numerators are
-                # primes, so that a coordinate is no simple multiple of 1/eps.
-                candidate = start or tuple(
-                    fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS))
-                    for _ in range(map_.dim)
-                )
-                try:
+            try:
+                progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
+                for _ in range(_DRAWS if start is None else 1):
+                    # Off the invariant curves of small equation that many maps have, such as eps^2 x^2 = 1: numerators
+                    # are primes, so that a coordinate is no simple multiple of 1/eps.
+                    candidate = start or tuple(
+                        fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS))
+                        for _ in range(map_.dim)
+                    )
                     found = height_growth(
                         over, candidate, steps, normal_form=normal_form, max_digits=max_digits, budget=budget
                     )
-                except TimeLimit:
-                    if is_stage or not orbits:
-                        raise
-                    return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
-                if found.end.status != "singular" or budget.is_spent:
-                    break
+                    if found.end.status != "singular" or budget.is_spent:
+                        break
+            except TimeLimit:
+                if is_stage or not orbits:
+                    raise
+                return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))
             if found.end.status == "interrupted":
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
