@@ -43,8 +43,8 @@ class Census(Printed):
     `lengths` is the number of cycles by length if all points were looked at (`complete`), else the number of sampled
     points that came back, by the step at which they did. A point is `indeterminate` where the map is not defined,
     `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
-    it, and `open` if none of this was seen in `steps` steps (samples only). Where the clock `stopped` the work before
-    the images of all points were known, no point counts as looked at.
+    it, and `open` if none of this was seen in `steps` steps (samples only). Where a time limit `stopped` the work
+    before the images of all points were known, no point counts as looked at.
     """
 
     prime: int

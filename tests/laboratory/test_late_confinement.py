@@ -25,8 +25,8 @@ from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import (
+    BUDGET_SPENT,
     CONFINED,
-    NO_TIME,
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
@@ -269,7 +269,7 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
         limits = Range(4, 4, 4, Budget(units), 4)
         found = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)
         if units == 0:
-            assert (found.status, found.note) == (UNDECIDED, NO_TIME)
+            assert (found.status, found.note) == (UNDECIDED, BUDGET_SPENT)
             continue
         assert (found.status, found.degree, len(set(found.primes))) == (NOT_CONTRACTED, 2, 2)
         assert [(step.common, step.rank) for step in found.steps] == [(0, 2)] * 4

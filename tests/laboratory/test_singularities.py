@@ -17,7 +17,7 @@ from kahanmaps.laboratory.singular.jets import (
     image_of,
     images_of_curve,
 )
-from kahanmaps.laboratory.singular.outcomes import NO_TIME, NOT_CONFINED, critical_points
+from kahanmaps.laboratory.singular.outcomes import BUDGET_SPENT, NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
@@ -104,7 +104,7 @@ def test_a_budget_that_is_spent_stops_it():
     assert run.stopped
     assert run.verdict == "undecided"
     assert run.hypersurfaces[0] == whole.hypersurfaces[0]
-    assert run.hypersurfaces[-1].note == NO_TIME
+    assert run.hypersurfaces[-1].note == BUDGET_SPENT
 
 
 def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():

@@ -117,7 +117,8 @@ class Line:
     def _by_minors(self, equation: Equation) -> list[nmod_poly]:
         def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
             self._require_budget()
-            return counted_product(left, right)
+            product: nmod_poly = counted_product(left, right)
+            return product
 
         *above, below = equation.image(self._X, nmod_poly([0], self.prime), times)
         if below.is_zero():

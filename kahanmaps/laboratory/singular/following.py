@@ -213,7 +213,7 @@ class Course:
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
-        """So many steps along series as long as needed, and whether these are all: time or precision may end it.
+        """So many steps along series as long as needed, and whether these are all: the budget or precision may end it.
 
         With tangents nothing is tracked.
         """

@@ -144,7 +144,7 @@ class SingularityOutcome(StrEnum):
 
 CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = SingularityOutcome
 NO_POINT = "no point was followed"
-NO_TIME = "the budget was spent before two points were followed (--effort)"
+BUDGET_SPENT = "the budget was spent before two points were followed (--effort)"
 POINTS_DIFFER = "the orders along two curves through it modulo different primes are not the same (another --seed)"
 
 
@@ -272,7 +272,7 @@ def outcome_of(
     followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
     outcomes: dict[int, Hypersurface] = {}  # by the primes
-    found, note = _UNKNOWN, NO_TIME
+    found, note = _UNKNOWN, BUDGET_SPENT
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.is_over:
             break
@@ -296,7 +296,7 @@ def outcome_of(
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            note = NO_TIME if limits.is_over else "the series lost all their terms"
+            note = BUDGET_SPENT if limits.is_over else "the series lost all their terms"
             break
     if len(outcomes) == _POINTS:
         first, second = outcomes.values()
@@ -306,11 +306,11 @@ def outcome_of(
 
 
 def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
-    """The outcome at two points, with a note where it is not the same: if the time `is_over`, it may have ended one."""
+    """The outcome at two points, with a note where it is not the same: a budget that `is_over` may have ended one."""
     first, second = ((each.status, each.contracted_at, each.confined_at, each.orders.known) for each in (one, other))
     if first == second:
         return one, ""
-    return Hypersurface(steps=one.steps), NO_TIME if is_over else POINTS_DIFFER
+    return Hypersurface(steps=one.steps), BUDGET_SPENT if is_over else POINTS_DIFFER
 
 
 def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:

@@ -91,8 +91,8 @@ def followed_map_by_map(
 ) -> tuple[Word, list[Hypersurface]] | None:
     """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
 
-    Steps and limits are those of single maps, but the first steps those of the word. Without those that there was no
-    time for; None where those of a map are too large.
+    Steps and limits are those of single maps, but the first steps those of the word. Without those that the
+    budget left out; None where those of a map are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)

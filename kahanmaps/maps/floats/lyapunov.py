@@ -48,7 +48,7 @@ class Lyapunov:
     the first half of the steps, shows how far they have converged. `log_volume` is the mean of log |det dPhi| per unit
     of time, computed apart, which the exponents add up to. `ended` counts the orbits that left the range of floats or
     met a pole; they are in no average. `steps` are those counted, after `transient` steps that were not; fewer than
-    requested if `stopped` by the clock.
+    requested if `stopped` by a time limit.
     """
 
     unit: float
