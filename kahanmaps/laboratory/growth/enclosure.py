@@ -34,7 +34,7 @@ from flint import arb, fmpq, fmpq_mpoly, nmod_mat, nmod_poly
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.printing import attributes
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
@@ -241,6 +241,7 @@ def _written_degrees(map_: BirationalMap, eps: fmpq | None, budget: Budget) -> I
     iterate = list(X)
     for _ in range(_MOST_WRITTEN):
         image = [entry.compose(*iterate, symbol, ctx=ring) for entry in forms]
+        count(20 + 10 * sum(map(len, image)))  # with their gcd
         common = reduce(fmpq_mpoly.gcd, image)
         iterate = [entry / common for entry in image]
         yield max(degree_in(entry, 3) for entry in iterate)

@@ -21,6 +21,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomial_work import counted_product, factored
 from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget, count
@@ -529,7 +530,7 @@ def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[
         rows = [[*row, row[0] * 0] for row in map_.matrix]
     except TooLarge:
         return None
-    return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
+    return [(format_polynomial(factor), power) for factor, power in factored(kernel_minors(rows, counted_product)[-1])]
 
 
 def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, ...]:
