@@ -16,7 +16,17 @@ from typing import Any
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.experiments.grid import AxisValues, Grid, RationalRange, has_repeats, read_values
-from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, read_memory, read_time
+from kahanmaps.experiments.options import (
+    EFFORT,
+    FAMILY,
+    OTHER,
+    VOCABULARY,
+    Option,
+    exact,
+    number_of,
+    read_memory,
+    read_time,
+)
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
 from kahanmaps.experiments.results.recipes import ENDINGS, family_recipe, find_file, recipe_of
 from kahanmaps.experiments.results.records import Task, TaskLimits, canonical
@@ -323,6 +333,11 @@ class ExperimentReader:
             options |= FAMILY | {"seed": VOCABULARY["seed"]}
         if name in options:
             return options[name]
+        if name == "seconds":  # which it was called up to 0.2, and on which answers depended
+            instead = (
+                f"{EFFORT} = 1, where each more doubles the work" if EFFORT in options else 'limits = {time = "60 s"}'
+            )
+            raise InputError(f"{kind.name} has no such option any more, expected {instead}")
         names = [*options, *([TIME_STEP] if "eps" in options else [])]
         expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")

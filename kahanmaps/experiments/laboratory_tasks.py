@@ -1,9 +1,9 @@
 """The tasks of the laboratory: what a map preserves and how it grows, and what is seen of it from outside.
 
 As in tasks.py results are small, words and numbers to group by; `report = true` keeps all that was found. Without eps
-an analysis is for every eps. A time budget (`seconds`) may cut a result short: it belongs to the key, and "status" says
-what is open. The verdict is that of the formulas that were found; growth and numbers of integrals are measured, and
-have words of their own. Singularities, cycles and exponents are all measured: they have no verdict.
+an analysis is for every eps. The effort bounds its work, and so belongs to the key; "status" says what is open. The
+verdict is that of the formulas that were found; growth and numbers of integrals are measured, and have words of their
+own. Singularities, cycles and exponents are all measured: they have no verdict.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are 
 
 
 @analysis(
-    "degrees", "growth.degrees:degree_growth", of="map", eps=None, terms=None, max_degree=20_000, seconds=10, seed=0
+    "degrees", "growth.degrees:degree_growth", of="map", eps=None, terms=None, max_degree=20_000, effort=1, seed=0
 )
 def degrees(found: DegreeGrowth) -> Result:
     """The degrees of the iterates: the kind of growth, the dynamical degree, a recurrence."""
@@ -58,14 +58,14 @@ def scan_parameters(
     by: str = "degrees",  # nothing else any more; it stays for the keys of earlier databases
     terms: int | None = None,
     primes: list[int] | None = None,
-    seconds: int = 120,
+    effort: int = 1,
     seed: int = 0,
 ) -> Whole:
     """The conditions on parameters under which degrees are smaller, with the growth there; the others have values."""
     from kahanmaps.laboratory.scan.result import growth_on
     from kahanmaps.laboratory.scan.scan import scan
 
-    found = scan(system, over, eps=eps, terms=terms, primes=primes, seconds=seconds, seed=seed, jobs=1)
+    found = scan(system, over, eps=eps, terms=terms, primes=primes, effort=effort, seed=seed, jobs=1)
     kinds = [(str(growth.growth), some) for _, some in found.classes if (growth := growth_on(some)) is not None]
     return {
         "status": found.ended,
@@ -79,7 +79,7 @@ def scan_parameters(
 
 
 @analysis(
-    "find-integrals", "preserve.integrals:find_integrals", eps=None, symbolic=None, max_degree=None, seconds=60, seed=0
+    "find-integrals", "preserve.integrals:find_integrals", eps=None, symbolic=None, max_degree=None, effort=1, seed=0
 )
 def integrals(found: IntegralSearch) -> Result:
     """Integrals in closed form with their verdict, and how many there are at least, by theorems and by orbits."""
@@ -96,7 +96,7 @@ def integrals(found: IntegralSearch) -> Result:
 
 
 @analysis(
-    "find-density", "preserve.densities:find_densities", eps=None, symbolic=None, max_degree=None, seconds=30, seed=0
+    "find-density", "preserve.densities:find_densities", eps=None, symbolic=None, max_degree=None, effort=1, seed=0
 )
 def density(found: DensitySearch) -> Result:
     """The densities phi of least degree, or a product of powers, for which the measure dx/phi is invariant."""
@@ -118,7 +118,7 @@ def density(found: DensitySearch) -> Result:
     eps=None,
     symbolic=None,
     max_degree=None,
-    seconds=30,
+    effort=1,
     seed=0,
 )
 def poisson(found: PoissonSearch) -> Result:
@@ -136,7 +136,7 @@ def poisson(found: PoissonSearch) -> Result:
     }
 
 
-@analysis("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", seconds=30)
+@analysis("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", effort=1)
 def symmetry(found: Symmetries) -> Result:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
     return {
@@ -157,7 +157,7 @@ def symmetry(found: Symmetries) -> Result:
     "symmetry.commuting:commuting_systems",
     of="system",
     shape="linear",
-    seconds=60,
+    effort=1,
     seed=0,
     error_bits=DEFAULT_ERROR_BITS,
 )
@@ -177,13 +177,13 @@ def commuting(found: CommutingSystems) -> Result:
     }
 
 
-@analysis("analyze", "analysis:analyze", eps=None, symbolic=None, seconds=None, seed=0)
+@analysis("analyze", "analysis:analyze", eps=None, symbolic=None, effort=1, seed=0)
 def all_analyses(found: Analysis) -> Result:
     """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
     final, confined = found.conclusion, {run.verdict for run in found.singularities}
-    # The parts that were begun and did not come to their end, be it for want of time or of formulas.
+    # The parts that were begun and did not come to their end, be it for want of budget or of formulas.
     states = {
         "degrees": found.degrees is None or found.degrees.recurrence is not None or found.degrees.ended in _ENDINGS,
         "integrals": found.integrals is None or _state_of_integrals(found.integrals) == "complete",
@@ -215,7 +215,7 @@ def confinement(
     system: SystemFile,
     eps: Any = None,
     steps: int | None = None,
-    seconds: int = 60,
+    effort: int = 1,
     seed: int = 0,
     report: bool = False,
 ) -> Result:
@@ -224,12 +224,12 @@ def confinement(
     from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 
     values = default_eps(system.map, seed) if eps is None else (eps,)
-    runs = [singularities(system.map, value, steps=steps, seed=seed, seconds=seconds) for value in values]
+    runs = [singularities(system.map, value, steps=steps, seed=seed, effort=effort) for value in values]
     agree = len({run.shape for run in runs}) == 1
     first = runs[0]
     result: Result = {
         "confinement": first.verdict if agree else UNDECIDED,
-        "status": "time" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
+        "status": "budget" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
         "followed": first.followed,  # for so many steps, where something is not confined
         **fields(first, "map_degree", "critical_degree"),
@@ -257,7 +257,6 @@ def cycles(
     eps: Any = None,
     samples: int | None = None,
     steps: int | None = None,
-    seconds: int | None = None,
     seed: int = 0,
     report: bool = False,
 ) -> Result:
@@ -268,11 +267,9 @@ def cycles(
         raise InputError(f"found steps = {steps} without samples, expected both: only samples have a last step")
     values = (1,) if not system.map.has_eps else default_eps(prime) if eps is None else (eps,)
     limits: dict[str, Any] = {"samples": samples, "steps": steps or DEFAULT_STEPS, "seed": seed}
-    limits["seconds"] = None if seconds is None else seconds / len(values)
     runs = [cycle_census(system.map, value, prime, **limits) for value in values]
-    stopped, whole = any(census.stopped for census in runs), all(census.complete for census in runs)
     return {
-        "status": "time" if stopped else "complete" if whole else "sampled",
+        "status": "complete" if all(census.complete for census in runs) else "sampled",
         "points": str(runs[0].points),  # may be longer than integers of databases
         "longest": max(census.longest for census in runs),
         "runs": [
@@ -295,7 +292,6 @@ def lyapunov(
     box: Any = "1",
     steps: int = 10_000,
     transient: int | None = None,
-    seconds: int = 60,
     seed: int = 0,
 ) -> Result:
     """Lyapunov exponents of float orbits from random starts, by the exact tangent map, per unit of time."""
@@ -305,10 +301,10 @@ def lyapunov(
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     skipped = steps // 10 if transient is None else transient
-    found = lyapunov_exponents(system.map, starts, eps, steps, transient=skipped, seconds=seconds)
+    found = lyapunov_exponents(system.map, starts, eps, steps, transient=skipped)
     mean, volume = found.mean, found.log_volume
     return {
-        "status": "time" if found.stopped else "completed" if len(found.exponents) else "no orbit left",
+        "status": "completed" if len(found.exponents) else "no orbit left",
         "ended": found.ended,
         "counted": found.steps,
         "largest": _number(mean[0]),

@@ -17,6 +17,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import GF, RR, rational
 from kahanmaps.algebra.parsing import parse_number, parse_point
 from kahanmaps.algebra.printing import format_number, format_point, format_univariate
+from kahanmaps.algebra.work import LEAST_EFFORT, MOST_EFFORT
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.draw import MAX_M, parse_chi
 
@@ -210,6 +211,7 @@ def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fract
     return amount
 
 
+EFFORT = "effort"
 OTHER = "other"  # read by the spec, which knows where files are; canonical is a recipe like that of the system
 
 VOCABULARY = {
@@ -241,7 +243,7 @@ VOCABULARY = {
         flag("controls", "run every claim on input that breaks one hypothesis"),
         flag("report", "keep the whole report, as --json prints it"),
         whole("m", "half the dimension", 1, 16),
-        whole("seconds", "time after which an analysis stops, and says what is open", 1, 10**6),
+        whole(EFFORT, "how much work: each more doubles it, each less halves it", LEAST_EFFORT, MOST_EFFORT),
         whole("terms", "measure so many degrees (default: until a recurrence is certain)", 1, 10_000),
         whole("max_degree", "the largest degree that is tried", most=10**6),
         Option("symbolic", "parameters that formulas contain, e.g. a1,a2", _read_names, lambda text: text.split(",")),

@@ -8,7 +8,7 @@ The names of the parameters are names of `options.VOCABULARY`; a default makes a
 it is there, is the system. A result is plain data; "verdict" in it becomes the verdict of the record. What a function
 of the laboratory finds, with these options and these defaults, is a task that only says what is kept of it:
 
-    @analysis("find-density", "preserve.densities:find_densities", eps=None, seconds=30, seed=0)
+    @analysis("find-density", "preserve.densities:find_densities", eps=None, effort=1, seed=0)
     def density(found: DensitySearch) -> Result:
         '''The densities phi for which the measure dx/phi is invariant.'''
 
