@@ -11,6 +11,7 @@ from .algebra.interpolation import reconstruct as reconstruct
 from .algebra.parsing import parse_point as parse_point
 from .algebra.parsing import parse_polynomial as parse_polynomial
 from .algebra.parsing import parse_rational_function as parse_rational_function
+from .algebra.work import Budget as Budget
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report
 from .checks.claims import Verdict as Verdict
@@ -130,6 +131,8 @@ from .reports.report import write_report as write_report
 from .systems.hamiltonian import CubicHamiltonian as CubicHamiltonian
 from .systems.hamiltonian import standard_structure as standard_structure
 from .systems.quadratic import QuadraticSystem as QuadraticSystem
+from .time_limit import TimeLimit as TimeLimit
+from .time_limit import time_limit as time_limit
 from .version import __version__ as __version__
 
 # The names of commands, see _COMMANDS in __init__.py.

@@ -19,6 +19,9 @@ from .algebra.printing import plain as plain
 from .algebra.roots import AlgebraicPoint as AlgebraicPoint
 from .algebra.roots import parse_algebraic_point as parse_algebraic_point
 from .algebra.roots import parse_root as parse_root
+from .algebra.work import LEAST_EFFORT as LEAST_EFFORT
+from .algebra.work import MOST_EFFORT as MOST_EFFORT
+from .algebra.work import Budget as Budget
 from .checks.claims import Evidence as Evidence
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report
@@ -101,7 +104,7 @@ from .laboratory.cycles import Census as Census
 from .laboratory.cycles import cycle_census as cycle_census
 from .laboratory.cycles import default_eps as default_eps
 from .laboratory.defaults import ITERATE_DEGREE as ITERATE_DEGREE
-from .laboratory.defaults import SECONDS as SECONDS
+from .laboratory.defaults import budget_for as budget_for
 from .laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
 from .laboratory.growth.degrees import degree_growth as degree_growth
 from .laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS
@@ -210,6 +213,8 @@ from .reports.report import report_html as report_html
 from .sources import source as source
 from .systems.quadratic import MAX_DIMENSION as MAX_DIMENSION
 from .systems.quadratic import QuadraticSystem as QuadraticSystem
+from .time_limit import TimeLimit as TimeLimit
+from .time_limit import time_limit as time_limit
 from .version import __version__ as __version__
 from .whole_files import resolved as resolved
 from .whole_files import whole_file as whole_file

@@ -16,7 +16,7 @@ def script() -> None:
     fish = km.System({"q": "p", "p": "a*q^2 - q"}, a=Fraction(1, 2))
     growth: km.DegreeGrowth = km.degrees("euler_top", max_terms=4)
     print(growth.growth_text, km.degrees(top, eps="1/10").rows(), km.degrees(Path("mine.toml"), time_step="1/5"))
-    found: km.IntegralSearch = km.find_integrals("x' = y; y' = 6*x^2 - 2", seconds=5)
+    found: km.IntegralSearch = km.find_integrals("x' = y; y' = 6*x^2 - 2", effort=1)
     print([one.text for one in found.integrals], km.find_density(fish).densities[0].text)
     report: km.Report = km.check_commute("euler_top", top, eps="1/10")
     print(report.verdict is km.Verdict.PROVED, km.check_measure("euler_top", eps="1/10").holds)
@@ -31,7 +31,7 @@ def script() -> None:
     member = km.draw_with_eigenvalues([2, -3], seed=1)
     print(km.check_commute(member.associate([1, 1]), member.associate([1, -1])).verdict, km.degrees(member).degrees)
     print(
-        km.heights(top.map, "1/10", seconds=1).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence
+        km.heights(top.map, "1/10", effort=0).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence
     )
 
     km.degrees(3)  # type: ignore[arg-type]

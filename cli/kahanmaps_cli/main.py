@@ -17,6 +17,7 @@ import click
 
 from kahanmaps.checks.table import CHECKS
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
+from kahanmaps.time_limit import TimeLimit
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
 from kahanmaps_cli.screen.progress import as_typed, say
@@ -190,9 +191,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         in_our_words(error).show(shown)
         say(bounded(shown.getvalue().removesuffix("\n")))
         return WRONG_USE
-    except (click.Abort, KeyboardInterrupt):
-        say("interrupted")
-        return INTERRUPTED
+    except (click.Abort, KeyboardInterrupt) as stop:  # click makes Abort of the other
+        return _interrupted(stop.__cause__ or stop)
     except SystemExit as stop:  # click ends a completion with 0, and with 1 where nobody reads a pipe any longer
         return UNDECIDED if stop.code else HOLDS
     except BrokenPipeError:
@@ -203,11 +203,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         while cause is not None and not isinstance(cause, KeyboardInterrupt):
             cause = cause.__cause__ or cause.__context__
         if cause is not None:
-            say("interrupted")
-            return INTERRUPTED
+            return _interrupted(cause)
         return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
     finally:
         leave_nothing_to_flush()
+
+
+def _interrupted(stop: BaseException) -> int:
+    is_over = isinstance(stop, TimeLimit)  # --seconds, at the very end of a search: elsewhere it says what was cut
+    say(f"stopped: {stop} (--seconds)" if is_over else "interrupted")
+    return UNDECIDED if is_over else INTERRUPTED
 
 
 def _report(error: Exception) -> int:

@@ -141,11 +141,22 @@ def integral_option(help_text: str, flag: str = "--integral", into: str = "integ
     )
 
 
-def seconds_option(default: float | None, help_text: str) -> Callable[[F], F]:
-    """--seconds T; None where the default depends on the system, and `help_text` says how."""
-    return click.option(
-        "--seconds", type=Seconds(), metavar="T", default=default, show_default=default is not None, help=help_text
-    )
+seconds_option: Callable[[F], F] = click.option(
+    "--seconds", type=Seconds(), metavar="T", help="Stop after T seconds, whatever is being done (default: never)."
+)
+
+# How long a search may be: by work, on which its answer depends, and by the clock, which may cut the answer short.
+effort_options: Callable[[F], F] = stack(
+    click.option(
+        "--effort",
+        type=click.IntRange(lib.LEAST_EFFORT, lib.MOST_EFFORT),
+        metavar="E",
+        default=1,
+        show_default=True,
+        help="How much work: each more doubles it, each less halves it.",
+    ),
+    seconds_option,
+)
 
 
 def error_bits_option(help_text: str) -> Callable[[F], F]:

@@ -49,9 +49,9 @@ class Analysis(Findings, Printed):
         """For `pickle`, which has no names for the functions of the table: there the class says which parts."""
         return {name: value for name, value in vars(self).items() if value is not ANALYSES}
 
-    def interrupt(self) -> None:
-        """Leave out the parts that are pending."""
-        self.skipped += [f"{part}: interrupted" for part in self.pending]
+    def interrupt(self, reason: str = "interrupted") -> None:
+        """Leave out the parts that are pending, for this reason."""
+        self.skipped += [f"{part}: {reason}" for part in self.pending]
         self.pending.clear()
         self.interrupted = True
 

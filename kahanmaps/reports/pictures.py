@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
-from math import inf
 from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
@@ -45,12 +43,11 @@ _CURVE_STEPS = 300
 class Pictures:
     """Draws pictures into a page, or leaves them out: `requested` says whether the reader wants any.
 
-    None is begun after `until`, a value of time.monotonic(): a sentence says so in its place. `note` is a sentence for
-    the page: that matplotlib is missing, and what to do; empty where it is there.
+    `note` is a sentence for the page: that matplotlib is missing, and what to do; empty where it is there.
     """
 
-    def __init__(self, requested: bool = True, until: float = inf) -> None:
-        self.note, self._until = "", until
+    def __init__(self, requested: bool = True) -> None:
+        self.note = ""
         self._requested = requested
         if requested:
             try:
@@ -69,8 +66,6 @@ class Pictures:
         if not self._requested:
             return ""
         try:
-            if time.monotonic() > self._until:
-                raise InputError("the time was over (--seconds)")
             figure = drawing(_STYLE)
             for axes in figure.axes:
                 # What has many points becomes an image within the picture; axes and letters stay lines.

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from importlib import resources
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +51,6 @@ def report_html(
     command: str = "",
     left_out: Sequence[str] = (),
     explore: bool = False,
-    until: float = inf,
 ) -> str:
     """A page about what was found: one HTML text that needs no network, and no JavaScript unless it is to `explore`.
 
@@ -62,9 +60,8 @@ def report_html(
         title: the title (default: the name of the system).
         pictures: whether to draw; without matplotlib the page says that there are none, and how to get them.
         command: the command line that makes the page, to be told in it.
-        left_out: sentences on what does not apply, to be told as notes.
+        left_out: sentences on what is not on the page, to be told as notes.
         explore: for an Analysis, a page on which eps and the start of an orbit are moved by sliders.
-        until: no picture is begun after this value of time.monotonic(); the page says so.
 
     Returns:
         The page, the same text for the same input (and the same versions of the libraries that make it). Formulas are
@@ -81,7 +78,7 @@ def report_html(
     ('<!DOCTYPE html>', 3)
     """
     page_template()  # which says what has to be installed, before pictures are drawn
-    drawn = Pictures(pictures and not explore, until)
+    drawn = Pictures(pictures and not explore)
     script, seed = "", None
     if isinstance(found, Analysis):
         file, seed = found.file, found.seed
@@ -93,7 +90,7 @@ def report_html(
             script = (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
         else:
             lead += f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
-            sections = _analysis_sections(found, drawn)
+            sections = [*_analysis_sections(found, drawn), Section("notes", "Notes", items=left_out)]
     elif explore:
         raise InputError(f"found {type(found).__name__}, expected an Analysis: it is what can be explored")
     else:

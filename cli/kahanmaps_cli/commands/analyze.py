@@ -11,7 +11,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import symbols_and_eps
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import echo, formula, on_terminal, tell
 
@@ -22,7 +22,7 @@ INTERRUPTED = 130
 @opt.system_options
 @opt.eps_options
 @opt.symbolic_option
-@opt.seconds_option(None, "Time for everything (default: 16 to 150 by dimension).")
+@opt.effort_options
 @opt.seed_option
 @click.option("--markdown", is_flag=True, help="The report in Markdown.")
 @opt.output_options
@@ -31,7 +31,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
-      kahanmaps analyze henon_heiles -p c=-6 --seconds 30
+      kahanmaps analyze henon_heiles -p c=-6 --effort 3
       kahanmaps analyze euler_top -p 'a1 = root of t^2 - 2'
       kahanmaps analyze my-system.toml --markdown > report.md
       kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
@@ -53,19 +53,20 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
-    asked = {"symbols": symbols, "eps": eps, **opt.given(options, "seconds", "seed"), "processes": 2}
+    asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
     report = _Report(as_json or markdown)
-    with Progress(quiet) as progress:
-        report.progress = progress
+    with Search({**options, "quiet": quiet}) as search:
+        report.progress = search
         try:
-            lib.analyze(file, **asked, progress=progress, reached=report)
+            lib.analyze(file, **asked, progress=search, reached=report)
         except KeyboardInterrupt:
             if report.found is None:
                 raise
-            report.found.interrupt()
+            report.found.interrupt("stopped (--seconds)" if search.is_over else "interrupted")
     found = report.found
     assert found is not None
+    work = f"effort {found.effort}: {found.units / 1e6:.3g} million units of work"
     if as_json:
         print_json(found.to_json())
     elif markdown:
@@ -75,12 +76,15 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
             lines += [f"## {name}", ""]
             lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
             lines.append("")
-        echo("\n".join(lines))
+        echo("\n".join([*lines, work]))
     else:
         report.tell(found.sections)
         final = found.conclusion
         tell("\nverdict", style="bold")
         tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
+        tell(work)
+    if search.is_over:
+        return 3
     if found.interrupted:
         say("interrupted: the verdict rests on what was found so far")
         return INTERRUPTED
@@ -92,7 +96,7 @@ class _Report:
 
     def __init__(self, is_silent: bool) -> None:
         self.found: lib.Analysis | None = None
-        self.progress: Progress | None = None
+        self.progress: Search | None = None
         self._is_silent, self._told = is_silent, 0
 
     def __call__(self, found: lib.Analysis) -> None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Search
 from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
-
-_STOPPED = "stopped by the clock: give more --seconds, fewer --samples or a smaller prime"
 
 
 @click.command("cycles")
@@ -23,7 +20,7 @@ _STOPPED = "stopped by the clock: give more --seconds, fewer --samples or a smal
 @opt.several_eps_options
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of all points.")
 @click.option("--steps", type=int, metavar="N", help="... for at most N steps (default 10000).")
-@opt.seconds_option(None, "Stop after T seconds (default: no limit).")
+@opt.seconds_option
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
@@ -48,26 +45,24 @@ def command(system: str | None, **options: Any) -> int:
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line. Values without a map are named at the end.
 
-    Exit status: 0 done, 2 usage error, 3 stopped by the clock.
+    Exit status: 0 done, 2 usage error, 3 stopped by --seconds.
     """
     if options["steps"] is not None and options["samples"] is None:
         raise click.UsageError("--steps N is for --samples N")
     if not options["primes"]:
         raise click.UsageError("missing --prime P, e.g. --prime 101")
 
-    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
+    def cell(file: lib.SystemFile, search: Search) -> Cell:
         runs = []
         limits = {name: options[name] for name in ("samples", "steps") if options[name] is not None}
-        end = None if options["seconds"] is None else time.monotonic() + options["seconds"]
         for prime in dict.fromkeys(options["primes"]):
             values = [*options["eps"], *(step / 2 for step in options["time_step"])] or lib.default_eps(prime)
             for eps in values if file.map.has_eps else [1]:
-                limits["seconds"] = None if end is None else end - time.monotonic()
-                runs.append(lib.cycle_census(file.map, eps, prime, **limits, seed=options["seed"], progress=progress))
+                if not search.is_over:
+                    runs.append(lib.cycle_census(file.map, eps, prime, **limits, seed=options["seed"], progress=search))
         words = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
         line = ", ".join(f"{word} modulo {run.prime}" for word, run in zip(words, runs, strict=True))
-        stopped = any(run.stopped for run in runs)
-        return Cell(line, lambda: _record(file, options, runs), lambda: _print(file, runs), _STOPPED if stopped else "")
+        return Cell(line, lambda: _record(file, options, runs), lambda: _print(file, runs))
 
     return table(system, options, cell)
 
@@ -87,7 +82,7 @@ def _record(file: lib.SystemFile, options: dict[str, Any], runs: list[lib.Census
         "cycles",
         file,
         "exact modulo primes",
-        **opt.given(options, "seed", "samples", "seconds", steps_asked="steps"),
+        **opt.given(options, "seed", "samples", steps_asked="steps"),
         primes=list(dict.fromkeys(options["primes"])),
         runs=[
             {

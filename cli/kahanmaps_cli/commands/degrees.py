@@ -9,7 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Search
 from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
@@ -20,7 +20,7 @@ _SHOWN = 8  # degrees in a line of a table
 @click.command("degrees")
 @opt.system_options
 @opt.eps_options
-@opt.seconds_option(lib.SECONDS["degrees"], "Stop after about so many seconds.")
+@opt.effort_options
 @click.option(
     "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
 )
@@ -42,7 +42,7 @@ def command(system: str | None, **options: Any) -> int:
 
     \b
       kahanmaps degrees euler_top
-      kahanmaps degrees lotka_volterra --seconds 20 --json
+      kahanmaps degrees lotka_volterra --effort 3 --json
       kahanmaps degrees weierstrass --eps 1/10 --terms 60
       kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
       kahanmaps degrees henon_heiles -p c=-2..0:1/2 --terms 6
@@ -67,14 +67,14 @@ def command(system: str | None, **options: Any) -> int:
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 
-    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
-        found = measured(file, eps, options, progress)
+    def cell(file: lib.SystemFile, search: Search) -> Cell:
+        found = measured(file, eps, options, search)
         more = ", ..." if len(found.degrees) > _SHOWN else ""
         line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
         undecided = ""
         if not is_done(found, options["terms"]):
             undecided = f"undecided: {found.unconfirmed}" if found.unconfirmed else f"stopped early: {found.message}"
-        return Cell(line, lambda: _record(file, options, found), lambda: _print(file, found), undecided)
+        return Cell(line, lambda: _record(file, options, found, search), lambda: _print(file, found), undecided)
 
     return table(system, options, cell)
 
@@ -83,7 +83,7 @@ def measured(
     file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
 ) -> lib.DegreeGrowth:
     """The degrees that the options ask for."""
-    asked = opt.given(options, "seconds", "max_degree", "seed", max_terms="terms")
+    asked = opt.given(options, "effort", "max_degree", "seed", max_terms="terms")
     return lib.degree_growth(file.map, eps, **asked, steps=options.get("steps"), progress=progress)
 
 
@@ -102,14 +102,14 @@ def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     tell(found.text)
 
 
-def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth) -> dict[str, Any]:
+def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth, search: Search) -> dict[str, Any]:
     time_step = lib.eps_record(found.eps, file.map)["time_step"]
     return record_of(
         "degrees",
         file,
         "modulo the primes of the lines" if found.primes else "exact",
         time_step="generic" if time_step == "every" else time_step,
-        **opt.given(options, "seconds", terms_asked="terms"),
-        max_degree=options["max_degree"],
+        **search.work,
+        **opt.given(options, "max_degree", terms_asked="terms"),
         **found.to_json(),
     )

@@ -8,7 +8,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import tell
 
@@ -23,7 +23,7 @@ from kahanmaps_cli.screen.terminal import tell
 )
 @opt.seed_option
 @opt.error_bits_option("What is supported is false with probability below 2^-BITS.")
-@opt.seconds_option(lib.SECONDS["commuting systems"], "Stop about then, and say what is open.")
+@opt.effort_options
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """All rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.
@@ -45,17 +45,17 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = opt.load_system(system, {**options, "quiet": quiet})
     seed, error_bits = options["seed"], options["error_bits"]
     settings = lib.Settings(seed=seed, error_bits=error_bits)
-    with Progress(quiet) as progress:
+    with Search({**options, "quiet": quiet}) as search:
         found = lib.find_commuting(
             file.system if file.map.root is None else file.map,
             options["shape"],
             seed=seed,
             error_bits=error_bits,
-            seconds=options["seconds"],
-            progress=progress,
+            effort=options["effort"],
+            progress=search,
         )
     if as_json:
-        context = settings.context([file], seconds=options["seconds"])
+        context = settings.context([file], **search.work)
         print_json({"command": "find-commuting", **context, **found.to_json()})
     else:
         tell(f"# find-commuting: {file.name}, {found.kind_text}, every eps (the time step is 2 eps)")
@@ -63,4 +63,4 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if not quiet:
         for sentence in found.undecided:
             say(f"undecided: {sentence}")
-    return 0 if found.complete else 3
+    return 0 if found.complete and not search.is_over else 3

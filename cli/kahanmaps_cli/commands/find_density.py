@@ -9,14 +9,14 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Search
 
 
 @click.command("find-density")
 @opt.system_options
 @click.option("--flow", is_flag=True, help="Densities of the differential equation itself.")
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
-@search_options("density", lib.SECONDS["densities"])
+@search_options("density")
 def command(system: str | None, **options: Any) -> int:
     """Densities of SYSTEM: phi with dx/phi invariant, polynomials of the least degree or products of powers.
 
@@ -34,12 +34,12 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
     require_one_form(options)
-    with Progress(options["quiet"]) as progress:
+    with Search(options) as search:
         file = opt.load_system(system, options)
         settings = asked(options, "flow", "max_degree")
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow goes without --toml, which is about the map")
-        found = lib.find_densities(file, **settings, progress=progress)
+        found = lib.find_densities(file, **settings, progress=search)
     further = f"note\t{found.further}" if found.further else ""
-    print_search("find-density", found, options, [("phi", one, "") for one in found.shown], further)
+    print_search("find-density", found, search, options, [("phi", one, "") for one in found.shown], further)
     return 0 if found.densities else 3

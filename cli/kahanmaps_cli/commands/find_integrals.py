@@ -17,8 +17,9 @@ from kahanmaps_cli.runs.search import (
     require_one_form,
     scope,
     search_options,
+    symbols_and_eps,
 )
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Search
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import formula, tell
 from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
@@ -41,7 +42,7 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 )
 @click.option("--flow", is_flag=True, help="Integrals of the differential equation, and what the map makes of them.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
-@search_options("integrals", lib.SECONDS["integrals"])
+@search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
     """Integrals of the map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
 
@@ -70,49 +71,40 @@ def command(system: str | None, **options: Any) -> int:
     """
     require_one_form(options)
 
-    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
+    def cell(file: lib.SystemFile, search: Search) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
-        found = lib.find_integrals(file, **asked(options, "max_degree"), progress=progress)
+        found = lib.find_integrals(file, **asked(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
-        return Cell(line, lambda: record("find-integrals", found), lambda: None, found.reason)
+        return Cell(line, lambda: record("find-integrals", found, search), lambda: None, found.reason)
 
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
-    with Progress(options["quiet"]) as progress:
+    if options["flow"] and (options["sets"] or options["as_toml"]):
+        raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
+    if options["sets"] and options["darboux"] is not None:
+        raise click.UsageError("give --monomials or --darboux, not both")
+    instead = "--monomials" if options["sets"] else "--darboux" if options["darboux"] is not None else ""
+    if instead and (options["as_toml"] or options["as_latex"]):
+        raise click.UsageError(f"{instead} goes with --json, not with --toml and --latex")
+    if instead:
+        return (_bases if options["sets"] else _darboux)(system, options)
+    with Search(options) as search:
         file = opt.load_system(system, options)
-        settings = asked(options)
-        if options["flow"] and (options["sets"] or options["as_toml"]):
-            raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
-        if options["sets"]:
-            if options["darboux"] is not None:
-                raise click.UsageError("give --monomials or --darboux, not both")
-            if options["as_toml"] or options["as_latex"]:
-                raise click.UsageError("--monomials goes with --json, not with --toml and --latex")
-            return _bases(file, settings["eps"], options)
-        if options["darboux"] is not None:
-            if options["as_toml"] or options["as_latex"]:
-                raise click.UsageError("--darboux goes with --json, not with --toml and --latex")
-            darboux = lib.darboux_polynomials(
-                file, options["darboux"], flow=options["flow"], **settings, progress=progress
-            )
-            if options["as_json"]:
-                print_json(record("darboux-polynomials", darboux))
-            else:
-                tell(f"Darboux polynomials: {darboux.file.name}{scope(darboux)}")
-                tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(darboux).split("\n")))
-            return 3 if darboux.reason else 0
-        settings |= {"max_degree": options["max_degree"], "seconds": options["seconds"] / (1 + options["flow"])}
-        search = partial(lib.find_integrals, file, **settings, progress=progress)
-        found = search(flow=options["flow"])
-        beside = lib.flow_and_map(search(), None, found) if options["flow"] else None
+        find = partial(lib.find_integrals, file, **asked(options, "max_degree"), progress=search)
+        if options["flow"]:
+            stages = lib.budget_for("integrals", options["effort"]).share([1, 1])
+            found = find(flow=True, effort=next(stages))
+            beside = lib.flow_and_map(find(effort=next(stages)), None, found)
+        else:
+            found, beside = find(), None
     if beside is not None and options["as_json"]:
-        print_json(record("find-integrals", found, beside_map=beside.to_json()))
+        print_json(record("find-integrals", found, search, beside_map=beside.to_json()))
         return 3 if found.reason else 0
     every: list[Any] = [*found.integrals, *found.in_iterates]
     named = [(one.name, one, f"{one.origin}: ") for one in every]
-    print_search("find-integrals", found, options, named, _count(found))
+    print_search("find-integrals", found, search, options, named, _count(found))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for one in found.in_time:
             where = "" if found.flow else "of the n-th point: "
@@ -128,39 +120,51 @@ def _count(found: Any) -> str:
     return f"found\t{found.found} functionally independent; {found.count_text}"
 
 
-def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
+def _darboux(system: str | None, options: dict[str, Any]) -> int:
+    with Search(options) as search:
+        file, degree = opt.load_system(system, options), options["darboux"]
+        found = lib.darboux_polynomials(file, degree, **asked(options, "flow"), progress=search)
+    if options["as_json"]:
+        print_json(record("darboux-polynomials", found, search))
+    else:
+        tell(f"Darboux polynomials: {found.file.name}{scope(found)}")
+        tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
+    return 3 if found.reason else 0
+
+
+def _bases(system: str | None, options: dict[str, Any]) -> int:
     if options["symbolic"]:
         raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
-    laboratory = lib.Laboratory(file, (), eps, options["seed"])
-    rows: list[lib.Basis] = []
-    reason = laboratory.defect
-    for text in options["sets"]:
-        parts = [part.strip() for part in text.split(",")]
-        if not all(parts):
-            raise lib.InputError(
-                f"found the set {lib.quoted(text)}, expected polynomials with commas between them: 'x^2,y^2,1'"
-            )
-        letters = lib.with_iterates(file.variables, lib.iterates_in(text))
-        functions = [lib.parse_polynomial(part, letters, file.parameters) for part in parts]
-        for k, function in enumerate(functions):
-            if function.is_zero():
-                raise lib.InputError(
-                    f"found 0 as function {k + 1} of the set {lib.quoted(text)}, expected polynomials that are not 0"
-                )
-            if function in functions[:k]:
-                raise lib.InputError(
-                    f"found function {k + 1} twice in the set {lib.quoted(text)}, expected different ones"
-                )
-        try:
-            if not reason:
-                rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, parts))
-        except lib.NoPoint as error:
-            reason = str(error)
+    eps = symbols_and_eps(options)[1]
+    with Search(options) as search:
+        file = opt.load_system(system, options)
+        laboratory = lib.Laboratory(file, (), eps, options["seed"])
+        rows: list[lib.Basis] = []
+        reason = laboratory.defect
+        for text in options["sets"]:
+            parts = [part.strip() for part in text.split(",")]
+            if not all(parts):
+                expected = "polynomials with commas between them: 'x^2,y^2,1'"
+                raise lib.InputError(f"found the set {lib.quoted(text)}, expected {expected}")
+            letters = lib.with_iterates(file.variables, lib.iterates_in(text))
+            functions = [lib.parse_polynomial(part, letters, file.parameters) for part in parts]
+            for k, function in enumerate(functions):
+                which = f"function {k + 1}"
+                if function.is_zero():
+                    expected = "polynomials that are not 0"
+                    raise lib.InputError(f"found 0 as {which} of the set {lib.quoted(text)}, expected {expected}")
+                if function in functions[:k]:
+                    raise lib.InputError(f"found {which} twice in the set {lib.quoted(text)}, expected different ones")
+            try:
+                if not reason:
+                    rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, parts))
+            except lib.NoPoint as error:
+                reason = str(error)
     note = lib.closing_note(next((row.period for row in rows if row.period), None), laboratory.eps, file.map)
     if options["as_json"]:
         print_json(
             {
-                **heading("hirota-kimura", laboratory),
+                **heading("hirota-kimura", laboratory, search),
                 "arithmetic": "residues modulo primes, eps random where none is given",
                 "primes": [str(prime) for prime in laboratory.primes],
                 "bases": [row.to_json() for row in rows],

@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Search
 from kahanmaps_cli.screen.terminal import tell
 
 
@@ -22,7 +22,7 @@ from kahanmaps_cli.screen.terminal import tell
     help="Largest degree of entries (default: 3 in dimension 3, else 2).",
 )
 @click.option("--denominator", metavar="EXPR", help="A function that all entries are divided by, e.g. a density.")
-@search_options("poisson", lib.SECONDS["Poisson tensors"])
+@search_options("poisson")
 def command(system: str | None, **options: Any) -> int:
     """Poisson tensors of SYSTEM: skew P(x), its entries polynomials, that the map preserves, dPhi P dPhi^T = P(x~).
 
@@ -39,13 +39,15 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
     require_one_form(options)
-    with Progress(options["quiet"]) as progress:
+    with Search(options) as search:
         file = opt.load_system(system, options)
         settings, denominator = asked(options), None
         if options["denominator"] is not None:
             denominator = lib.parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
-        found = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=progress)
-    print_search("find-poisson", found, options, [(one.name, one, f"{one.statement}; ") for one in found.tensors])
+        found = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=search)
+    print_search(
+        "find-poisson", found, search, options, [(one.name, one, f"{one.statement}; ") for one in found.tensors]
+    )
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in found.integrals:
             tell(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")

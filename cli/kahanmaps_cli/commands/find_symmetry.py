@@ -7,15 +7,15 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import load_system, output_options, seconds_option, system_options
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.options import effort_options, load_system, output_options, system_options
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import tell
 
 
 @click.command("find-symmetry")
 @system_options
-@seconds_option(lib.SECONDS["symmetries"], "Stop about then, and say what is open.")
+@effort_options
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Affine symmetries T Phi T^-1 = Phi and reversing symmetries T Phi T^-1 = Phi^-1 of the map of SYSTEM.
@@ -34,13 +34,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     groups of them. -I reverses every homogeneous quadratic system: this is told as
     obvious. A finite group is shown by generators, --json lists it.
 
-    Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the time over.
+    Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the budget spent.
     """
     file = load_system(system, {**options, "quiet": quiet})
-    with Progress(quiet) as progress:
-        found = lib.linear_symmetries(file.system, seconds=options["seconds"], progress=progress)
+    with Search({**options, "quiet": quiet}) as search:
+        found = lib.linear_symmetries(file.system, effort=options["effort"], progress=search)
     if as_json:
-        context = lib.Settings().context([file], seconds=options["seconds"])
+        context = lib.Settings().context([file], **search.work)
         print_json({"command": "find-symmetry", **context, **found.to_json()})
     else:
         tell(f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved")
@@ -48,4 +48,4 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if not quiet:
         for sentence in found.undecided:
             say(f"undecided: {sentence}")
-    return 0 if found.complete else 3
+    return 0 if found.complete and not search.is_over else 3

@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Progress, Search
 from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
@@ -39,7 +39,7 @@ from kahanmaps_cli.screen.value_rows import Cell, table
 @click.option(
     "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
-@opt.seconds_option(lib.SECONDS["heights"], "Stop after about so many seconds.")
+@opt.effort_options
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
@@ -59,18 +59,18 @@ def command(system: str | None, **options: Any) -> int:
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line. Values without a map are named at the end.
 
-    Exit status: 0 all orbits that were decided agree, 2 usage error, 3 undecided, or the orbits disagree, or the time
-    was over.
+    Exit status: 0 all orbits that were decided agree, 2 usage error, 3 undecided, or the orbits disagree, or the budget
+    was spent.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
-    def cell(file: lib.SystemFile, progress: Progress) -> Cell:
-        found = surveyed(file, eps, options, progress)
+    def cell(file: lib.SystemFile, search: Search) -> Cell:
+        found = surveyed(file, eps, options, search)
         undecided = f"undecided: {found.text}" if found.kind is lib.Growth.UNDECIDED else ""
         if not found.is_whole:
-            undecided = "stopped early: the time was over before all orbits were finished"
-        return Cell(found.text, lambda: _record(file, options, found), lambda: _print(file, found), undecided)
+            undecided = "stopped early: the budget was spent before all orbits were finished (--effort)"
+        return Cell(found.text, lambda: _record(file, options, found, search), lambda: _print(file, found), undecided)
 
     return table(system, options, cell)
 
@@ -88,7 +88,7 @@ def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: 
         eps,
         starts=options["given"] or (lib.DEFAULT_STARTS if options["count"] is None else options["count"]),
         normal_form=file.normal_form,
-        **opt.given(options, "steps", "max_digits", "seconds", "seed"),
+        **opt.given(options, "steps", "max_digits", "effort", "seed"),
         progress=progress,
     )
 
@@ -101,8 +101,8 @@ def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     tell(str(found))
 
 
-def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey) -> dict[str, Any]:
+def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey, search: Search) -> dict[str, Any]:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     steps = [str(step) for value in values if (step := lib.time_step(value, file.map)) is not None]
-    asked = opt.given(options, "seed", "steps", "max_digits", "seconds")
+    asked = {**opt.given(options, "seed", "steps", "max_digits"), **search.work}
     return record_of("heights", file, "exact", eps=lib.plain(list(values)), time_step=steps, **asked, **found.to_json())

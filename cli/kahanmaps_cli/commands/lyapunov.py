@@ -10,7 +10,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import on_terminal, print_table, tell
 
@@ -24,7 +24,7 @@ _DEFAULT_STARTS = 16
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="How many steps to count.")
 @click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
-@opt.seconds_option(60.0, "Time for all steps.")
+@opt.seconds_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Lyapunov exponents of float orbits of the map of SYSTEM, by the exact tangent map.
@@ -40,7 +40,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is checked against log |det dPhi|.
 
-    Exit status: 0 all orbits went through, 2 usage error, 3 some ended early or the clock stopped all.
+    Exit status: 0 all orbits went through, 2 usage error, 3 some ended early or --seconds stopped all.
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
@@ -53,15 +53,14 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
     starts = requested_starts(file, options, count=_DEFAULT_STARTS)
-    with Progress(quiet) as progress:
+    with Search({**options, "quiet": quiet}) as search:
         found = lib.lyapunov_exponents(
             file.map,
             starts,
             lib.rational(1) if eps is None else eps,
             steps,
             transient=transient,
-            seconds=options["seconds"],
-            progress=progress,
+            progress=search,
         )
     if as_json:
         print_json(_record(file, eps, options, found))
@@ -69,9 +68,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         _print(file, eps, found)
     if found.ended and not quiet:
         say(f"{found.ended} of {found.orbits} orbits left the range of floats or met a pole")
-    if found.stopped and not quiet:
-        say(f"stopped by the clock after {found.steps} counted steps: give more --seconds")
-    return 3 if found.ended or found.stopped else 0
+    return 3 if found.ended or search.is_over else 0
 
 
 def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
@@ -106,7 +103,6 @@ def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.
         **lib.eps_record(eps, file.map),
         **starts_record(options, found.orbits),
         steps_asked=options["steps"],
-        seconds=options["seconds"],
         **lib.attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
         **{name: [_number(value) for value in values] for name, values in lists.items()},
         sum=_number(found.mean.sum()),

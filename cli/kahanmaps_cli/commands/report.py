@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +13,11 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 
 _ONLY_FOR = {
     "symbolic": ("analyze",),
+    "effort": ("analyze",),
     "seconds": ("analyze",),
     "explore": ("analyze",),
     "sections": ("verify",),
@@ -39,10 +38,7 @@ _ONLY_FOR = {
 @click.option("--explore", is_flag=True, help="A page with sliders: eps and the start of an orbit move.")
 @opt.eps_options
 @opt.symbolic_option
-@opt.seconds_option(
-    None,
-    "Stop about then, pictures left out (default: 16 to 150 by dimension for the analysis).",
-)
+@opt.effort_options
 @opt.seed_option
 @draw_options
 @click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")
@@ -63,7 +59,7 @@ def command(system: str | None, **options: Any) -> int:
 
     \b
       kahanmaps report euler_top -o top.html
-      kahanmaps report henon_heiles -p c=-6 --seconds 30 -o hh.html
+      kahanmaps report henon_heiles -p c=-6 --effort 3 -o hh.html
       kahanmaps report euler_top --explore -o explore.html
       kahanmaps report --from verify --m 2 -o paper.html
 
@@ -78,31 +74,35 @@ def command(system: str | None, **options: Any) -> int:
     is_named, is_drawn = _require_consistent(system, options)
     lib.page_template()  # what has to be installed is said before the work
     how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
-    with Progress(options["quiet"]) as progress:
+    with Search(options) as search:
         if options["source"] == "analyze":
             from kahanmaps_cli.runs.search import symbols_and_eps
 
             symbols, eps = symbols_and_eps(options)
-            file, seconds, began = opt.load_system(system, options), options["seconds"], time.monotonic()
-            found = lib.analyze(
-                file, symbols=symbols, eps=eps, seconds=seconds, seed=options["seed"], progress=progress, processes=2
-            )
-            progress("the page")
-            until = inf if seconds is None else began + seconds
-            html = lib.report_html(found, explore=options["explore"], until=until, **how)
-            status = 3 if found.conclusion.kind == "undecided" else 0
+            asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+            reached: list[lib.Analysis] = []
+            try:
+                lib.analyze(opt.load_system(system, options), **asked, progress=search, reached=reached.append)
+                search("the page")
+                html = lib.report_html(reached[-1], explore=options["explore"], **how)
+            except lib.TimeLimit:
+                if not reached:
+                    raise
+                reached[-1].interrupt("stopped (--seconds)")
+                html = lib.report_html(reached[-1], **{**how, "pictures": False}, left_out=[search.ending])
+            status = 3 if search.is_over or reached[-1].conclusion.kind == "undecided" else 0
         else:
             # For verify, and where one is to be drawn, a member of the family.
             draws = not is_named and (is_drawn or options["source"] == "verify")
             file = drawn_file(options) if draws else opt.load_system(system, options)
             eps = opt.the_eps(options["eps"], options["time_step"], required=False)
-            settings = lib.Settings(eps=eps, seed=options["seed"], progress=progress)
+            settings = lib.Settings(eps=eps, seed=options["seed"], progress=search)
             left_out: list[str] = []
             if options["source"] == "verify":
                 reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
             else:
                 reports, left_out = _checks(file, settings)
-            progress("the page")
+            search("the page")
             html = lib.report_html(reports, file=file, left_out=left_out, **how)
             verdict = lib.combined(report.verdict for report in reports)
             status = {lib.Verdict.REFUTED: 1, lib.Verdict.UNDECIDED: 3}.get(verdict, 0)

@@ -10,7 +10,6 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import output_options
-from kahanmaps_cli.params import Seconds
 from kahanmaps_cli.runs.scan_run import ending, scan_options, scanned
 from kahanmaps_cli.screen.outputs import OutputFolder, file_name, will_write
 from kahanmaps_cli.screen.progress import say
@@ -21,7 +20,11 @@ from kahanmaps_cli.screen.terminal import tell
 @click.command("scan")
 @scan_options
 @click.option(
-    "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
+    "--analyze",
+    "analysis",
+    type=click.IntRange(lib.LEAST_EFFORT, lib.MOST_EFFORT),
+    metavar="E",
+    help="Analyze a member of each slow class, with this effort.",
 )
 @click.option("--toml", "as_toml", is_flag=True, help="A member of each component as a system file, one after another.")
 @click.option(
@@ -35,8 +38,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan henon_heiles --over c
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
       kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
-      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to out
-      kahanmaps scan lorenz --over s,b,r --seconds 600
+      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze -1 --write-to out
+      kahanmaps scan lorenz --over s,b,r --effort 3
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
@@ -44,19 +47,19 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
 
     With two or three parameters members on random lines of parameter space are tried besides, modulo primes at which
-    quadratic fields split: so a^2 - 2 = 0 is found as one curve. The time is for everything together; what there was
-    no time for is told.
+    quadratic fields split: so a^2 - 2 = 0 is found as one curve. The effort is for everything together; what
+    exceeded it is told.
 
     Without --eps: conditions that hold for every eps; with eps among the parameters also those that contain it. With
     more than three parameters members on random lines and planes of parameter space are tried, which finds what has
     codimension 1 and 2, as two linear conditions or a linear one and another. What can have been missed is told.
 
-    Exit status: 0 done, whatever was found; 2 usage error; 3 the time was over: what was left out is told; 130
+    Exit status: 0 done, whatever was found; 2 usage error; 3 the budget was spent: what was left out is told; 130
     interrupted, with what was found up to then.
     """
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
-    found = scanned(system, quiet, options)
+    found, search = scanned(system, quiet, options)
     if options["folder"] is not None:
         _write(found, options["folder"], quiet)
     if options["as_toml"]:
@@ -64,13 +67,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             if one.values is not None:
                 click.echo(f"# {one.text}\n{found.member(one).to_toml()}")
     elif as_json:
-        more = {**lib.eps_record(found.eps, found.file.map), "seconds": options["seconds"], **found.to_json()}
+        more = {**lib.eps_record(found.eps, found.file.map), **search.work, **found.to_json()}
         print_json(record_of("scan", found.file, "modulo primes", **more))
     else:
         at = "" if "eps" in found.over else lib.eps_told(found.eps, found.file.map)
         tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
         tell(found.text)
-    return ending(found, quiet)
+    return ending(found, search)
 
 
 def _write(found: lib.Scan, folder: str, quiet: bool) -> None:

@@ -8,7 +8,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import formula, tell
 
@@ -22,7 +22,7 @@ from kahanmaps_cli.screen.terminal import formula, tell
     metavar="N",
     help="Steps to follow each hypersurface for (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
 )
-@opt.seconds_option(lib.SECONDS["singularities"], "Time for each eps.")
+@opt.effort_options
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
@@ -50,16 +50,17 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their outcome,
     known by random points.
 
-    Exit status: 0 done, 2 usage error, 3 undecided (stopped by the clock, or two points or two eps that differ).
+    Exit status: 0 done, 2 usage error, 3 undecided (the budget was spent, or two points or two eps differ).
     """
     from kahanmaps.laboratory.singular.singularities import default_eps
 
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     file = opt.load_system(system, {**options, "quiet": quiet})
-    with Progress(quiet) as progress:
+    with Search({**options, "quiet": quiet}) as search:
         runs = [
-            lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "seconds"), progress=progress)
+            lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "effort"), progress=search)
             for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))
+            if not search.is_over
         ]
     agree = len({run.shape for run in runs}) == 1
     verdict = runs[0].verdict if agree else lib.UNDECIDED
@@ -72,7 +73,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
                 "exact; series modulo primes",
                 seed=options["seed"],
                 steps=options["steps"] or lib.steps_by_default(file.map.dim),
-                seconds=options["seconds"],
+                **search.work,
                 verdict=verdict,
                 symbolic_denominator=symbolic,
                 runs=[_run_record(file, run) for run in runs],
@@ -80,15 +81,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         )
     else:
         _print(file, runs, symbolic, runs[0].text if agree else verdict)
-    if verdict == lib.UNDECIDED and not quiet:
+    if verdict == lib.UNDECIDED and not quiet and not search.is_over:
         if any(run.stopped for run in runs):
-            why = "stopped by the clock: give more --seconds"
+            why = "the budget was spent: give more --effort"
         elif not agree:
             why = "the two eps tell different things: try others with --eps"
         else:
             why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
         say(f"undecided: {why}")
-    return 3 if verdict == lib.UNDECIDED else 0
+    return 3 if verdict == lib.UNDECIDED or search.is_over else 0
 
 
 def _print(

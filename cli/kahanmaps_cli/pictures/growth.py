@@ -15,7 +15,7 @@ from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.commands.heights import require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawn, picture
-from kahanmaps_cli.screen.progress import Progress
+from kahanmaps_cli.screen.progress import Search
 
 _MAX_BYTES = 64_000_000
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
@@ -32,7 +32,7 @@ _scale_option = click.option(
     opt.inline_options,
     click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
     opt.eps_options,
-    opt.seconds_option(lib.SECONDS["degrees"], "Stop each system after about so many; the picture takes seconds more."),
+    opt.effort_options,
     click.option(
         "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
     ),
@@ -47,7 +47,7 @@ _scale_option = click.option(
     opt.seed_option,
     _scale_option,
 )
-def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
+def degrees(options: dict[str, Any], progress: Search) -> Drawn:
     """Degrees of the iterates of maps, with the recurrence they satisfy.
 
     \b
@@ -85,6 +85,8 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
     files = [opt.load_system(name, options) for name in names]
     early: list[str] = []
     for file in files:
+        if progress.is_over:
+            break
 
         def told(sentence: str, name: str = file.label) -> None:
             progress(f"{name}: {sentence}")
@@ -94,7 +96,7 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")
     figure = lib.draw_degrees(growths, options["style"], scale=options["scale"])
-    return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early else 0)
+    return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early or progress.is_over else 0)
 
 
 @picture(
@@ -115,11 +117,11 @@ def degrees(options: dict[str, Any], progress: Progress) -> Drawn:
         show_default=True,
         help="Digit budget of each orbit.",
     ),
-    opt.seconds_option(lib.SECONDS["heights"], "Stop after about so many seconds."),
+    opt.effort_options,
     opt.seed_option,
     _scale_option,
 )
-def heights(options: dict[str, Any], progress: Progress) -> Drawn:
+def heights(options: dict[str, Any], progress: Search) -> Drawn:
     """Heights of exact orbits against the step: how fast the numbers grow.
 
     \b
@@ -134,7 +136,7 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
     Records hold heights at the steps 0, 1, 2, 4, 8, ... only.
 
     Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
-    time was over before all orbits were finished (the picture is written).
+    budget was spent before all orbits were finished (the picture is written).
     """
     require_heights(options)
     file: lib.SystemFile | None = None
@@ -156,9 +158,9 @@ def heights(options: dict[str, Any], progress: Progress) -> Drawn:
         talk.append(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")
     if early := sum(curve.status in _EARLY for curve in curves):
         talk.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
-    if not whole:
-        talk.append("stopped early: the time was over before all orbits were finished")
-    return Drawn(figure, file, talk, 3 if early or not whole else 0)
+    if not whole and not progress.is_over:
+        talk.append("stopped early: the budget was spent before all orbits were finished (--effort)")
+    return Drawn(figure, file, talk, 3 if early or not whole or progress.is_over else 0)
 
 
 def read_record(path: str) -> Any:

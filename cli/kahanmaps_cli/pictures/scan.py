@@ -33,7 +33,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     as far as there is room. With --modulo P
     the plane over GF(P): all slow members that were seen.
 
-    Exit status: 0 done, 2 usage error, 3 the time was over, 130 interrupted
+    Exit status: 0 done, 2 usage error, 3 the budget was spent, 130 interrupted
     (the picture is written if something was found).
     """
     window = window_from(options, 2)
@@ -47,8 +47,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     names = names_of(options)
     if len(names) != 2:
         raise click.UsageError(f"found --over {','.join(names)}, expected two parameters: a plane is drawn")
-    found = scanned(options["system"], options["quiet"], options)
-    status = ending(found, options["quiet"])
+    found, search = scanned(options["system"], options["quiet"], options)
+    status = ending(found, search)
     if found.ended != "complete" and not (found.components or any(one.prime == modulo for one in found.sweeps)):
         return Drawn(
             None, talk=["there is no picture: nothing to be drawn was found before the scan ended"], status=status

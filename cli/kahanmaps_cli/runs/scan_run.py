@@ -11,7 +11,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import quoted
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.signals import interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -27,7 +27,7 @@ scan_options: Callable[[F], F] = opt.stack(
     opt.eps_options,
     click.option("--terms", type=int, metavar="N", help="Measure d_1, ..., d_N."),
     click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
-    opt.seconds_option(120.0, "Stop about then, counted from when its loops are loaded, and say what was seen."),
+    opt.effort_options,
     click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
     opt.seed_option,
 )
@@ -42,8 +42,8 @@ def names_of(options: dict[str, Any]) -> list[str]:
     return names
 
 
-def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Scan:
-    """The scan that a command line asks for."""
+def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, Search]:
+    """The scan that a command line asks for, and the search that made it."""
     names = names_of(options)
     if opt.is_inline(options, system):
         given = {"eps", *(name for name, _ in options["parameters"])}
@@ -57,33 +57,37 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> lib.Sca
         has_begun.set()
         if interrupted.is_set():
             raise lib.TimeOver
-        progress(sentence)
+        search(sentence)
 
     def interrupt() -> None:
         if not has_begun.is_set():  # libraries and loops are loaded for seconds, and there is nothing to be kept
             raise KeyboardInterrupt
         interrupted.set()
 
-    with Progress(quiet) as progress, interruptible(interrupt):
-        return lib.scan(
+    with Search({**options, "quiet": quiet}) as search, interruptible(interrupt):
+        found = lib.scan(
             file,
             names,
             eps=opt.the_eps(options["eps"], options["time_step"], required=False),
-            **opt.given(options, "terms", "seconds", "seed", "jobs"),
+            **opt.given(options, "terms", "effort", "seed", "jobs"),
             primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),
             progress=told,
         )
+    return found, search
 
 
-def ending(found: lib.Scan, quiet: bool) -> int:
-    """The exit status, and a word where it is not 0."""
+def ending(found: lib.Scan, search: Search) -> int:
+    """The exit status, and a word where it is not 0 and nothing was said before."""
+    if search.is_over:
+        return 3
     if found.ended == "complete":
         return 0
-    if not quiet:
-        why = "the time was over" if found.ended == "time" else "interrupted"
+    is_interrupted = found.ended == "interrupted"
+    if not search.quiet:
+        why = "interrupted" if is_interrupted else "the budget was spent (--effort)"
         say(f"stopped early: {why} before {', '.join(found.omitted)}")
-    return 3 if found.ended == "time" else 130
+    return 130 if is_interrupted else 3
 
 
 def primes_of(text: str | None) -> list[int] | None:

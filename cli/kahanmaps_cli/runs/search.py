@@ -9,18 +9,19 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.screen.progress import Search
 from kahanmaps_cli.screen.render import envelope, print_json
 from kahanmaps_cli.screen.terminal import formula, tell
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def search_options(section: str, seconds: float) -> Callable[[F], F]:
-    """eps, --symbolic, --seconds with this default, --seed and the output; `section` is that of a system file."""
+def search_options(section: str) -> Callable[[F], F]:
+    """eps, --symbolic, the effort, --seed and the output; `section` is that of a system file."""
     return opt.stack(
         opt.eps_options,
         opt.symbolic_option,
-        opt.seconds_option(seconds, "Time for the search."),
+        opt.effort_options,
         opt.seed_option,
         click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
         click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
@@ -44,9 +45,9 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 
 def asked(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """What every search is asked with, and these options: symbols, eps, seconds, seed."""
+    """What every search is asked with, and these options: symbols, eps, effort, seed."""
     symbols, eps = symbols_and_eps(options)
-    return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "seconds", "seed")}
+    return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "effort", "seed")}
 
 
 def scope(found: Any) -> str:
@@ -57,8 +58,8 @@ def scope(found: Any) -> str:
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 
-def heading(name: str, found: Any) -> dict[str, Any]:
-    """What is needed to redo a search, as plain data."""
+def heading(name: str, found: Any, search: Search) -> dict[str, Any]:
+    """What is needed to redo a search, as plain data, and the work that it took."""
     return {
         **envelope(name),
         "system": found.file.name,
@@ -67,16 +68,22 @@ def heading(name: str, found: Any) -> dict[str, Any]:
         **lib.eps_record(found.eps, found.file.map),
         "arithmetic": "exact formulas, from residues modulo primes",
         "seed": found.seed,
+        **search.work,
     }
 
 
-def record(name: str, found: Any, **more: Any) -> dict[str, Any]:
+def record(name: str, found: Any, search: Search, **more: Any) -> dict[str, Any]:
     """All that a search found, as plain data."""
-    return {**heading(name, found), **found.to_json(), **more, "document": dict(found.file.document)}
+    return {**heading(name, found, search), **found.to_json(), **more, "document": dict(found.file.document)}
 
 
 def print_search(
-    name: str, found: Any, options: dict[str, Any], formulas: Iterable[tuple[str, Any, str]], count: str = ""
+    name: str,
+    found: Any,
+    search: Search,
+    options: dict[str, Any],
+    formulas: Iterable[tuple[str, Any, str]],
+    count: str = "",
 ) -> None:
     """The result of a search in the form that was asked for.
 
@@ -84,7 +91,7 @@ def print_search(
     them.
     """
     if options["as_json"]:
-        print_json(record(name, found))
+        print_json(record(name, found, search))
     elif options["as_toml"]:
         click.echo(found.toml_section(), nl=False)
     elif options["as_latex"]:

@@ -9,17 +9,19 @@ from __future__ import annotations
 import math
 import os
 import shlex
+import signal
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from itertools import pairwise
 from threading import Event, RLock, Thread
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import click
 
+from kahanmaps import internals as lib
 from kahanmaps.errors import printable
 
 _FIRST_TOLD = 16  # step; what the first ones take says nothing
@@ -106,6 +108,60 @@ class Progress:
     ) -> None:
         self._ended.set()
         self.clear()
+
+
+class Search(Progress):
+    """The progress of a search that --seconds ends, and the units of work that it takes.
+
+    The options are "quiet" and, as far as a command has them, "effort" and "seconds"; `since` is when the seconds
+    began, if that was before. When they are over the search is given up, a line says what was being done, and the exit
+    status is 3. Where a function makes a partial result of its TimeLimit the line is said as well, and `is_over` holds
+    after the block.
+    """
+
+    def __init__(self, options: Mapping[str, Any], since: float | None = None) -> None:
+        super().__init__(options["quiet"])
+        self.work: dict[str, Any] = {}  # after the block: what a record says of it
+        self._was_over: bool | None = None  # after the block
+        self._effort, self._seconds, self._since = options.get("effort"), options.get("seconds"), since
+
+    def __call__(self, sentence: str) -> None:
+        if self.is_over:  # who made a partial result is not the last who is called
+            raise lib.TimeLimit
+        super().__call__(sentence)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the seconds are over, or were at the end of the block."""
+        if self._was_over is not None:
+            return self._was_over
+        return self._seconds is not None and signal.getitimer(signal.ITIMER_REAL)[0] == 0
+
+    @property
+    def ending(self) -> str:
+        """Why it was stopped, and what was cut."""
+        return f"stopped after {self._seconds:g} s (--seconds){self._sentence and ': '}{self._sentence}"
+
+    def __enter__(self) -> Self:
+        left = self._seconds
+        if left is not None and self._since is not None:
+            left = max(1e-6, left - (time.monotonic() - self._since))
+        self._limit, self._budget = lib.time_limit(left), lib.Budget()
+        self._limit.__enter__()
+        return super().__enter__()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._was_over = self.is_over
+        self._limit.__exit__(None, None, None)
+        self.work = {"effort": self._effort, "units": self._budget.spent}
+        words, is_stopped = self.ending if self.is_over else "", isinstance(error, lib.TimeLimit)
+        super().__exit__(kind, error, trace)
+        if words and not self.quiet and (is_stopped or error is None):
+            say(words)
+        if is_stopped:
+            raise click.exceptions.Exit(3) from error
 
 
 class TimeLeft:

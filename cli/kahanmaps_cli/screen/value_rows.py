@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -13,7 +14,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import KahanmapsError
 from kahanmaps_cli.options import load_system
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import tell
 
@@ -32,32 +33,32 @@ class Cell:
     undecided: str = ""
 
 
-def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, Progress], Cell]) -> int:
+def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, Search], Cell]) -> int:
     """A line for each combination of values, without a range all that was found; in JSON a record each.
 
     A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
-    raised. Returns the exit status.
+    raised. Returns the exit status. --seconds is for all of them.
     """
-    quiet = options["quiet"]
+    quiet, began = options["quiet"], time.monotonic()
     rows = rows_of(options["parameters"], system)
     if rows is None:
         file = load_system(system, options)
-        with Progress(quiet) as progress:
-            cell = found(file, progress)
+        with Search(options) as search:
+            cell = found(file, search)
         if options["as_json"]:
             print_json(cell.record())
         else:
             cell.show()
-        if cell.undecided and not quiet:
+        if cell.undecided and not quiet and not search.is_over:
             say(cell.undecided)
-        return 3 if cell.undecided else 0
+        return 3 if cell.undecided or search.is_over else 0
     done, refused = 0, list[tuple[str, KahanmapsError]]()
     for row in rows:
         name = ", ".join(f"{name} = {value}" for name, value in row)
         try:
             file = load_system(system, {**options, "parameters": row, "quiet": True})
-            with Progress(quiet) as progress:
-                cell = found(file, progress)
+            with Search(options, began) as search:
+                cell = found(file, search)
         except KahanmapsError as error:
             refused.append((name, error))
             continue
@@ -65,6 +66,8 @@ def table(system: str | None, options: dict[str, Any], found: Callable[[lib.Syst
             print_json(cell.record())
         else:
             tell(f"{name}\t{cell.line}")
+        if search.is_over:
+            return 3
         done += not cell.undecided
     if len(refused) == len(rows):
         raise refused[0][1]
