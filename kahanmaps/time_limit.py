@@ -39,9 +39,9 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     def stop(*_: Any) -> None:
         raise TimeLimit(f"the time limit of {seconds:g} s is over")
 
-    previous = signal.signal(signal.SIGALRM, stop)
-    outer, interval = signal.setitimer(signal.ITIMER_REAL, seconds)
+    previous, outer, interval = signal.signal(signal.SIGALRM, stop), 0.0, 0.0
     try:
+        outer, interval = signal.setitimer(signal.ITIMER_REAL, seconds)
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, outer, interval)

@@ -118,7 +118,7 @@ COUNTS = {
     "every": lambda value: km.orbit("weierstrass", [1, 2], "1/10", 3, every=value)[1].step,
     "a step of at": lambda value: km.orbit("weierstrass", [1, 2], "1/10", at=[value])[0].step,
     "max_terms": lambda value: len(km.degrees("weierstrass", max_terms=value).degrees) - 1,
-    "degree": lambda value: km.darboux_polynomials("weierstrass", value, seconds=9).degree,
+    "degree": lambda value: km.darboux_polynomials("weierstrass", value).degree,
     "the power": lambda value: (km.map("weierstrass", "1/10") ** value == km.map("weierstrass", "1/10") ** 3) * 3,
     "the modulus": lambda value: km.GF(value).characteristic,
     "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,
@@ -227,7 +227,7 @@ np.array(km.map("euler_top", "1/10")([1, 2, 3]), dtype=float)
 km.map("lyness")([1, 2])
 km.lyapunov("lorenz", [[1, 2, 3], [1, 1, 1]], eps="1/100", steps=10)
 km.plot.degrees(km.degrees("euler_top", max_terms=4))
-km.plot.heights(km.heights("weierstrass", "1/10", seconds=2))
+km.plot.heights(km.heights("weierstrass", "1/10"))
 km.plot.orbit(km.orbit("euler_top", [1, 2, 3], "1/10", 20))
 km.plot.portrait("lotka_volterra", [1, 2], "1/10", 20)
 km.portrait("lotka_volterra", [[1, 2], [1, 3]], time_step="1/10", steps=20)
@@ -247,7 +247,7 @@ REFUSED = [
     ('km.degrees("nosuch")', "found the unknown system 'nosuch'"),
     ("km.degrees(\"x' = y^3; y' = x\")", "degree 3"),
     ("km.degrees(phi)", "a map at one eps, expected what it was made of"),
-    ("km.degrees(FISH, seconds=-1)", "found -1 seconds, expected a positive"),
+    ("km.degrees(FISH, effort=99)", "found the effort 99, expected an integer from -20 to 40"),
     ('km.orbit("euler_top", [1, 2, 3], 0.1, 5)', 'e.g. "0.1"'),
     ('km.orbit("euler_top", [1, 2, 3], "1/10")', "expected a number of steps"),
     ('km.orbit(FISH, [1, 2], "1/10", at=3)', r"found at = 3, expected a sequence of steps, at=\[3\]"),

@@ -92,7 +92,7 @@ def test_functions_and_their_results_go_to_other_processes_and_back():
 def test_results_are_shown_in_short_and_are_plain_data():
     member = km.draw_with_eigenvalues([1, -2], seed=3)
     results = (
-        km.analyze("weierstrass", seconds=2),
+        km.analyze("weierstrass"),
         km.check_integrals("euler_top"),
         km.cycles(FISH, "1/7", 11),
         km.lyapunov(FISH, [0.5, 0.25], "1/50", 20),

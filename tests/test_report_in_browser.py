@@ -49,7 +49,7 @@ def dumped(tmp_path, html):
 @pytest.fixture(scope="module")
 def html():
     system = km.QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2 + y"])
-    return report_html(km.analyze(km.SystemFile.from_system(system, "small"), seconds=5))
+    return report_html(km.analyze(km.SystemFile.from_system(system, "small")))
 
 
 def test_nothing_is_fetched_and_nothing_complained_of(tmp_path, html):
@@ -75,7 +75,7 @@ MOVING = """<script>document.addEventListener("DOMContentLoaded", () => {
 
 
 def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
-    page = report_html(km.analyze(km.load("euler_top"), seconds=5), explore=True)
+    page = report_html(km.analyze(km.load("euler_top")), explore=True)
     _, _, (refusal,) = dumped(tmp_path, page.replace("</body>", MOVING))
     assert "violates the following Content Security Policy" in refusal, "the page runs its own script alone"
     without_policy = re.sub("<meta http-equiv=.*?/>", "", page)
@@ -91,7 +91,7 @@ def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
 
 
 def test_at_one_eps_its_slider_stays(tmp_path):
-    html = report_html(km.analyze(km.load("euler_top"), eps="1/7", seconds=5), explore=True)
+    html = report_html(km.analyze(km.load("euler_top"), eps="1/7"), explore=True)
     dom, asked, console = dumped(tmp_path, html)
     assert (asked, console) == ([], [])
     assert re.search('id="explore-eps-value"[^>]*>0.142857<', dom)

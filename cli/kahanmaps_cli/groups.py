@@ -80,7 +80,7 @@ def in_our_words(error: click.ClickException) -> click.ClickException:
         text = f"{error.format_message().removesuffix('.')}: {getattr(error.param, 'help', '')}"
         return error if is_told else click.UsageError(text, error.ctx)
     message = error.message
-    if found := re.fullmatch(r"'(.*)' is not a valid (integer|float)\.", message, re.DOTALL):
+    if found := re.fullmatch(r"'(.*)' is not a valid (integer|float)(?: range)?\.", message, re.DOTALL):
         message = f"found {quoted(found[1])}, expected {'an integer' if found[2] == 'integer' else 'a number'}"
     elif found := re.fullmatch(r"(\S+) is not in the range (.*)\.", message):
         message = f"found {found[1][:40]}, expected {found[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"

@@ -182,9 +182,9 @@ def unread(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], int]:
     [
         ("check-integrals euler_top --integral x1", 1),
         ("orbit --vars x --rhs x^2 --start 1 --eps 1/2 --steps 2", 3),
-        ("find-density lorenz --seconds 0.001", 3),
-        ("heights harmonic --seconds 0.001", 3),
-        ("degrees lorenz --seconds 0.001", 3),
+        ("find-density lorenz --effort -20", 3),
+        ("heights harmonic --effort -20", 3),
+        ("degrees lorenz --effort -20", 3),
         ("batch run FAILS --jsonl -q", 3),
         ("batch export --db DB --jsonl", 0),
         ("convert harmonic --to latex", 0),

@@ -1,15 +1,14 @@
 """kahanmaps degrees, singularities, cycles, lyapunov, heights: what they print as text and JSON, exit statuses."""
 
-import time
-
 import pytest
-from cli_helpers import terminal
+from cli_helpers import terminal, time_is_over
 
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import height_growth
-from kahanmaps.laboratory.cycles import cycle_census
+from kahanmaps.laboratory.cycles import _ProjectiveMap, cycle_census
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.version import __version__
 
@@ -96,12 +95,18 @@ def test_no_law_refuses_an_integrable_map_that_exchanges_levels(kahanmaps):
     assert "compatible" not in outcome.out
 
 
-def test_the_time_is_that_of_all_runs_and_what_was_stopped_says_so(kahanmaps):
-    outcome = kahanmaps("cycles paper_m3_irreducible --prime 31 --samples 5 --prime 11 --seconds 0.001")
+@pytest.mark.parametrize("form", ["", "--json"])
+def test_what_seconds_stopped_says_so_and_nothing_is_begun_after_it(kahanmaps, monkeypatch, form):
+    whole = _ProjectiveMap.images
+    images = lambda space, X: (time_is_over if space.prime == 7 else whole)(space, X)  # noqa: E731
+    monkeypatch.setattr(_ProjectiveMap, "images", images)
+    outcome = kahanmaps(f"cycles weierstrass --prime 5 --prime 7 --prime 11 --seconds 1000 {form}")
     assert outcome.status == 3
-    assert outcome.out.count("time limit") == 4
-    outcome = kahanmaps("cycles paper_m3_irreducible --prime 11 --seconds 0.001 --json")
-    assert [(run["stopped"], run["looked_at"]) for run in outcome.json["runs"]] == [(True, 0)] * 2
+    assert outcome.err.startswith("stopped after 1000 s (--seconds): p = 7")
+    if form:
+        assert [(run["prime"], run["stopped"]) for run in outcome.json["runs"]] == [(5, False), (5, False), (7, True)]
+    else:
+        assert (outcome.out.count("# p = "), outcome.out.count("time limit")) == (3, 1)
 
 
 def test_p_is_a_parameter_and_a_prime_is_told_how_to_be_typed(kahanmaps):
@@ -142,19 +147,19 @@ def test_eps_that_disagree_are_told(monkeypatch):
     assert found.text == "heights of exact orbits are undecided: the eps disagree (2 periodic, 2 quadratic)"
 
 
-def test_no_orbit_is_begun_after_the_time(monkeypatch):
-    def slow(*arguments, **options):
-        time.sleep(0.02)
-        return height_growth(*arguments, **{**options, "deadline": None})
+def test_no_orbit_is_begun_after_the_budget_is_spent(monkeypatch):
+    def expensive(*arguments, **options):
+        count(1e6)
+        return height_growth(*arguments, **{**options, "budget": Budget()})
 
-    monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", slow)
-    survey = height_survey(load("weierstrass").system, starts=3, steps=4, seconds=0.01)
+    monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", expensive)
+    survey = height_survey(load("weierstrass").system, starts=3, steps=4, effort=-6)
     assert (len(survey.orbits), survey.is_whole) == (1, False)
 
 
 def test_wrong_values_in_the_library():
     system = load("weierstrass").system
-    for options in ({"starts": 0}, {"starts": []}, {"seconds": 0}):
+    for options in ({"starts": 0}, {"starts": []}, {"effort": 41}):
         with pytest.raises(InputError):
             height_survey(system, **options)
 

@@ -39,8 +39,8 @@ def test_orbits_are_stepped(kahanmaps, word, name, arithmetic):
 LINES = [
     "check-measure",
     "check-integrals",
-    "find-density --seconds 5",
-    "find-integrals --seconds 2",
+    "find-density",
+    "find-integrals --effort -4",
     "cycles --prime 11 --samples 5 --steps 5",
     "lyapunov --eps 1/50 --steps 20",
     "systems",

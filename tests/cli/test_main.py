@@ -149,10 +149,10 @@ SIGNALS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids
                 "cycles paper_m3_irreducible --prime 11",
                 "find-integrals kirchhoff_case",
                 "find-density so4_euler_manakov",
-                "degrees zhukovski_volterra_2 --terms 100 --seconds 60",
+                "degrees zhukovski_volterra_2 --terms 100 --effort 5",
                 "singularities paper_m2 --steps 10000",
                 "scan lotka_volterra --over a,b,c,d",
-                "heights henon_heiles --seconds 60 --max-digits 1000000",
+                "heights henon_heiles --effort 5 --max-digits 1000000",
                 "lyapunov lorenz --random 3 --box 5 --eps 1/400 --steps 100000000",
                 "verify --m 4",
             ]

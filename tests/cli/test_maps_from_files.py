@@ -49,13 +49,13 @@ def test_backward_steps_find_the_inverse(kahanmaps, tmp_path):
 @pytest.mark.parametrize(
     "command",
     [
-        "analyze --seconds 1",
+        "analyze --effort -3",
         "degrees --terms 3",
         "singularities --eps 1/3",
-        "find-integrals --seconds 5 --max-degree 4",
+        "find-integrals --max-degree 4",
         "find-integrals --darboux 2",
         "find-integrals --monomials 'q,p,1'",
-        "find-density --seconds 5 --max-degree 4",
+        "find-density --max-degree 4",
         "heights --eps 1/10 --steps 8 --random 1",
         "ensemble --eps 1/10 --random 3 --box 1/4 --steps 5",
         "lyapunov --eps 1/10 --random 2 --box 1/8 --steps 20",
@@ -101,7 +101,7 @@ def test_a_witness_of_a_map_without_eps_has_none(kahanmaps, command):
 
 
 def test_a_page_about_a_map_without_eps_does_not_speak_of_it(kahanmaps, tmp_path):
-    kahanmaps(f"report lyness --seconds 2 --no-pictures -o {tmp_path}/page.html -q")
+    kahanmaps(f"report lyness --effort -2 --no-pictures -o {tmp_path}/page.html -q")
     text = re.sub(
         r"<style.*?</style>|<svg.*?</svg>|<script.*?</script>", "", (tmp_path / "page.html").read_text(), flags=re.S
     )

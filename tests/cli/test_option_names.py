@@ -7,10 +7,10 @@ import pytest
 from command_tree import all_commands, names_of, options_of
 
 LEAVES = [(words, command) for words, command in all_commands() if not isinstance(command, click.Group)]
-# Others tell how the command uses them: what --steps counts, what --seconds bounds.
+# Others tell how the command uses them: what --steps counts.
 SAME_WORDS = [
     *("json", "eps", "time-step", "vars", "rhs", "symbolic", "backward", "starts"),
-    *("random", "box", "db", "m", "eigenvalues", "chi", "color"),
+    *("random", "box", "db", "m", "eigenvalues", "chi", "color", "effort", "seconds"),
 ]
 
 
@@ -70,6 +70,14 @@ def test_a_time_that_is_none_is_refused_by_every_command(kahanmaps, words, value
     outcome = kahanmaps(words, f"--seconds {value}")
     assert outcome.status == 2
     assert f"found '{value}', expected a number of seconds above 0" in outcome.err
+
+
+@pytest.mark.parametrize(("value", "found"), [("x", "'x', expected an integer"), ("99", "99, expected -20 to 40")])
+@pytest.mark.parametrize("words", [words for words, _ in by_name()["--effort"] if own(words)])
+def test_an_effort_that_is_none_is_refused_by_every_command(kahanmaps, words, value, found):
+    outcome = kahanmaps(words, f"--effort {value}")
+    assert outcome.status == 2
+    assert f"found {found}" in outcome.err
 
 
 def test_the_old_name_of_an_option_still_works(kahanmaps):

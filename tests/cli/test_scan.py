@@ -76,7 +76,7 @@ def test_members_are_printed_as_system_files(kahanmaps):
 
 
 def test_verdicts_are_asked_for(kahanmaps, plane):
-    assert "verdict\t" in kahanmaps(f"scan {QUICK} --analyze 0.01").out
+    assert "verdict\t" in kahanmaps(f"scan {QUICK} --analyze -4").out
     assert "verdict" not in plane.out
 
 
@@ -104,14 +104,14 @@ def test_ctrl_c_ends_it_with_what_was_seen(kahanmaps, monkeypatch):
     assert outcome.err == "stopped early: interrupted before members modulo 17\n"
 
 
-def test_the_time_may_be_over(kahanmaps):
-    outcome = kahanmaps(f"scan {QUICK} --seconds 1e-6")
+def test_the_budget_may_be_spent(kahanmaps):
+    outcome = kahanmaps(f"scan {QUICK} --effort -20")
     assert outcome.status == 3
     assert outcome.out.splitlines()[1:] == [
         "tried\tmembers modulo three primes are needed, those modulo 0 primes were tried",
         "open\tthere was no time for members modulo 11, 13, 17",
     ]
-    assert outcome.err == "stopped early: the time was over before members modulo 11, 13, 17\n"
+    assert outcome.err == "stopped early: the budget was spent (--effort) before members modulo 11, 13, 17\n"
 
 
 def test_a_picture_needs_two_parameters_and_something_to_draw(kahanmaps, tmp_path, monkeypatch):
@@ -121,7 +121,7 @@ def test_a_picture_needs_two_parameters_and_something_to_draw(kahanmaps, tmp_pat
     assert (outcome.status, outcome.out) == (2, "")
     assert "expected two parameters: a plane is drawn" in outcome.err
     for more in ("", "--modulo 53"):
-        command = f"plot scan zhukovski_volterra_2 --over b1,b2 --seconds 1e-6 {more} -o {tmp_path}/none.svg"
+        command = f"plot scan zhukovski_volterra_2 --over b1,b2 --effort -20 {more} -o {tmp_path}/none.svg"
         outcome = kahanmaps(command)
         assert outcome.status == 3
         assert "there is no picture: nothing to be drawn was found" in outcome.err

@@ -62,7 +62,7 @@ def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_the
 
 def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimension_refused():
     none, line = (
-        scan(parse_system(PLANE), over, terms=1, primes=[5, 7, 11], effort=Budget(1)) for over in (["a", "b"], ["a"])
+        scan(parse_system(PLANE), over, terms=1, primes=[5, 7, 11], effort=-20) for over in (["a", "b"], ["a"])
     )
     assert draw_scan(none).legends == []
     with pytest.raises(InputError, match="expected two parameters"):

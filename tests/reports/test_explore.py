@@ -31,7 +31,7 @@ FILES = {
 
 @cache
 def found(name):
-    return km.analyze(FILES[name], seconds=3)
+    return km.analyze(FILES[name])
 
 
 def in_node(data, eps, steps):
@@ -101,7 +101,7 @@ def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
 
 
 def test_a_verdict_for_one_eps_says_so():
-    page = Page(report_html(km.analyze(FILES["plane"], eps="1/7", seconds=3), explore=True))
+    page = Page(report_html(km.analyze(FILES["plane"], eps="1/7"), explore=True))
     assert "at eps = 1/7 only" in page.text
     assert "for every eps" in Page(report_html(found("plane"), explore=True)).text
 

@@ -123,12 +123,6 @@ def test_without_matplotlib_the_page_says_what_to_install(volterra, monkeypatch)
     assert "pip install 'kahanmaps[plot]'" in page.text
 
 
-def test_no_picture_is_begun_when_the_time_is_over(volterra):
-    page = require_sound(report_html(volterra, until=0.0))
-    assert "svg" not in page.tags
-    assert page.text.count("not drawn, for the time was over (--seconds)") == 3
-
-
 def test_a_portrait_says_which_orbits_ended_and_what_lies_outside():
     nowhere = km.QuadraticSystem.from_text(["x"], ["x"])  # at eps = 1
     html = Pictures().portrait(km.SystemFile.from_system(nowhere), 1)
@@ -168,7 +162,7 @@ def test_names_and_titles_are_text(volterra):
 @pytest.mark.parametrize("pictures", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_degenerate_systems_have_pages(pictures):
     for rhs in ("0", "x", "1", "x^2"):
-        found = km.analyze(km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], [rhs])), seconds=2)
+        found = km.analyze(km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], [rhs])))
         require_sound(report_html(found, pictures=pictures))
 
 
