@@ -56,6 +56,8 @@ from .family.system_normal_form import SystemNormalForm as SystemNormalForm
 from .family.system_normal_form import system_normal_form as system_normal_form
 from .family.tensor import TensorStructure as TensorStructure
 from .family.tensor import tensor_structure as tensor_structure
+from .hard_stop import TimeLimit as TimeLimit
+from .hard_stop import time_limit as time_limit
 from .invariants.heights import HeightGrowth as HeightGrowth
 from .invariants.heights import height as height
 from .invariants.heights import height_growth as height_growth
@@ -131,8 +133,6 @@ from .reports.report import write_report as write_report
 from .systems.hamiltonian import CubicHamiltonian as CubicHamiltonian
 from .systems.hamiltonian import standard_structure as standard_structure
 from .systems.quadratic import QuadraticSystem as QuadraticSystem
-from .time_limit import TimeLimit as TimeLimit
-from .time_limit import time_limit as time_limit
 from .version import __version__ as __version__
 
 # The names of commands, see _COMMANDS in __init__.py.

@@ -97,6 +97,8 @@ from .family.skew_hamiltonian import chi as chi
 from .family.skew_hamiltonian import diagnosis as diagnosis
 from .family.system_normal_form import NoNormalForm as NoNormalForm
 from .family.system_normal_form import SystemNormalForm as SystemNormalForm
+from .hard_stop import TimeLimit as TimeLimit
+from .hard_stop import time_limit as time_limit
 from .invariants.growth import Growth as Growth
 from .laboratory.analysis import Analysis as Analysis
 from .laboratory.analysis import analyze as analyze
@@ -213,8 +215,6 @@ from .reports.report import report_html as report_html
 from .sources import source as source
 from .systems.quadratic import MAX_DIMENSION as MAX_DIMENSION
 from .systems.quadratic import QuadraticSystem as QuadraticSystem
-from .time_limit import TimeLimit as TimeLimit
-from .time_limit import time_limit as time_limit
 from .version import __version__ as __version__
 from .whole_files import resolved as resolved
 from .whole_files import whole_file as whole_file

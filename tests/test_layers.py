@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # From the ground up, one folder or file of kahanmaps/ a floor.
 FLOORS = [
-    *("errors", "version", "sources", "displayed", "whole_files", "processes"),
+    *("errors", "version", "sources", "displayed", "whole_files", "processes", "hard_stop"),
     *("algebra", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
     *("display", "languages", "plots", "reports"),
@@ -34,6 +34,9 @@ NUMPY_WHILE_LOADING = (
     "kahanmaps/maps/residues/",
     "kahanmaps/plots/",
 )
+# Whoever reads a clock: those who run batches, and who flushes files; never what finds an answer.
+CLOCKS = {"time", "datetime", "timeit", "sched"}
+WITH_A_CLOCK = ("kahanmaps/errors.py", "kahanmaps/experiments/running/", "kahanmaps/maps/orbits/writers.py")
 # A file of compiled kernels may import numba or llvmlite at its top if nobody imports the file while being loaded.
 KERNELS = ("kahanmaps/maps/floats/machine_code.py", "kahanmaps/maps/kept_code.py")
 
@@ -54,6 +57,8 @@ def violations(path: str, source: str) -> list[str]:
     found = []
     for line, target in _imports(tree.body, package):
         found += [f"{path}:{line}: {what}" for what in _off_floor(module, target.split("."))]
+        if target.split(".")[0] in CLOCKS and path.startswith("kahanmaps/") and not path.startswith(WITH_A_CLOCK):
+            found.append(f"{path}:{line}: reads a clock: answers would depend on the machine, count work instead")
     for line, target in _imports(tree.body, package, only_while_loading=True):
         top = target.split(".")[0]
         is_kernel = target.startswith(tuple(kernels.removesuffix(".py").replace("/", ".") for kernels in KERNELS))
@@ -167,6 +172,7 @@ WRONG = [
     ("kahanmaps/helpers.py", "from kahanmaps import errors", "has no floor"),
     (MAPS, "def f():\n    import click", "the library imports click"),
     (MAPS, "import numpy as np", "imports numpy while it is loaded"),
+    (MAPS, "def f():\n    from time import monotonic", "reads a clock"),
     ("kahanmaps/maps/floats/fast.py", "try:\n    import numba\nexcept ImportError:\n    pass", "imports numba while"),
     (
         "kahanmaps/maps/floats/ensemble.py",

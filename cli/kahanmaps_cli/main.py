@@ -17,7 +17,7 @@ import click
 
 from kahanmaps.checks.table import CHECKS
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
-from kahanmaps.time_limit import TimeLimit
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
 from kahanmaps_cli.screen.progress import as_typed, say

@@ -22,11 +22,11 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.printing import all_fields
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
-from kahanmaps.time_limit import TimeLimit
 
 MAX_POINTS = 2_000_000  # of a whole space, up to dimension 6; half as many with each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62

@@ -22,6 +22,7 @@ import numpy as np
 from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.printing import all_fields
 from kahanmaps.errors import InputError
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps import convention
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.equation import Equation
@@ -29,7 +30,6 @@ from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
-from kahanmaps.time_limit import TimeLimit
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
 _PORTION = 200_000  # entries of the tangent maps that are computed at once
