@@ -168,7 +168,7 @@ def test_a_signal_at_any_moment_ends_a_command_with_130_and_a_word(number, words
                 assert process.stderr.readline() == "ready\n"  # before it Python itself tells of Ctrl-C
                 time.sleep(delay)
                 process.send_signal(number)
-                _, err = process.communicate(timeout=30)  # much less on a quiet machine
+                _, err = process.communicate(timeout=100)  # much less on a quiet machine
             finally:
                 process.kill()
         assert (process.returncode, "interrupted" in err, "Traceback" in err) == (130, True, False)

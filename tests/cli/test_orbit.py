@@ -276,7 +276,7 @@ def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
     while not path.exists() or not path.stat().st_size:  # the first records are in the file
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=30)
+    process.communicate(timeout=100)
     assert process.returncode == 130
     records = [json.loads(line) for line in path.read_text().splitlines()]
     steps = [record["step"] for record in records[1:-1]]

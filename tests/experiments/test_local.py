@@ -62,15 +62,15 @@ def start() -> Iterator[Started]:
 
 
 def fault(order: int, seed: int = 1, limits: TaskLimits | None = None) -> Job:
-    return Job(Task("fault", None, {"order": order, "seed": seed}), limits or TaskLimits(20.0, 400_000_000))
+    return Job(Task("fault", None, {"order": order, "seed": seed}), limits or TaskLimits(100.0, 400_000_000))
 
 
 def pause(milliseconds: int, seed: int = 0, limits: TaskLimits | None = None) -> Job:
-    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or TaskLimits(20.0))
+    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or TaskLimits(100.0))
 
 
 def signalled(number: int, times: int) -> Job:
-    return Job(Task("signalled", None, {"order": int(number), "seed": times}), TaskLimits(20.0))
+    return Job(Task("signalled", None, {"order": int(number), "seed": times}), TaskLimits(100.0))
 
 
 def tries(folder: Path, number: int, times: int) -> int:
@@ -90,7 +90,7 @@ def done(jobs: Sequence[Job], workers: int = 2, **settings: Any) -> dict[str, Re
 def pids_of(workers: LocalWorkers) -> list[int]:
     """The processes at work, once they wait for tasks or have one."""
     at_work = [worker for worker, _ in workers._running.values()]
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 100
     while not all(worker.is_ready for worker in at_work):
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -106,7 +106,7 @@ def is_running(pid: int) -> bool:
 
 
 def wait_until_gone(pids: Sequence[int]) -> None:
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 100
     while any(map(is_running, pids)):
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -171,7 +171,7 @@ def test_answers_of_megabytes_come_whole_with_where_and_how_they_came_about(faul
     assert record.host
     assert set(record.versions) == {"kahanmaps", "python", "python-flint", "flint"}
     assert record.finished.endswith("+00:00")
-    assert 0 < record.seconds < 5
+    assert record.seconds > 0
     assert record.peak_memory is None or record.peak_memory > 10_000_000
 
 
@@ -217,13 +217,13 @@ def test_an_error_that_comes_of_a_want_of_memory_is_told_as_such(error, is_memor
 
 
 def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
-    records = done([pause(300, seed, TaskLimits(time=1.0)) for seed in range(6)], workers=1)
-    assert all(record.is_ok for record in records.values())  # 1.8 seconds in one worker
+    records = done([pause(300, seed, TaskLimits(time=3.0)) for seed in range(11)], workers=1)
+    assert all(record.is_ok for record in records.values())  # 3.3 seconds in one worker
 
 
 def test_what_earlier_tasks_left_belongs_to_the_memory_of_a_task():
     jobs = [
-        Job(Task("use", None, {"steps": steps, "seed": seed}), TaskLimits(20.0, 60_000_000))
+        Job(Task("use", None, {"steps": steps, "seed": seed}), TaskLimits(100.0, 60_000_000))
         for seed, steps in enumerate((40, 48, 54, 65, 68, 72))
     ]
     among, alone = done(jobs, workers=1), done(jobs, workers=1, group_seconds=0.0)
@@ -246,7 +246,7 @@ def test_the_limit_of_memory_ends_with_the_task_so_that_its_result_can_be_told()
 
 
 def test_an_error_nobody_expected_is_tried_again_in_a_fresh_worker():
-    jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), TaskLimits(20.0)) for seed in range(2)]
+    jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), TaskLimits(100.0)) for seed in range(2)]
     assert all(record.is_ok for record in done(jobs, workers=1).values())
 
 
@@ -299,7 +299,7 @@ def test_a_worker_that_dies_costs_no_task_whether_it_has_one_or_not(start: Start
         for worker in workers._idle:
             os.kill(worker.process.pid, number)
         workers.submit(pause(1, seed))
-    assert [record.is_ok for record in workers.wait(20.0) or workers.wait(20.0)] == [True]
+    assert [record.is_ok for record in workers.wait(100.0) or workers.wait(100.0)] == [True]
 
 
 @pytest.mark.parametrize("seconds", quick([0.0, 0.05, 0.15], [0.05]))
@@ -311,7 +311,7 @@ def test_ctrl_c_does_not_reach_a_worker_that_begins(start: Started, seconds: flo
     assert worker.process.pid is not None
     time.sleep(seconds)
     os.kill(worker.process.pid, signal.SIGINT)
-    (record,) = workers.wait(20.0)
+    (record,) = workers.wait(100.0)
     assert record.is_ok
     assert workers._idle == [worker]
 
@@ -326,7 +326,7 @@ def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_k
     assert len(pids) == workers.in_flight == 2
     workers.close()
     workers.close()
-    assert time.monotonic() - begin < 15  # otherwise they would work until the time of their tasks is over, 20 s
+    assert time.monotonic() - begin < 50  # they would work for a minute and more
     assert not any(map(is_running, pids))
 
 
@@ -418,7 +418,7 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
     process = subprocess.Popen(
         [*command, "-q"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 100
     while not stored(tmp_path / "wild.db"):
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -429,7 +429,7 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
     assert len(children) >= 2
     for pid in [process.pid, *children] if first == "parent" else [*children, process.pid]:
         os.kill(pid, number)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=100)
     assert process.returncode == (130 if number in (signal.SIGINT, signal.SIGTERM) else -number), err
     wait_until_gone(children)
     with Store.open(tmp_path / "wild.db", readonly=True) as store:

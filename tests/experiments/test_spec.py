@@ -2,7 +2,6 @@
 
 import json
 import re
-import time
 import tracemalloc
 from itertools import islice, product
 
@@ -277,7 +276,6 @@ def test_the_limits_of_an_experiment_come_before_those_of_all():
 )
 def test_absurd_products_are_refused_in_no_time_and_space(axes, told):
     text = LORENZ + f"axes = {{{axes}}}" + ('\nzip = [["eps", "seed"]]' if "1..5" in axes else "")
-    begin = time.perf_counter()
     tracemalloc.start()
     try:
         ((key, sentence),) = mistakes(text)
@@ -287,7 +285,7 @@ def test_absurd_products_are_refused_in_no_time_and_space(axes, told):
     assert key == "experiments"
     assert "expected at most 1,000,000 (--max-tasks allows more)" in sentence
     assert told in sentence
-    assert (time.perf_counter() - begin < 5, peak < 50_000_000) == (True, True)  # 20 ms and 1 MB
+    assert peak < 50_000_000  # 1 MB
 
 
 def test_more_tasks_may_be_allowed_and_are_not_enumerated():
