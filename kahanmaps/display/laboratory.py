@@ -127,7 +127,7 @@ def analysis_text(found: Analysis) -> str:
     lines = [analysis_head(found)]
     for name, told in found.sections:
         lines += ["", name, *(f"{line.status}\t{line.text}" for line in told)]
-    return "\n".join([*lines, "", "verdict", f"{found.conclusion.kind}\t{found.conclusion.sentence}"])
+    return "\n".join([*lines, "", "verdict", f"{found.conclusion.kind}\t{found.conclusion.sentence}", found.work])
 
 
 @html_form.register

@@ -49,8 +49,13 @@ class Analysis(Findings, Printed):
         """For `pickle`, which has no names for the functions of the table: there the class says which parts."""
         return {name: value for name, value in vars(self).items() if value is not ANALYSES}
 
+    @property
+    def work(self) -> str:
+        """How much was to be done and was: effort 1, 12.3 million units."""
+        return f"effort {self.effort}, {self.units / 1e6:.1f} million units"
+
     def interrupt(self, reason: str = "interrupted") -> None:
-        """Leave out the parts that are pending, for this reason."""
+        """Leave out the parts that are pending, for this reason: Ctrl-C, or that the time of a `time_limit` is over."""
         self.skipped += [f"{part}: {reason}" for part in self.pending]
         self.pending.clear()
         self.interrupted = True

@@ -66,7 +66,6 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
             report.found.interrupt("stopped (--seconds)" if search.is_over else "interrupted")
     found = report.found
     assert found is not None
-    work = f"effort {found.effort}: {found.units / 1e6:.3g} million units of work"
     if as_json:
         print_json(found.to_json())
     elif markdown:
@@ -76,13 +75,13 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
             lines += [f"## {name}", ""]
             lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
             lines.append("")
-        echo("\n".join([*lines, work]))
+        echo("\n".join([*lines, found.work]))
     else:
         report.tell(found.sections)
         final = found.conclusion
         tell("\nverdict", style="bold")
         tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
-        tell(work)
+        tell(found.work)
     if search.is_over:
         return 3
     if found.interrupted:

@@ -17,25 +17,31 @@ from kahanmaps_cli.screen.value_rows import Cell, table
 _SHOWN = 8  # degrees in a line of a table
 
 
+# Of the picture as well.
+degree_options: Callable[[opt.F], opt.F] = opt.stack(
+    opt.eps_options,
+    opt.effort_options,
+    click.option(
+        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
+    ),
+    click.option(
+        "--max-degree",
+        type=int,
+        metavar="D",
+        default=lib.ITERATE_DEGREE,
+        show_default=True,
+        help="Work out no larger degree.",
+    ),
+    opt.seed_option,
+)
+
+
 @click.command("degrees")
 @opt.system_options
-@opt.eps_options
-@opt.effort_options
-@click.option(
-    "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
-)
-@click.option(
-    "--max-degree",
-    type=int,
-    metavar="D",
-    default=lib.ITERATE_DEGREE,
-    show_default=True,
-    help="Work out no larger degree.",
-)
+@degree_options
 @click.option(
     "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."
 )
-@opt.seed_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -14,10 +15,25 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
 
+# Of the picture as well.
+height_options: Callable[[opt.F], opt.F] = opt.stack(
+    opt.eps_options,
+    click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit."),
+    click.option(
+        "--max-digits",
+        type=Whole(1),
+        metavar="N",
+        default=20_000,
+        show_default=True,
+        help="Digit budget of each orbit.",
+    ),
+    opt.effort_options,
+    opt.seed_option,
+)
+
 
 @click.command("heights")
 @opt.system_options
-@opt.eps_options
 @click.option(
     "--random",
     "--starts",
@@ -35,12 +51,7 @@ from kahanmaps_cli.screen.value_rows import Cell, table
     metavar="X",
     help="Instead: this start, e.g. 1/2,-1/3,0.25. Repeatable.",
 )
-@click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit.")
-@click.option(
-    "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
-)
-@opt.effort_options
-@opt.seed_option
+@height_options
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
     """How fast the heights of exact orbits of the map of SYSTEM grow, from several starts.

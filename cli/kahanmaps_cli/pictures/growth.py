@@ -11,8 +11,8 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import InputError
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.commands.degrees import is_done, measured
-from kahanmaps_cli.commands.heights import require_heights, surveyed
+from kahanmaps_cli.commands.degrees import degree_options, is_done, measured
+from kahanmaps_cli.commands.heights import height_options, require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawn, picture
 from kahanmaps_cli.screen.progress import Search
@@ -31,20 +31,7 @@ _scale_option = click.option(
     click.argument("systems", nargs=-1, metavar="[SYSTEM]..."),
     opt.inline_options,
     click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
-    opt.eps_options,
-    opt.effort_options,
-    click.option(
-        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
-    ),
-    click.option(
-        "--max-degree",
-        type=int,
-        metavar="N",
-        default=lib.ITERATE_DEGREE,
-        show_default=True,
-        help="Work out no larger degree.",
-    ),
-    opt.seed_option,
+    degree_options,
     _scale_option,
 )
 def degrees(options: dict[str, Any], progress: Search) -> Drawn:
@@ -103,22 +90,11 @@ def degrees(options: dict[str, Any], progress: Search) -> Drawn:
     "heights",
     opt.system_options,
     click.option("--from", "record", metavar="FILE", help="Written by heights --json, instead of SYSTEM."),
-    opt.eps_options,
     click.option("--random", "count", type=Whole(1), metavar="N", help="N starts drawn at random (default 3)."),
     click.option(
         "--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable."
     ),
-    click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit."),
-    click.option(
-        "--max-digits",
-        type=Whole(1),
-        metavar="N",
-        default=20_000,
-        show_default=True,
-        help="Digit budget of each orbit.",
-    ),
-    opt.effort_options,
-    opt.seed_option,
+    height_options,
     _scale_option,
 )
 def heights(options: dict[str, Any], progress: Search) -> Drawn:
