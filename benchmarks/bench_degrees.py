@@ -38,7 +38,7 @@ PARI = "PARI/GP: matsolve over GF(p)(t), two lines"
 
 def ours(system: QuadraticSystem, n: int, patterns: Patterns | None = None) -> list[int]:
     """The degrees from d_0 = 1 to d_n."""
-    found = degree_growth(system, EPS, max_terms=n, seconds=600, max_degree=10**6, patterns=patterns)
+    found = degree_growth(system, EPS, max_terms=n, effort=8, max_degree=10**6, patterns=patterns)
     return list(found.degrees)
 
 
