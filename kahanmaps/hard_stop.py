@@ -44,5 +44,7 @@ def time_limit(seconds: float | None) -> Iterator[None]:
         outer, interval = signal.setitimer(signal.ITIMER_REAL, seconds)
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, outer, interval)
+        left, _ = signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
+        if outer:  # a timer around this one goes on, less the time that went by meanwhile
+            signal.setitimer(signal.ITIMER_REAL, max(1e-6, outer - (seconds - left)), interval)

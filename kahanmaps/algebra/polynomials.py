@@ -202,7 +202,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     if own is not None:
         return own
     count(1 + 3 * len(polynomial))
-    powers: list[list[Any]] = [[field.one, entry] for entry in point]
+    powers = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():
         for monomial, coefficient in polynomial.terms():

@@ -10,13 +10,13 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.time_limit import TimeLimit
 
 
 def system_of(*rhs: str) -> QuadraticSystem:

@@ -12,6 +12,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.scan import scan as scan_module
@@ -20,7 +21,6 @@ from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, _goes_on, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
 from kahanmaps.maps.residues import families
-from kahanmaps.time_limit import TimeLimit
 
 THREE_LINES = """variables = ["x", "y"]
 parameters = { g1 = 1, g2 = 1 }

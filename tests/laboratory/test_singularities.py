@@ -12,6 +12,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.singular import outcomes
 from kahanmaps.laboratory.singular.jets import (
     image_of,
@@ -22,7 +23,6 @@ from kahanmaps.laboratory.singular.singularities import default_eps, singulariti
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.time_limit import TimeLimit
 
 PRIME = 2_305_843_009_213_693_951
 

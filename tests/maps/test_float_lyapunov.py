@@ -10,11 +10,11 @@ from flint import fmpq_mat
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.time_limit import TimeLimit
 
 
 def system_of(*rhs: str) -> QuadraticSystem:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.scan.scan import scan

@@ -31,6 +31,7 @@ from kahanmaps.algebra.printing import attributes, format_number
 from kahanmaps.algebra.work import Budget
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import ITERATE_DEGREE, budget_for
 from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
@@ -52,7 +53,6 @@ from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike, as_map
-from kahanmaps.time_limit import TimeLimit
 
 _MOST_TERMS = 10_000
 _LINES = 2

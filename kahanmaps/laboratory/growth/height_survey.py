@@ -21,12 +21,12 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import HeightGrowth, height_growth
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike, as_map
-from kahanmaps.time_limit import TimeLimit
 
 DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
 DEFAULT_STARTS = 3

@@ -23,6 +23,7 @@ from kahanmaps.algebra.work import Budget, units_at
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, counted
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import OF_DEGREES, Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.curves import Ended
@@ -36,7 +37,6 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import processors
-from kahanmaps.time_limit import TimeLimit
 
 Progress = Callable[[str], None]
 

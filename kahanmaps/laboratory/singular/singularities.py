@@ -27,6 +27,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget, count
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
+from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
@@ -61,7 +62,6 @@ from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.time_limit import TimeLimit
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
