@@ -5,6 +5,9 @@ bounded size is computed. A finite set of solutions is then read off from a matr
 ring, whose rational eigenvalues are the values of a linear form at the rational solutions. What is left is told, never
 dropped: linear families with free variables, equations that this does not solve, and how many solutions are not
 rational. Every step loses no rational solution.
+
+What FLINT cannot interrupt is bounded by size: Groebner bases go one S-polynomial after the other here, and polynomials
+in several variables are factored up to a number of terms. All counts as work, in units fitted to measurements.
 """
 
 from __future__ import annotations
@@ -13,17 +16,23 @@ import itertools
 import random
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from heapq import heappop, heappush
+from math import sqrt
 
-from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly_ctx, fmpz_mpoly_vec
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 
-# Of a Groebner basis: polynomials, terms of one, bits of a coefficient. FLINT cannot be interrupted.
-GROEBNER_LIMITS = (120, 400, 4_000)
+MAX_BASIS, MAX_TERMS, MAX_BITS = (
+    120,
+    400,
+    4_000,
+)  # of a Groebner basis: polynomials, terms of one, bits of a coefficient
+MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored, which takes some 20 ms then
+SPENT = "the budget was spent (--effort)"
 MAX_PARTS = 400  # points, families and unsolved parts together
 MAX_QUOTIENT = 130  # dimension of the quotient ring, so the number of solutions over the complex numbers
 
@@ -124,6 +133,7 @@ def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
     # A polynomial with all the monomials has them in the order of the ring.
     order = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
     places = {tuple(m): k for k, m in enumerate(order)}
+    count(10 + 5 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 40)
     matrix = fmpq_mat(len(nonzero), len(places))
     for i, p in enumerate(nonzero):
         for monomial, value in p.terms():
@@ -149,6 +159,7 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
     leads = [(tuple(g.monoms()[0]), g) for g in basis]
     while not p.is_zero():
         top, value = tuple(p.monoms()[0]), p.leading_coefficient()
+        count(10 + len(p) + len(leads) / 2)
         for lead, g in leads:
             if all(a <= b for a, b in zip(lead, top, strict=True)):
                 rest = context.from_dict({tuple(b - a for a, b in zip(lead, top, strict=True)): fmpq(1)})
@@ -221,7 +232,7 @@ class _Solver:
             self.found.components.append(SolutionComponent(values))
             return
         if self.budget.is_spent:
-            self.stopped = "the budget is spent"
+            self.stopped = SPENT
         elif len(self.found.components) + len(self.found.unsolved) > MAX_PARTS:
             self.stopped = f"there are more than {MAX_PARTS} parts"
         if self.stopped:
@@ -232,6 +243,7 @@ class _Solver:
                 context = p.context()
                 gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
                 gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
+                count(sum(5 + len(q) * len(p) for q in (*given, *values)))
                 put = [tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (given, values)]
                 self.solve(list(put[0]), put[1])
                 return
@@ -249,9 +261,10 @@ class _Solver:
         if based:
             self._finite(equations, values)
             return
-        basis = groebner(equations)
+        basis = groebner(equations, self.budget)
         if basis is None:
-            self._give_up(equations, values, "a Groebner basis would be too large")
+            spent = self.budget.is_spent
+            self._give_up(equations, values, SPENT if spent else "a Groebner basis would be too large")
             self.found.without_basis.append(SolutionComponent(values, tuple(equations)))
             return
         self.solve(basis, values, based=True)
@@ -271,15 +284,23 @@ class _Solver:
         context, places = form.context(), {m: k for k, m in enumerate(quotient)}
         matrix = fmpq_mat(len(quotient), len(quotient))  # of the multiplication by the form in the quotient ring
         for k, m in enumerate(quotient):
+            if self.budget.is_spent:
+                self._give_up(basis, values, SPENT)
+                return
             for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
                 matrix[places[tuple(int(e) for e in monomial)], k] = value
+        size = max((max(abs(e.p), e.q).bit_length() for e in matrix.entries()), default=1)
+        count(20 + len(quotient) ** 3 * size**1 / 200)
         _, factors = matrix.charpoly().factor()
         for factor, _ in factors:
             if factor.degree() > 1:
                 text = f"groups of {factor.degree()} conjugate solutions"
-                at_form = form * 0
+                # The factor at the form, in the quotient ring: multiplied out it may have millions of terms.
+                value = fmpq_mat(len(quotient), 1)
                 for coefficient in reversed(factor.coeffs()):
-                    at_form = at_form * form + coefficient
+                    value = matrix * value
+                    value[0, 0] += coefficient
+                at_form = context.from_dict(dict(zip(quotient, value.entries(), strict=True)))
                 self._no_rational_point(text, [*basis, at_form], values)
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
@@ -297,32 +318,92 @@ class _Solver:
 
 def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
     """The factors of that one of the equations that falls apart best, None where none does."""
-    products = [p.factor()[1] for p in equations]
+    products = []
+    for p in equations:
+        used = sum(e > 0 for e in p.degrees())
+        if used == 1:
+            bits = max(max(abs(c.p), c.q).bit_length() for c in p.coeffs())
+            count(30 + degree(p) ** 2 * (1 + bits / 200) / 2)
+        elif len(p) <= MAX_FACTORED:
+            count(30 + 4 * used**2 + 3 * len(p))
+        else:
+            continue
+        products.append(p.factor()[1])
     reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
     return min(reducible, key=lambda one: (max(map(degree, one)), sum(map(len, one))), default=None)
 
 
-def groebner(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
-    """The reduced Groebner basis, graded and reverse lexicographic, or None if it exceeds the limits.
+def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly] | None:
+    """The reduced Groebner basis, graded and reverse lexicographic, or None if it exceeds the limits or the budget.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
-    >>> groebner([x*y - 1, x**2 - y])
+    >>> groebner([x*y - 1, x**2 - y], Budget())
     [x*y - 1, x^2 - y, y^2 - x]
     """
     context = equations[0].context()
     integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
+    basis: list[fmpz_mpoly] = []
+    leads: list[tuple[int, ...]] = []
+    packed: list[int] = []  # the exponents of one, 16 bits each: it divides b if no bit of the guard is borrowed in b
+    guard = sum(1 << 16 * i + 15 for i in range(integers.nvars()))
+    # Pairs of polynomials, those first whose leading monomials have the smallest common multiple in this order.
+    pairs: list[tuple[int, list[int], int, int]] = []
+    waiting: set[tuple[int, int]] = set()  # the same pairs
+    bits = 1  # of the longest coefficient
 
-    cleared = []
-    for p in equations:
+    def pack(monomial: Iterable[int]) -> int:
+        return sum(e << 16 * i for i, e in enumerate(monomial))
+
+    def add(p: fmpz_mpoly) -> bool:
+        """Whether it is within the limits; then it is added."""
+        nonlocal bits
+        bits = max(bits, *(abs(c).bit_length() for c in p.coeffs()))
+        if len(basis) >= MAX_BASIS or len(p) > MAX_TERMS or bits > MAX_BITS:
+            return False
+        lead = tuple(map(int, p.monoms()[0]))
+        for i, other in enumerate(leads):
+            common = list(map(max, lead, other))
+            if sum(common) < sum(lead) + sum(other):  # else it reduces to 0, by Buchberger's criterion
+                heappush(pairs, (sum(common), [-e for e in reversed(common)], i, len(basis)))
+                waiting.add((i, len(basis)))
+        basis.append(p)
+        leads.append(lead)
+        packed.append(pack(lead))
+        return True
+
+    for p in filter(None, equations):
         below = common_denominator(p)
-        cleared.append(integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()}))
-    vector = fmpz_mpoly_vec(cleared, integers)
-    result: Any = vector.buchberger_naive(GROEBNER_LIMITS)
-    basis, done = result
-    if not done:
-        return None
-    return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in basis.autoreduction()]
+        cleared = integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()})
+        if not add(cleared.primitive()[1]):
+            return None
+    used = sum(any(lead[i] for lead in leads) for i in range(integers.nvars()))
+    vector = fmpz_mpoly_vec(basis, integers)
+    while pairs:
+        if budget.is_spent:
+            return None
+        total, _, i, j = heappop(pairs)
+        waiting.remove((i, j))
+        count(4 + len(basis) / 10)
+        common = pack(map(max, leads[i], leads[j])) + guard
+        # A third leading monomial divides it, and both pairs with that are done: it reduces to 0 as well.
+        if any(
+            (common - lead) & guard == guard
+            and k not in (i, j)
+            and (min(i, k), max(i, k)) not in waiting
+            and (min(j, k), max(j, k)) not in waiting
+            for k, lead in enumerate(packed)
+        ):
+            continue
+        s_polynomial = basis[i].spoly(basis[j])
+        mean = sum(map(len, basis)) / len(basis)
+        count(5 + mean * total * used * sqrt(used * bits * len(s_polynomial)) / 200)
+        remainder = s_polynomial.reduction_primitive_part(vector)
+        if not remainder.is_zero():
+            if not add(remainder):
+                return None
+            vector = fmpz_mpoly_vec(basis, integers)
+    return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in vector.autoreduction()]
 
 
 def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:

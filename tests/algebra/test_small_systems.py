@@ -3,20 +3,20 @@
 import itertools
 
 import pytest
-from flint import fmpq
+from flint import Ordering, fmpq, fmpz_mpoly_ctx, fmpz_mpoly_vec
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import decoupling, independent, solve_system
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.small_systems import SPENT, decoupling, groebner, independent, normal_form, solve_system
+from kahanmaps.algebra.work import Budget, counted
 
 RING = ring(["x", "y", "z"])
 x, y, z = RING.gens()
 
 
-def solve(*equations):
-    return solve_system(equations, (x, y, z), Budget(10_000_000))
+def solve(*equations, units=1e7):
+    return solve_system(equations, (x, y, z), Budget(units))
 
 
 def points(found):
@@ -100,3 +100,39 @@ def test_planes_of_cubics_are_decoupled():
 @pytest.mark.parametrize("form", [x**3 + y**3 + z**3 + x * y * z, x**3 + x * y**2 + y * z**2 + 3 * x**2 * z])
 def test_a_cubic_that_is_no_sum_over_blocks_is_not_decoupled(form):
     assert decoupling([form], 3) is None
+
+
+CYCLIC = [x + y + z, x * y + y * z + z * x, x * y * z - 1]
+SPHERES = [x**2 + y**2 + z**2 - 3, x * y + 2 * z**2 - x - 2, 3 * x * z - y**2 - 2 * y]
+
+
+@pytest.mark.parametrize("equations", [CYCLIC, SPHERES, [x**3 - y * z, y**3 - x * z, z**3 - x * y], [x * y, 2 * x * y]])
+def test_groebner_bases_are_ones_of_the_same_ideal(equations):
+    basis = groebner(equations, Budget())
+    integers = fmpz_mpoly_ctx.get(("x", "y", "z"), Ordering.degrevlex)
+    vector = fmpz_mpoly_vec([integers.from_dict({m: int(c) for m, c in p.terms()}) for p in basis], integers)
+    assert vector.is_groebner()
+    given = fmpz_mpoly_vec([integers.from_dict({m: int(c) for m, c in p.terms()}) for p in equations], integers)
+    assert sorted(map(str, vector)) == sorted(map(str, given.buchberger_naive().autoreduction()))
+    assert not any(normal_form(p, basis) for p in equations)
+
+
+def test_a_groebner_basis_is_given_up_at_the_end_of_the_budget_and_at_its_limits():
+    before = counted()
+    assert groebner(SPHERES, Budget(1)) is None
+    assert counted() - before < 100
+    assert groebner([x**401 - 1, sum((x**k for k in range(401)), y)], Budget()) is None  # more than 400 terms
+
+
+def test_what_the_budget_did_not_suffice_for_is_unsolved():
+    found = solve(*SPHERES, units=1)
+    assert (found.complete, found.reason) == (False, SPENT)
+    assert solve(*SPHERES).complete
+
+
+def test_conjugate_solutions_of_a_large_degree_are_reduced():
+    found = solve(x**4 + y * z - 3, y**4 + x + z - 1, z**4 - x * y + 2)
+    assert found.complete
+    assert not found.components
+    assert found.irrational == ["groups of 64 conjugate solutions"]
+    assert all(sum(m) <= 12 for p in found.conjugate[0].equations for m in p.monoms())

@@ -18,7 +18,14 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_product
-from kahanmaps.algebra.small_systems import SolutionComponent, groebner, normal_form, quotient_monomials, solve_system
+from kahanmaps.algebra.small_systems import (
+    SPENT,
+    SolutionComponent,
+    groebner,
+    normal_form,
+    quotient_monomials,
+    solve_system,
+)
 from kahanmaps.algebra.work import Budget
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.defaults import budget_for
@@ -26,6 +33,7 @@ from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 6  # above it Groebner bases of quadrics may take long, and they cannot be interrupted
+_UNITS = 1e6  # for one Groebner basis at a given eps
 _KINDS = {1: "line", 2: "plane"}
 
 
@@ -88,7 +96,7 @@ class FixedPoints:
         value = normal_form(at_eps, self.equations)
         if value.is_constant():
             return not value.is_zero()
-        common = groebner([*self.equations, value]) if self.equations else None
+        common = groebner([*self.equations, value], Budget(_UNITS)) if self.equations else None
         return True if common is not None and any(p.is_constant() for p in common) else None
 
     def to_json(self) -> dict[str, Any]:
@@ -132,14 +140,13 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     if system.dim > MAX_DIMENSION:
         return FixedPointSearch((), f"they are sought up to dimension {MAX_DIMENSION}")
     context = ring(system.variables)
-    solved = solve_system(
-        [p for p in system.rhs if not p.is_zero()], context.gens(), budget_for("fixed points", effort)
-    )
+    budget = budget_for("fixed points", effort)
+    solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)
     found, undecided = [_on(system, part, []) for part in solved.components], ""
     for part in (*solved.conjugate, *solved.unsolved):
-        basis = None if part in solved.without_basis else groebner(part.equations)
+        basis = None if part in solved.without_basis else groebner(part.equations, budget)
         if basis is None:
-            undecided = solved.reason or "a Groebner basis would be too large"
+            undecided = solved.reason or (SPENT if budget.is_spent else "a Groebner basis would be too large")
         elif not any(p.is_constant() for p in basis):
             found.append(_on(system, part, basis))
     return FixedPointSearch(tuple(found), undecided)
