@@ -133,7 +133,7 @@ def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
     # A polynomial with all the monomials has them in the order of the ring.
     order = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
     places = {tuple(m): k for k, m in enumerate(order)}
-    count(10 + 5 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 40)
+    count(20 + 7 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 30)
     matrix = fmpq_mat(len(nonzero), len(places))
     for i, p in enumerate(nonzero):
         for monomial, value in p.terms():
@@ -222,6 +222,7 @@ class _Solver:
         """Add the solutions of `equations` to what was found; `based` says that they are a Groebner basis already."""
         if self.stopped:  # told once
             return
+        count(50)
         given = [p for p in equations if not p.is_zero()]
         equations = equations if based else independent(equations)
         if len(given) > len(equations):
@@ -243,7 +244,7 @@ class _Solver:
                 context = p.context()
                 gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
                 gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
-                count(sum(5 + len(q) * len(p) for q in (*given, *values)))
+                count(sum(20 + len(q) * len(p) for q in (*given, *values)))
                 put = [tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (given, values)]
                 self.solve(list(put[0]), put[1])
                 return
@@ -323,9 +324,9 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
         used = sum(e > 0 for e in p.degrees())
         if used == 1:
             bits = max(max(abs(c.p), c.q).bit_length() for c in p.coeffs())
-            count(30 + degree(p) ** 2 * (1 + bits / 200) / 2)
+            count(40 + degree(p) ** 2 * (1 + bits / 200) / 2)
         elif len(p) <= MAX_FACTORED:
-            count(30 + 4 * used**2 + 3 * len(p))
+            count(60 + 5 * used**2 + 3 * len(p))
         else:
             continue
         products.append(p.factor()[1])

@@ -320,6 +320,8 @@ def _commuting(found: CommutingSystems) -> Iterator[Line]:
         yield "", family.finding.evidence.summary
     if found.irrational:
         yield "note", f"more solutions, not rational: {'; '.join(found.irrational)}"
+    if found.note:
+        yield "note", found.note
     if found.discarded:
         yield "note", f"{found.discarded} solutions of the equations up to eps^{found.order} do not commute"
     if found.every_g_commutes:

@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from kahanmaps.algebra.printing import attributes, format_polynomial
+from kahanmaps.algebra.small_systems import SPENT
 from kahanmaps.algebra.work import Budget, units_at
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.inline import as_file
@@ -157,6 +158,7 @@ def analyze(
 
     Returns:
         An `Analysis`, the same on any machine at any load. Parts that could not be done are named in `skipped`.
+        Ctrl-C and a `time_limit` end it with an exception; what `reached` got last is then all that was completed.
 
     Raises:
         InputError: for eps = 0, unknown symbols, and an effort that is no integer from -20 to 40.
@@ -192,7 +194,9 @@ def analyze(
             if has_come:
                 with suppress(EOFError, OSError):  # the process was killed, or met an error, which it meets here again
                     outcome = outcomes.recv()
-            result, reason, spent = outcome or accounts[part.is_apart].outcome(part)
+            account = accounts[part.is_apart]
+            result, reason, spent = outcome or account.outcome(part)
+            account.book(part, spent)  # what the other process spent as well: this one may have to go on in its place
             found.units += spent
             if reason:
                 skipped[part.name] = f"{part.name}: {reason}"
@@ -217,15 +221,19 @@ class _Account:
 
     def outcome(self, part: Part) -> tuple[Any, str, int]:
         """What a part found; or None, and why it was not done; and the units that it took."""
-        weight, weights = self.run.weight(part), sum(map(self.run.weight, self.waiting))
-        self.waiting.remove(part)
-        budget = Budget(self.units * weight / weights)
+        if self.units <= 0:
+            return None, SPENT, 0
+        budget = Budget(self.units * self.run.weight(part) / sum(map(self.run.weight, self.waiting)))
         try:
             result, reason = part.look(self.run, **self.run.given(part, budget)), ""
         except KahanmapsError as error:
             result, reason = None, str(error)
-        self.units = max(0, self.units - budget.spent)
         return result, reason, budget.spent
+
+    def book(self, part: Part, spent: int) -> None:
+        """The part is done, and this is what it took."""
+        self.waiting.remove(part)
+        self.units -= spent
 
 
 @contextmanager
@@ -247,6 +255,7 @@ def _second_process(run: Run, parts: Sequence[Part], account: _Account) -> Itera
         with suppress(Exception):
             for part in parts:
                 result, reason, spent = account.outcome(part)
+                account.book(part, spent)
                 if not reason:
                     run.found[part.result] = result
                 sender.send((result, reason, spent))

@@ -13,9 +13,11 @@ from kahanmaps import KahanMap, draw_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
+from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
+from kahanmaps.laboratory.symmetry import commuting
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, judge_family, judge_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
@@ -147,7 +149,7 @@ def test_multiples_are_refuted_as_a_family():
 @given(st.lists(st.integers(-2, 2), min_size=12, max_size=12))
 def test_everything_found_commutes_exactly(numbers):
     f = system_of(("x", "y"), [[fmpq(n) for n in numbers[:6]], [fmpq(n) for n in numbers[6:]]])
-    found = commuting_systems(f, "quadratic", seconds=5)
+    found = commuting_systems(f, "quadratic", effort=-2)
     rng = random.Random(str(numbers))
     for solution in found.solutions:
         assert commute_exactly(f, solution.system, 2)
@@ -166,9 +168,9 @@ def test_the_zero_system(names):
     assert (quadratic.every_g_commutes, quadratic.dimension) == (True, [0, 3, 12][len(names.split())])
 
 
-def test_no_time_is_undecided_and_never_complete():
+def test_no_budget_is_undecided_and_never_complete():
     member = draw_with_eigenvalues([1, -2, 3], seed=7)
-    found = commuting_systems(member.chosen.system, seconds=1e-9)
+    found = commuting_systems(member.chosen.system, effort=Budget(0))
     assert not found.complete
     assert [g.trivial for g in found.solutions[:3]] == TRIVIAL
 
@@ -211,3 +213,13 @@ def test_too_large_is_undecided_with_a_reason():
     assert (found.dimension, found.complete) == (31, False)
     found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
     assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)
+
+
+def test_a_shape_that_was_given_up_is_told(monkeypatch):
+    f = load("lotka_volterra", {}).system
+    assert (commuting_systems(f).shape, commuting_systems(f).note) == ("quadratic", "")
+    monkeypatch.setattr(commuting, "QUICK_UNITS", 1)
+    found = commuting_systems(f)
+    assert found.shape == "linear"
+    assert found.note.startswith("the fields g of degree at most 2 with rational coefficients were tried first")
+    assert found.note in str(found)

@@ -111,7 +111,7 @@ def test_a_system_is_known_again_after_any_affine_change(name):
     n = load(name).dim
     P = fmpq_mat(n, n, [rng.randint(-2, 2) + 5 * (i % (n + 1) == 0) for i in range(n * n)])
     file = elsewhere(name, P, [fmpq(rng.randint(-2, 2)) for _ in range(n)], 3)
-    found = equivalent_system(file, seconds=60)
+    found = equivalent_system(file, effort=3)
     assert found is not None
     assert found.name == name
     assert holds(file, found)
@@ -121,10 +121,10 @@ def test_lines_of_fixed_points_are_a_frame():
     """An Euler top with its axes turned: three lines of fixed points lead back to them."""
     P = fmpq_mat([[1, 1, 0], [0, 1, 1], [1, 0, 3]])
     file = elsewhere("euler_top", P, [fmpq(0)] * 3, 1)
-    found = equivalent_system(file, seconds=60)
+    found = equivalent_system(file, effort=3)
     assert found is not None
     assert (found.name, holds(file, found)) == ("euler_top", True)
-    assert equivalent_system(file, FixedPointSearch((), ""), 60) is None  # without them it is not seen
+    assert equivalent_system(file, FixedPointSearch((), ""), 3) is None  # without them it is not seen
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_lines_of_fixed_points_are_a_frame():
 )
 def test_other_systems_are_not_taken_for_one(equations):
     file = System(equations)
-    assert equivalent_system(file, seconds=60) is None
+    assert equivalent_system(file, effort=3) is None
 
 
 def test_a_near_miss_is_no_equivalence():

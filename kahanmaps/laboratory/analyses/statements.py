@@ -335,7 +335,7 @@ def of_commuting_systems(found: Findings) -> list[KnownStatement]:
                 number = counted(len(moved), "parameter")
                 text = f"commutes with a linear family of {number}, which find-commuting writes out"
             lines.append(KnownStatement(Known(family.finding.verdict), text))
-    lines += [KnownStatement(Known.NOTE, text) for text in search.irrational]
+    lines += [KnownStatement(Known.NOTE, text) for text in (*search.irrational, search.note) if text]
     lines += [KnownStatement(Known.UNDECIDED, text) for text in search.undecided]
     if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):
         lines.append(KnownStatement(Known.PROVED, f"among the {search.kind_text} only 0, f and -f commute with f"))

@@ -24,7 +24,14 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
-from kahanmaps.algebra.small_systems import SolutionComponent, decoupling, normal_form, solve_system, without_contained
+from kahanmaps.algebra.small_systems import (
+    SPENT,
+    SolutionComponent,
+    decoupling,
+    normal_form,
+    solve_system,
+    without_contained,
+)
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
@@ -49,7 +56,9 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_s
 
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
 MAX_TOLD = 6  # sentences about equations that were not solved
-QUICK_DIMENSION, QUICK_UNITS = 3, 1e6  # all quadratic g are tried by default: some hundredths of this as a rule
+# All quadratic g are tried by default, within the same units at every effort, so that the shape is the same in every
+# command; some hundredths of this suffice as a rule.
+QUICK_DIMENSION, QUICK_UNITS = 3, 1e6
 MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
 
 
@@ -118,6 +127,7 @@ class CommutingSystems(Printed):
     order: int = 2  # the highest power of eps of which equations were taken
     undecided: list[str] = field(default_factory=list)
     root: str = ""  # the algebraic number in f, where there is one
+    note: str = ""  # on a shape that was tried before this one, and given up
 
     @property
     def complete(self) -> bool:
@@ -172,9 +182,9 @@ def commuting_systems(
     """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
     `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
-    where the dimension is at most 3 and little work finds all of them, else those. Exact over Q; what no lemma
-    proves is supported at random points, with a probability of error below 2^-error_bits. Each more of `effort` doubles
-    the work that the search may take. With a matrix C, for which C f' = f' C, only g with C g' = g' C. Raises
+    where the dimension is at most 3 and little work finds all of them, else those, which a `note` says. Exact over Q;
+    what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. Each more of
+    `effort` doubles the work that the search may take. With a matrix C, for which C f' = f' C, only g with C g' = g' C. Raises
     InputError for another shape or a bound that is not positive. What is too large is told in `undecided`. Source:
     petrera-suris-2016.
 
@@ -184,14 +194,15 @@ def commuting_systems(
     """
     system, budget = as_system(system), budget_for("commuting systems", effort)
     if shape is None:
-        if system.dim <= QUICK_DIMENSION:
-            quick = Budget(min(budget.left, QUICK_UNITS))
-            found = commuting_systems(
-                system, "quadratic", seed=seed, error_bits=error_bits, effort=quick, progress=progress
-            )
+        note = ""
+        options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "progress": progress}
+        if system.dim <= QUICK_DIMENSION and not budget.is_spent:
+            found = commuting_systems(system, "quadratic", **options, effort=Budget(QUICK_UNITS))
             if found.complete:
                 return found
-        shape = "linear"
+            note = f"the {found.kind_text} were tried first, and little work did not find all (--shape quadratic)"
+        found = commuting_systems(system, "linear", **options, effort=budget, C=C)
+        return replace(found, note=note)
     if shape not in SHAPES:
         raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
     settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
@@ -251,7 +262,7 @@ class _Search:
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
             if not self._in_budget() and weights not in trivial:
-                found.undecided.append(f"the time is over: {len(others) + 3 - k} solutions were not judged")
+                found.undecided.append(f"{SPENT}: {len(others) + 3 - k} solutions were not judged")
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
             finding = judge_field(f, field_at(self.space, weights), self.settings)
@@ -306,7 +317,7 @@ class _Search:
         if any(known.contains(family) for known in self.families):
             return
         if not self._in_budget():
-            self._leave(family, "the time is over")
+            self._leave(family, SPENT)
             return
         self.settings.progress(f"a family with {len(family.free)} parameters")
         finding = judge_family(self.f, self.space, family, self.settings)

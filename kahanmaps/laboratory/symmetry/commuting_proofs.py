@@ -20,6 +20,7 @@ from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
+from kahanmaps.algebra.work import count
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding
 from kahanmaps.checks.commute import commutativity
@@ -47,6 +48,7 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
     for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
         if g == f.scaled(factor):
             return Finding(claim, theorems.PROVED, Evidence(theorems.METHOD, why), formula=_FORMULA)
+    count(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
     proof = theorems.commuting_by_splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
     return judge(claim, identity, settings, proof, formula=_FORMULA)
@@ -54,6 +56,7 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
 
 def judge_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
     """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
+    count(2_000 + 350 * f.dim**2 * len(family.free))
     members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
     proof = affine(f, members) or _in_dimension_one(f, f)
     claim = "the Kahan maps of f and of every member g of the family commute"

@@ -24,12 +24,12 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.small_systems import independent
+from kahanmaps.algebra.work import count
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
 MAX_DIMENSION = 100  # of a space whose basis is kept and verified
 MAX_UNKNOWNS = 900  # a matrix of so many rows and columns takes seconds
-
 
 # A vector of power series in eps: series[k][i] is the coefficient of eps^k in coordinate i.
 Series = list[list[Any]]
@@ -118,7 +118,10 @@ class _Terms:
         """y + 2 eps v with v = g(y) + eps g'(y) v, order by order."""
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
+        terms_of = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
         for order in range(len(y)):
+            lengths = [len(e) if isinstance(e, fmpq_mpoly) else 1 for row in (*y[: order + 1], *v) for e in row]
+            count((order + 1) * (2 * len(terms_of) + sum(terms_of) * sum(lengths) / len(lengths) / 2))
             value = [fmpq(0)] * len(y[0])
             for i, terms in enumerate(self._terms):
                 for c, j, k in terms:
@@ -193,6 +196,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                         for k, (phi, slope) in itertools.product(range(n), scalars)
                     ]
                 )
+        count(500 + len(rows) * len(rows[0]) * (2 + len(rows[0]) / 400))
         kernel = nullspace(QQ, fmpq_mat(rows))
         if len(kernel) > MAX_DIMENSION:
             return CommutingSpace((f,), (QQ.identity(n),) * (shape == "linear"), len(kernel))

@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_mat, fmpz
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 12
@@ -132,10 +132,12 @@ def _walk(
     ]
 
     def fits(p: list[int], s: list[int]) -> bool:
-        return all(
-            numbers.get(tuple(p[k] for k in at), 0) * math.prod(s[k] for k in at) == numbers.get(at, 0) * sign
-            for at in equations[len(p) - 1]
-        )
+        for checked, at in enumerate(equations[len(p) - 1], 1):
+            if numbers.get(tuple(p[k] for k in at), 0) * math.prod(s[k] for k in at) != numbers.get(at, 0) * sign:
+                count(2 + 1.5 * checked)
+                return False
+        count(2 + 1.5 * len(equations[len(p) - 1]))
+        return True
 
     def further(p: list[int], s: list[int]) -> Iterator[list[tuple[int, int]] | None]:
         if budget.is_spent:

@@ -20,7 +20,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
@@ -181,6 +181,7 @@ def _matched(
     F is the frame. Then the terms of degree 2 are free of c and q, and are solved first.
     """
     n = f.dim
+    count(300 * n)
     entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
     # In the order in which they are set to their defaults where there is a choice.
     scales = [f"t{i}{j}" for i, j in entries]
