@@ -39,12 +39,17 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     def stop(*_: Any) -> None:
         raise TimeLimit(f"the time limit of {seconds:g} s is over")
 
-    previous, outer, interval = signal.signal(signal.SIGALRM, stop), 0.0, 0.0
+    outer, interval = signal.getitimer(signal.ITIMER_REAL)
+    if 0 < outer <= seconds:  # another limit around this one is over before it
+        yield
+        return
+    previous = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         outer, interval = signal.setitimer(signal.ITIMER_REAL, seconds)
         yield
     finally:
         left, _ = signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
-        if outer:  # a timer around this one goes on, less the time that went by meanwhile
-            signal.setitimer(signal.ITIMER_REAL, max(1e-6, outer - (seconds - left)), interval)
+        if outer:
+            signal.setitimer(signal.ITIMER_REAL, max(outer - (seconds - left), 1e-6), interval)

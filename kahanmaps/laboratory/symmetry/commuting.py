@@ -184,9 +184,9 @@ def commuting_systems(
     `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
     where the dimension is at most 3 and little work finds all of them, else those, which a `note` says. Exact over Q;
     what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. Each more of
-    `effort` doubles the work that the search may take. With a matrix C, for which C f' = f' C, only g with C g' = g' C. Raises
-    InputError for another shape or a bound that is not positive. What is too large is told in `undecided`. Source:
-    petrera-suris-2016.
+    `effort` doubles the work that the search may take. With a matrix C, for which C f' = f' C, only g with C g' = g' C.
+    Raises InputError for another shape or a bound that is not positive. What is too large is told in `undecided`.
+    Source: petrera-suris-2016.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2 + 1", "y^2 - x*y"])
     >>> [(g.trivial, str(g.finding.verdict)) for g in commuting_systems(f).solutions]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,7 +23,7 @@ from kahanmaps.whole_files import growing_file, whole_file, write_whole
 
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
-_LONG_LINE = 10_000  # characters, after which the next step may take minutes
+_UNFLUSHED = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
 _ENVELOPE = {"command": "orbit", "version": __version__}  # what every JSON object of a command begins with
 _TEXT = ("", ".txt", ".tsv", ".out", ".dat", ".log")  # endings of files of text
 
@@ -44,7 +43,7 @@ class Writer(ABC):
         self.stream = stream
         self.variables = list(variables)
         self.integrals = list(integrals)
-        self._flushed = time.monotonic()
+        self._unflushed = 0
 
     @abstractmethod
     def header(self, header: dict[str, Any]) -> None:
@@ -61,10 +60,10 @@ class Writer(ABC):
     def _line(self, text: str) -> None:
         self.stream.write(text + "\n")
         # Now and then, so that a reader of the file sees it grow and a kill loses little; always before long steps.
-        now = time.monotonic()
-        if now - self._flushed > 0.5 or len(text) > _LONG_LINE:
+        self._unflushed += len(text)
+        if self._unflushed > _UNFLUSHED:
             self.stream.flush()
-            self._flushed = now
+            self._unflushed = 0
 
 
 class Text(Writer):

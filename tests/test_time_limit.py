@@ -1,0 +1,166 @@
+"""The hard stop: the only thing that a clock decides, and no module of the library reads one for its answers."""
+
+import ast
+import math
+import signal
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+import kahanmaps
+from kahanmaps.documents.catalog import load
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.time_limit import TimeLimit, time_limit
+
+LIBRARY = Path(kahanmaps.__file__).parent
+pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers here")
+
+
+def busy():
+    while True:
+        math.sqrt(2)
+
+
+def test_a_busy_loop_is_stopped():
+    began = time.monotonic()
+    with pytest.raises(TimeLimit, match=r"the time limit of 0.05 s is over"), time_limit(0.05):
+        busy()
+    assert time.monotonic() - began < 10
+
+
+def test_it_is_like_an_interrupt_from_the_keyboard():
+    assert issubclass(TimeLimit, KeyboardInterrupt)
+    assert not issubclass(TimeLimit, Exception)  # so that what catches errors does not swallow it
+
+
+def test_what_is_done_in_time_is_not_disturbed_and_all_is_as_before():
+    before, timer = signal.getsignal(signal.SIGALRM), signal.getitimer(signal.ITIMER_REAL)[0]  # pytest may have one
+    with time_limit(20):
+        assert signal.getsignal(signal.SIGALRM) is not before
+    assert signal.getsignal(signal.SIGALRM) is before
+    assert timer - 10 < signal.getitimer(signal.ITIMER_REAL)[0] <= timer
+    with time_limit(None):
+        assert signal.getsignal(signal.SIGALRM) is before
+    with pytest.raises(ZeroDivisionError), time_limit(20):
+        1 // 0  # noqa: B018
+    assert signal.getsignal(signal.SIGALRM) is before
+
+
+@pytest.mark.parametrize(("outer", "inner", "which"), [(60, 0.02, "0.02"), (0.02, 60, "0.02")])
+def test_the_shorter_of_two_limits_stops(outer, inner, which):
+    with pytest.raises(TimeLimit, match=f"of {which} s"), time_limit(outer), time_limit(inner):
+        busy()
+
+
+def test_the_outer_limit_goes_on_after_the_inner_one():
+    def two():
+        with time_limit(0.01), suppress(TimeLimit):
+            busy()
+        busy()
+
+    with pytest.raises(TimeLimit, match=r"of 0.1 s"), time_limit(0.1):
+        two()
+
+
+@pytest.mark.parametrize("seconds", [0, -1, float("nan"), float("inf")])
+def test_other_times_are_refused(seconds):
+    with pytest.raises(InputError, match="expected a positive number"), time_limit(seconds):
+        pass
+
+
+def test_other_threads_are_refused():
+    errors = []
+
+    def work():
+        try:
+            with time_limit(1):
+                pass
+        except InputError as error:
+            errors.append(str(error))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert errors == ["found a time limit in another thread or on Windows, expected the main thread: give effort="]
+
+
+def test_what_an_analysis_had_completed_stays_as_it_is():
+    last = []
+
+    def reached(found):
+        last[:] = [found]
+        if len(found.pending) < 12:
+            busy()
+
+    with pytest.raises(TimeLimit) as stop, time_limit(0.5):
+        analyze(load("harmonic"), reached=reached)
+    (found,) = last
+    complete = analyze(load("harmonic"))
+    assert found.pending
+    done = [part for part in complete.parts if part.name not in found.pending]
+    assert [part.to_json(found) for part in done] == [part.to_json(complete) for part in done]
+    pending = list(found.pending)
+    found.interrupt(str(stop.value))
+    assert found.skipped == [f"{part}: the time limit of 0.5 s is over" for part in pending]
+    assert (found.interrupted, found.pending) == (True, [])
+
+
+# Nothing else reads a clock
+
+FLOORS = ("algebra", "family", "systems", "maps", "invariants", "checks", "paper", "laboratory")
+CLOCKS = {"time", "datetime", "timeit"}
+READINGS = {
+    "monotonic",
+    "perf_counter",
+    "process_time",
+    "time_ns",
+    "monotonic_ns",
+    "perf_counter_ns",
+    "utcnow",
+    "today",
+}
+DATES = {"errors.py"}  # datetime.date as a kind of value in a file
+
+
+def readings(source):
+    """What a module imports of clocks, and the calls that read one."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found += [name.name for name in node.names if name.name.split(".")[0] in CLOCKS]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").split(".")[0] in CLOCKS:
+            found += [f"{node.module}.{name.name}" for name in node.names]
+        elif isinstance(node, ast.Attribute) and node.attr in READINGS:
+            found.append(node.attr)
+    return found
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_no_answer_depends_on_a_clock(floor):
+    files = sorted((LIBRARY / floor).rglob("*.py"))
+    assert files
+    assert {str(path): found for path in files if (found := readings(path.read_text(encoding="utf-8")))} == {}
+
+
+def test_neither_do_the_files_beside_them():
+    files = [path for path in sorted(LIBRARY.glob("*.py")) if path.name not in DATES]
+    assert LIBRARY / "time_limit.py" in files
+    assert {path.name: found for path in files if (found := readings(path.read_text(encoding="utf-8")))} == {}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import time",
+        "from time import monotonic as m",
+        "import datetime as d",
+        "def f():\n    import time",
+        "t.monotonic()",
+    ],
+)
+def test_a_reading_of_a_clock_is_noticed(source):
+    assert readings(source)
