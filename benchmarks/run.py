@@ -1,6 +1,7 @@
 """All benchmarks (`make bench`): runs them, prints ratios, and writes results.json here and docs/benchmarks.md.
 
-    python benchmarks/run.py [--quick] [--only exact|fields|catalogue|iterate|float|degrees|analysis|memory] [--page]
+    python benchmarks/run.py [--quick] [--only exact|fields|catalogue|iterate|float|degrees|analysis|memory|units]
+        [--page]
 
 --quick takes less than a minute, on shorter orbits, and writes nothing; --only runs one part, and leaves what is on
 record of the others as it is; --page runs nothing and writes the page anew from the record. Peers that are absent are
@@ -29,12 +30,13 @@ import bench_exact
 import bench_iterate
 import bench_memory
 import flint
+import units
 from work import Absent, Row, format_ratio, gp_version, say, table
 
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results.json"
 PAGE = HERE.parent / "docs" / "benchmarks.md"
-PARTS = ("exact", "fields", "catalogue", "iterate", "float", "degrees", "analysis", "memory")
+PARTS = ("exact", "fields", "catalogue", "iterate", "float", "degrees", "analysis", "memory", "units")
 PACKAGES = ("python-flint", "numpy", "cypari", "gmpy2", "sympy", "scipy", "numba", "heyoka")
 FLOAT = "Float orbits"
 
@@ -78,6 +80,8 @@ def measured(part: str, quick: bool) -> list[Row]:
         return bench_analysis.measure(quick)
     if part == "memory":
         return bench_memory.measure(quick)
+    if part == "units":
+        return units.measure(quick)
     if quick:
         say("  left out: there is no quick form of it")
         return []
@@ -341,6 +345,10 @@ GROUPS = {
         "Time relative to what `analyze` does first to count integrals: how many polynomials of each degree vanish\n"
         "along orbits modulo two primes. All of `analyze` includes degree 7, formulas, densities, proofs, degrees,\n"
         "singularities and symmetries."
+    ),
+    units.GROUP: (
+        "Searches are bounded by counted work, so that their answers do not depend on the machine nor on its load.\n"
+        "The ratio is units per microsecond of the processor; a unit is meant to be one, within a factor of three."
     ),
 }
 
