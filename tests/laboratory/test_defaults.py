@@ -36,18 +36,17 @@ def command(name: str) -> click.Command:
     return found
 
 
-@pytest.mark.parametrize("part", defaults.SECONDS)
-def test_no_part_of_analyze_has_more_time_than_its_command(part: str) -> None:
-    longest = SHARES[part] * analysis._MOST_SECONDS
-    assert longest <= defaults.SECONDS[part]
-    [option] = [one for one in command(COMMANDS[part]).params if one.name == "seconds"]
-    assert option.default == defaults.SECONDS[part]
+@pytest.mark.parametrize("part", COMMANDS)
+def test_no_part_of_analyze_has_more_units_than_its_command(part: str) -> None:
+    assert SHARES[part] * analysis._MOST_UNITS <= defaults.UNITS[part]
+    [option] = [one for one in command(COMMANDS[part]).params if one.name == "effort"]
+    assert option.default == 1
 
 
 @pytest.mark.parametrize("dim", range(1, 5))
-def test_degrees_have_time_for_the_singularities_too(dim: int) -> None:
+def test_degrees_have_units_for_the_singularities_too(dim: int) -> None:
     shares = SHARES["singularities"] + SHARES["degrees"]
-    assert shares * analysis._SECONDS[dim] <= defaults.SECONDS["degrees"]
+    assert shares * analysis._UNITS[dim] <= defaults.UNITS["degrees"]
     [option] = [one for one in command("degrees").params if one.name == "max_degree"]
     assert option.default == defaults.ITERATE_DEGREE
 

@@ -40,11 +40,9 @@ DEGENERATE = json.loads((FOLDER / "degenerate" / "answers.json").read_text(encod
 KNOWN = FURTHER | DEGENERATE
 MODIFIED, DETERMINANT = "modified Hamiltonian", "determinant"  # of theorems, for which no formula is written out
 
-# Analysed in less than half a second. Those that would take long by default are given a time.
+# Analysed in less than half a second.
 FAST = ("nahm_icosahedral", "suslov_pencil", "riccati_pair", "gauss_skew", "volterra_open_3")
 FAST = (*FAST, "rabinovich_conservative", "zander_11m1_lines", "zander_112_affine")
-SECONDS = {"bogoyavlensky_5": 40, "coupled_euler_tops": 20, "volterra_open_5": 20, "volterra_periodic_6": 24}
-SECONDS |= {"weierstrass_times_lv": 10, "hamiltonian_4_generic": 12, "volterra_open_4": 10, "gyrostat_two": 8}
 BOUNDED = ("hamiltonian_6_generic",)  # has a test of its own
 EPS = ("1/10", "-2/7")
 
@@ -57,7 +55,7 @@ def file_of(name):
 
 @cache
 def analysed(name):
-    return analyze(file_of(name), seconds=SECONDS.get(name))
+    return analyze(file_of(name))
 
 
 @cache
@@ -223,5 +221,5 @@ def test_a_perturbed_system_no_longer_has_the_answer():
     name, old, new = "suslov_pencil", "(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
     assert old in text
-    found = analyze(parse_system(text.replace(old, new)), seconds=4)
+    found = analyze(parse_system(text.replace(old, new)))
     assert {"count", "growth"} <= differences(found, answer_for(name))

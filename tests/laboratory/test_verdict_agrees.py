@@ -9,7 +9,7 @@ from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.enclosure import enclose
 
 SYSTEMS: list[tuple[str, dict[str, Any]]] = [
-    ("lotka_volterra", {"seconds": 1}),
+    ("lotka_volterra", {"effort": -5}),
     ("lotka_volterra", {}),
     ("weierstrass", {}),
     ("weierstrass", {"eps": "1/5"}),
@@ -17,7 +17,7 @@ SYSTEMS: list[tuple[str, dict[str, Any]]] = [
     ("riccati", {}),
     ("harmonic", {}),
     ("euler_top", {"symbols": ["a1"]}),
-    ("lorenz", {"seconds": 5}),
+    ("lorenz", {"effort": -3}),
     ("x' = 0; y' = 0; z' = 0", {}),
 ]
 
