@@ -18,6 +18,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from math import sqrt
+from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
@@ -291,17 +292,17 @@ class _Solver:
             for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
                 matrix[places[tuple(int(e) for e in monomial)], k] = value
         size = max((max(abs(e.p), e.q).bit_length() for e in matrix.entries()), default=1)
-        count(20 + len(quotient) ** 3 * size**1 / 200)
+        count(20 + len(quotient) ** 3 * size / 200)
         _, factors = matrix.charpoly().factor()
         for factor, _ in factors:
             if factor.degree() > 1:
                 text = f"groups of {factor.degree()} conjugate solutions"
                 # The factor at the form, in the quotient ring: multiplied out it may have millions of terms.
-                value = fmpq_mat(len(quotient), 1)
+                vector = fmpq_mat(len(quotient), 1)
                 for coefficient in reversed(factor.coeffs()):
-                    value = matrix * value
-                    value[0, 0] += coefficient
-                at_form = context.from_dict(dict(zip(quotient, value.entries(), strict=True)))
+                    vector = matrix * vector
+                    vector[0, 0] += coefficient
+                at_form = context.from_dict(dict(zip(quotient, vector.entries(), strict=True)))
                 self._no_rational_point(text, [*basis, at_form], values)
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
@@ -344,7 +345,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     """
     context = equations[0].context()
     integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
-    basis: list[fmpz_mpoly] = []
+    basis: list[Any] = []  # fmpz_mpoly, of which type checkers do not know spoly
     leads: list[tuple[int, ...]] = []
     packed: list[int] = []  # the exponents of one, 16 bits each: it divides b if no bit of the guard is borrowed in b
     guard = sum(1 << 16 * i + 15 for i in range(integers.nvars()))

@@ -1,13 +1,14 @@
 """What a vector field tells by itself: fixed points, which are those of the map, and systems of the catalogue in it."""
 
 import random
+from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
 
 from kahanmaps import KahanMap, System
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.files import SystemFile, read_system
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
@@ -157,3 +158,11 @@ def test_a_system_of_the_catalogue_is_not_compared():
 def test_a_change_of_time_is_told_as_a_change_of_eps():
     found = equivalent_system(System("x' = 20*(y - x); y' = 2*x*(28 - z) - 2*y; z' = 2*x*y - 16/3*z"))
     assert found.text.endswith(", with 2*eps in place of eps")
+
+
+def test_the_conjugate_fixed_points_of_a_generic_system_in_dimension_6_are_counted():
+    path = Path(__file__).parent / "further_systems" / "hamiltonian_6_generic.toml"
+    found = fixed_points(read_system(path))
+    assert (found.undecided, [(one.dimension, one.count) for one in found.found]) == ("", [(0, 64)])
+    short = fixed_points(read_system(path), effort=-5)
+    assert (short.found, short.undecided) == ((), "the budget was spent (--effort)")
