@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-SYSTEMS = ("harmonic", "weierstrass", "lotka_volterra", "euler_top", "zhukovski_volterra_2", "volterra_periodic_4")
+SYSTEMS = ("harmonic", "weierstrass", "lotka_volterra", "euler_top", "nahm_tetrahedral", "riccati")
 LARGE = (
     "paper_m2",
     "volterra_periodic_5",
