@@ -8,7 +8,7 @@
 >>> phi_f.step(phi_g.step(x)) == phi_g.step(phi_f.step(x))
 True
 >>> km.check_commute(km.SystemFile.from_member(member)).verdict
-<Verdict.PROVED: 'proved'>
+<Certainty.PROVED: 'proved'>
 
 Names are imported when they are first used, so that `import kahanmaps` costs next to nothing.
 """

@@ -12,9 +12,9 @@ from .algebra.parsing import parse_point as parse_point
 from .algebra.parsing import parse_polynomial as parse_polynomial
 from .algebra.parsing import parse_rational_function as parse_rational_function
 from .algebra.work import Budget as Budget
+from .checks.claims import Certainty as Certainty
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report
-from .checks.claims import Verdict as Verdict
 from .checks.commute import check_commute as check_commute
 from .checks.conserve import check_integrals as check_integrals
 from .checks.preserve import check_measure as check_measure

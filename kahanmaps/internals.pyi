@@ -22,10 +22,10 @@ from .algebra.roots import parse_root as parse_root
 from .algebra.work import LEAST_EFFORT as LEAST_EFFORT
 from .algebra.work import MOST_EFFORT as MOST_EFFORT
 from .algebra.work import Budget as Budget
+from .checks.claims import Certainty as Certainty
 from .checks.claims import Evidence as Evidence
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report
-from .checks.claims import Verdict as Verdict
 from .checks.claims import combined as combined
 from .checks.conserve import functions_along as functions_along
 from .checks.settings import Settings as Settings
@@ -107,12 +107,12 @@ from .laboratory.cycles import cycle_census as cycle_census
 from .laboratory.cycles import default_eps as default_eps
 from .laboratory.defaults import ITERATE_DEGREE as ITERATE_DEGREE
 from .laboratory.defaults import budget_for as budget_for
+from .laboratory.findings import Statement as Statement
 from .laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
 from .laboratory.growth.degrees import degree_growth as degree_growth
 from .laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS
 from .laboratory.growth.height_survey import HeightSurvey as HeightSurvey
 from .laboratory.growth.height_survey import height_survey as height_survey
-from .laboratory.known import KnownStatement as KnownStatement
 from .laboratory.laboratory import Laboratory as Laboratory
 from .laboratory.modular_points import NoPoint as NoPoint
 from .laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials as darboux_polynomials

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.checks.claims import Finding, Report, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Finding, Report, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.maps.kahan import KahanMap
@@ -263,7 +263,7 @@ def half_step(self: KahanMap, point: Sequence[Any]) -> tuple[Any, ...]:
     return tuple(a + (b - a) / self.field.convert(2) for a, b in zip(x, image, strict=True))
 
 
-def verdicts(report: Report) -> list[Verdict]:
+def verdicts(report: Report) -> list[Certainty]:
     """The verdicts of a report, claim by claim."""
     return [finding.verdict for finding in report.findings]
 

@@ -41,8 +41,8 @@ def test_all_that_stands_for_a_map_gives_the_same(path):
 def test_members_of_the_family_stand_for_their_maps():
     member = km.draw_with_eigenvalues([2, -3], seed=1)
     f, g = member.associate([1, 1]), member.associate([1, -1])
-    assert km.check_commute(f, g).verdict is km.Verdict.PROVED
-    assert km.check_commute(f, km.System("x' = y; y' = x; z' = w; w' = x^2")).verdict is km.Verdict.REFUTED
+    assert km.check_commute(f, g).verdict is km.Certainty.PROVED
+    assert km.check_commute(f, km.System("x' = y; y' = x; z' = w; w' = x^2")).verdict is km.Certainty.REFUTED
     assert km.map(f, "1/10")([1, 0, 2, 0]) == km.map(f.hamiltonian, "1/10")([1, 0, 2, 0])
     assert km.map(member, "1/10")([1, 0, 2, 0]) == km.KahanMap(member.chosen.system, "1/10")([1, 0, 2, 0])
 
@@ -168,11 +168,11 @@ def test_claims_are_text_or_expressions_by_name_or_without():
     energy = y**2 / 2 + x**2 / 2 - x**3 / 3
     fish = km.System({x: y, y: x**2 - x})
     for claim in (energy, str(energy), [energy], {"H": energy}):
-        assert km.check_integrals(fish, claim).verdict is km.Verdict.REFUTED
-        assert km.check_integrals(fish, claim, eps="1/5").verdict is km.Verdict.REFUTED
+        assert km.check_integrals(fish, claim).verdict is km.Certainty.REFUTED
+        assert km.check_integrals(fish, claim, eps="1/5").verdict is km.Certainty.REFUTED
     [found] = km.find_integrals(fish).integrals
     for claim in (found.text, sympy.sympify(found.text), [found.text]):
-        assert km.check_integrals(fish, extra=claim).verdict is km.Verdict.PROVED
+        assert km.check_integrals(fish, extra=claim).verdict is km.Certainty.PROVED
     assert [km.check_measure(PREY, phi).verdict.value for phi in (x * y, "x*y + 1")] == ["proved", "refuted"]
     canonical = sympy.Matrix([[0, x * y], [-x * y, 0]])
     for tensor, verdict in ((canonical, "proved"), ([["0", "1"], ["-1", "0"]], "refuted")):

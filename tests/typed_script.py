@@ -19,7 +19,7 @@ def script() -> None:
     found: km.IntegralSearch = km.find_integrals("x' = y; y' = 6*x^2 - 2", effort=1)
     print([one.text for one in found.integrals], km.find_density(fish).densities[0].text)
     report: km.Report = km.check_commute("euler_top", top, eps="1/10")
-    print(report.verdict is km.Verdict.PROVED, km.check_measure("euler_top", eps="1/10").holds)
+    print(report.verdict is km.Certainty.PROVED, km.check_measure("euler_top", eps="1/10").holds)
     walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5)
     print(len(walk), walk[-1].text, [point.step for point in walk[1:3]], [point.x for point in walk])
     phi = km.map("euler_top", "1/10")

@@ -16,18 +16,26 @@ from typing import Any
 from kahanmaps.displayed import Displayed, Printed, WithoutTruthValue
 
 
-class Verdict(Displayed, WithoutTruthValue, StrEnum):
-    """How much is known of a claim; its truth value is `holds`, and `bool` of it an error."""
+class Certainty(Displayed, WithoutTruthValue, StrEnum):
+    """How much is known of a claim; its truth value is `holds`, and `bool` of it an error.
+
+    Checks give one of the first four. EXPLAINED is what follows exactly from the patterns of singularities, which are
+    measured; NOTE stands where certainty is not the question.
+    """
 
     PROVED = "proved"
     REFUTED = "refuted"
-    SUPPORTED = "supported"
+    SUPPORTED = "supported"  # at random points, with a bound for the probability of an error
     UNDECIDED = "undecided"
+    EXPLAINED = "explained"
+    MEASURED = "measured"  # modulo primes, or on orbits
+    ESTIMATED = "estimated"
+    NOTE = "note"
 
     @property
     def holds(self) -> bool | None:
         """True, False, or None where nothing is known."""
-        return {Verdict.REFUTED: False, Verdict.UNDECIDED: None}.get(self, True)
+        return {Certainty.REFUTED: False, Certainty.UNDECIDED: None, Certainty.NOTE: None}.get(self, True)
 
 
 @dataclass(frozen=True)
@@ -71,7 +79,7 @@ class Finding(Displayed, WithoutTruthValue):
     """One claim with its verdict. A `control` is a claim that is expected to be refuted and proves the check alive."""
 
     claim: str
-    verdict: Verdict
+    verdict: Certainty
     evidence: Evidence
     also: tuple[Evidence, ...] = ()
     witness: Witness | None = None
@@ -89,7 +97,7 @@ class Finding(Displayed, WithoutTruthValue):
     @property
     def is_as_expected(self) -> bool:
         """Whether a control was refuted; true for everything that is not a control."""
-        return not self.control or self.verdict is Verdict.REFUTED
+        return not self.control or self.verdict is Certainty.REFUTED
 
     def to_json(self) -> dict[str, Any]:
         plain: dict[str, Any] = {
@@ -109,7 +117,7 @@ class Finding(Displayed, WithoutTruthValue):
             plain["applies"] = False
         if self.control:
             plain["control"] = True
-            plain["expected"] = str(Verdict.REFUTED)
+            plain["expected"] = str(Certainty.REFUTED)
         return plain
 
 
@@ -124,7 +132,7 @@ class Report(Printed):
     ended_early: bool = False  # an orbit that the user asked for could not be walked to its end
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Certainty:
         """The verdict on all claims together; controls, and claims that do not apply, do not count."""
         return combined(finding.verdict for finding in self.findings if finding.applies and not finding.control)
 
@@ -153,16 +161,16 @@ class Report(Printed):
         }
 
 
-def combined(verdicts: Iterable[Verdict]) -> Verdict:
+def combined(verdicts: Iterable[Certainty]) -> Certainty:
     """The weakest of several verdicts: refuted before undecided before supported before proved.
 
     Without any verdict nothing has been decided.
 
-    >>> combined([Verdict.PROVED, Verdict.SUPPORTED])
-    <Verdict.SUPPORTED: 'supported'>
+    >>> combined([Certainty.PROVED, Certainty.SUPPORTED])
+    <Certainty.SUPPORTED: 'supported'>
     """
     found = set(verdicts)
-    for verdict in (Verdict.REFUTED, Verdict.UNDECIDED, Verdict.SUPPORTED, Verdict.PROVED):
+    for verdict in (Certainty.REFUTED, Certainty.UNDECIDED, Certainty.SUPPORTED, Certainty.PROVED):
         if verdict in found:
             return verdict
-    return Verdict.UNDECIDED
+    return Certainty.UNDECIDED

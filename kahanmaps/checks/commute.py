@@ -10,7 +10,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
@@ -65,7 +65,7 @@ def _require_another_than_identity(file: SystemFile, letter: str, map_: Biration
         return map_.at(eps_value, field).step(point), point
 
     told: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
-    if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **told), seed).verdict is Verdict.SUPPORTED:
+    if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **told), seed).verdict is Certainty.SUPPORTED:
         at = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
         raise InputError(
             f"found {file.labelled(letter)}, whose map is the identity{at}, expected another: "
@@ -170,7 +170,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         names = (f"f_{first.label}", f"f_{second.label}")
         formula = f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}"
         if k >= tried and proof is not None:
-            findings.append(Finding(claim, Verdict.PROVED, proof, formula=formula, source=SOURCE))
+            findings.append(Finding(claim, Certainty.PROVED, proof, formula=formula, source=SOURCE))
             continue
         identity = commutativity(first.system, second.system, settings.eps, names)
         walked = orbit if k < tried else None
@@ -200,7 +200,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
             f"over the splitting field of chi, where {', '.join(irrational)} splits, the Kahan maps of all "
             f"associated systems commute pairwise"
         )
-        verdict = Verdict.UNDECIDED if proof is None else Verdict.PROVED
+        verdict = Certainty.UNDECIDED if proof is None else Certainty.PROVED
         findings.append(Finding(claim, verdict, proof or reason, source=SOURCE))
     control = _control(member, settings, orbit)
     if not control.is_as_expected:

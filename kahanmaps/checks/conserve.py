@@ -13,7 +13,7 @@ from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, linear_combinations
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION, judge
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_functions, run_orbit, settings_and_claim
@@ -202,12 +202,14 @@ def check_integrals(
             is_claimed = isinstance(integral, ClaimedIntegral)  # others do not count
             formula = integral.formula
             findings.append(
-                Finding(claim, Verdict.UNDECIDED, reason, formula=formula, source=source, applies=is_claimed)
+                Finding(claim, Certainty.UNDECIDED, reason, formula=formula, source=source, applies=is_claimed)
             )
             continue
         if proof is not None and k >= tried and file.dim > 16:
             findings.append(
-                Finding(f"{integral.name} is conserved", Verdict.PROVED, proof, formula=integral.formula, source=source)
+                Finding(
+                    f"{integral.name} is conserved", Certainty.PROVED, proof, formula=integral.formula, source=source
+                )
             )
             continue
         findings.append(
@@ -222,7 +224,7 @@ def check_integrals(
             )
         )
     notes = []
-    proved = [finding for finding in findings if finding.verdict is Verdict.PROVED]
+    proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]
     if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved):
         notes.append(f"of the proved integrals the first {tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())

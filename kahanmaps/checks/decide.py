@@ -30,7 +30,7 @@ from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
 from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.algebra.roots import Root
-from kahanmaps.checks.claims import Evidence, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Witness
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep, counted
 
 METHOD = "random points over GF(p)"
@@ -145,7 +145,7 @@ class Identity:
 class Decision:
     """The outcome: a verdict (supported, refuted or undecided), its evidence, and for refuted ones a witness."""
 
-    verdict: Verdict
+    verdict: Certainty
     evidence: Evidence
     witness: Witness | None = None
 
@@ -158,7 +158,7 @@ class Trial:
     decision: Decision | None = None
 
 
-class Statement(Protocol):
+class Decidable(Protocol):
     """What can be decided at random points: identities, and the claims of the paper on objects of their own.
 
     `bound` is as that of an identity, `conjugates` as for `log2_error`; `patience` is the number of points without a
@@ -188,7 +188,7 @@ class Statement(Protocol):
     def data(self, undefined: int) -> dict[str, Any]: ...
 
 
-def decide(statement: Statement, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
+def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
     """Decide a statement at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
     equation, pole_degree = statement.bound
     per_trial = log2_error(equation, pole_degree, statement.conjugates)
@@ -217,7 +217,7 @@ def decide(statement: Statement, seed: int, error_bits: int = DEFAULT_ERROR_BITS
         return _undecided("held at a random point, which says nothing: the two sides have no values over bounds")
     bound = math.floor(-per_trial * needed)
     return Decision(
-        Verdict.SUPPORTED,
+        Certainty.SUPPORTED,
         Evidence(
             METHOD,
             f"held at {counted(needed, 'random point')} over GF(p), p random of 63 bits{statement.where}; "
@@ -236,7 +236,7 @@ def decide(statement: Statement, seed: int, error_bits: int = DEFAULT_ERROR_BITS
 
 
 def _undecided(text: str, **data: Any) -> Decision:
-    return Decision(Verdict.UNDECIDED, Evidence(METHOD, text, data))
+    return Decision(Certainty.UNDECIDED, Evidence(METHOD, text, data))
 
 
 def log2_error(equation: CoefficientSize, poles: int, conjugates: int = 1) -> float:
@@ -278,7 +278,7 @@ def _refuted(
         f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
         f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
     )
-    return Decision(Verdict.REFUTED, Evidence("point over GF(p)", summary, {"prime": str(field.prime)}), witness)
+    return Decision(Certainty.REFUTED, Evidence("point over GF(p)", summary, {"prime": str(field.prime)}), witness)
 
 
 def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
@@ -295,7 +295,7 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
         if witness is not None:
             height = max(max(abs(int(entry.p)), int(entry.q)) for entry in candidate)
             where = f"fails at a rational point of height at most {height}, exactly"
-            return Decision(Verdict.REFUTED, Evidence("exact rational point", where, {}), witness)
+            return Decision(Certainty.REFUTED, Evidence("exact rational point", where, {}), witness)
     return None
 
 

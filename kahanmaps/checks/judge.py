@@ -9,7 +9,7 @@ points over Q and GF(p) runs over the field of rational functions, as far as a b
 from __future__ import annotations
 
 from kahanmaps.algebra.functions import DEFAULT_BUDGET, BudgetExceeded, FunctionField
-from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Witness
 from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
 from kahanmaps.checks.settings import OrbitRun, Settings, along
 
@@ -42,26 +42,26 @@ def judge(
     also: list[Evidence] = []
     verdict, evidence, witness = decision.verdict, decision.evidence, decision.witness
     if proof is not None:
-        if decision.verdict is Verdict.REFUTED:
+        if decision.verdict is Certainty.REFUTED:
             raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
-        if decision.evidence.data.get("poles_met") and decision.verdict is Verdict.UNDECIDED:
+        if decision.evidence.data.get("poles_met") and decision.verdict is Certainty.UNDECIDED:
             # A theorem on a map that has no value anywhere, det(I - eps f') being zero for all x, says nothing.
             return Finding(claim, decision.verdict, decision.evidence, (), None, formula, source, control)
-        verdict, evidence, witness = Verdict.PROVED, proof, None
-        if decision.verdict is Verdict.SUPPORTED:
+        verdict, evidence, witness = Certainty.PROVED, proof, None
+        if decision.verdict is Certainty.SUPPORTED:
             also.append(_without_bound(decision.evidence))
     elif not control:
         settled = settle(identity, decision, settings.seed)
         verdict, evidence, witness = settled.verdict, settled.evidence, settled.witness
-        if verdict is Verdict.PROVED:
+        if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
     if orbit is not None:
         experience, failure = along(identity, orbit)
         also.append(experience)
-        if failure is not None and verdict is not Verdict.REFUTED:
-            if verdict is Verdict.PROVED:
+        if failure is not None and verdict is not Certainty.REFUTED:
+            if verdict is Certainty.PROVED:
                 raise Contradiction(f"{claim}: {evidence.summary}, but it {experience.summary} {failure}")
-            verdict, evidence, witness = Verdict.REFUTED, experience, failure
+            verdict, evidence, witness = Certainty.REFUTED, experience, failure
     return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)
 
 
@@ -114,10 +114,10 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 def settle(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
     """The decision at random points or, where these support a claim and both sides can be multiplied out, that."""
-    if decision.verdict is not Verdict.SUPPORTED:
+    if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:
         expanded = expansion(identity, budget)
     except NotEqual as error:
-        return fails_over_Q(identity, seed) or Decision(Verdict.REFUTED, Evidence(METHOD, str(error)))
-    return decision if expanded is None else Decision(Verdict.PROVED, expanded)
+        return fails_over_Q(identity, seed) or Decision(Certainty.REFUTED, Evidence(METHOD, str(error)))
+    return decision if expanded is None else Decision(Certainty.PROVED, expanded)

@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, gradient, linear_combinations
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
 from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix, minimal_degree
@@ -23,7 +23,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
-PROVED = Verdict.PROVED
+PROVED = Certainty.PROVED
 # All rational associated systems: 128 for as many factors, and 8128 pairs of them.
 MAX_FACTORS = 8
 

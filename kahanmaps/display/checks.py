@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.display import markup
 from kahanmaps.displayed import html_form, shorten, text_form
 from kahanmaps.errors import counted
@@ -33,7 +33,7 @@ _NOTEBOOK = DisplayLimits(_TEXT, 1_200, 60, 8)
 
 
 @html_form.register
-def word_html(verdict: Verdict) -> str:
+def word_html(verdict: Certainty) -> str:
     """The word with its mark."""
     return markup.verdict(verdict)
 

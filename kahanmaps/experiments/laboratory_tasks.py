@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq_poly
 
 from kahanmaps.algebra.printing import format_number, format_univariate
-from kahanmaps.checks.claims import Verdict, combined
+from kahanmaps.checks.claims import Certainty, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
@@ -140,7 +140,7 @@ def poisson(found: PoissonSearch) -> Result:
 def symmetry(found: Symmetries) -> Result:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
     return {
-        "verdict": str(Verdict.PROVED if found.complete else Verdict.UNDECIDED),
+        "verdict": str(Certainty.PROVED if found.complete else Certainty.UNDECIDED),
         "status": "complete" if found.complete else "undecided",
         "group_order": found.order,
         "symmetries": len(found.symmetries),
@@ -333,7 +333,7 @@ def _state_of_densities(found: DensitySearch) -> str:
     return "none" if found.reason.startswith("no polynomial") else "open"
 
 
-def _weakest(verdicts: Iterable[Verdict]) -> str | None:
+def _weakest(verdicts: Iterable[Certainty]) -> str | None:
     """The weakest of the verdicts; None where nothing was found: that there is nothing is no claim here."""
     given = list(verdicts)
     return str(combined(given)) if given else None

@@ -14,7 +14,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.printing import format_point
-from kahanmaps.checks.claims import Report, Verdict
+from kahanmaps.checks.claims import Certainty, Report
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.checks.table import CHECKS, Check
@@ -245,13 +245,13 @@ def _of_report(report: Report) -> Whole:
     counted = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in counted)
     controls = [finding for finding in report.findings if finding.control]
-    doubtful = [finding.to_json() for finding in counted if finding.verdict in (Verdict.REFUTED, Verdict.UNDECIDED)]
+    doubtful = [finding.to_json() for finding in counted if finding.verdict in (Certainty.REFUTED, Certainty.UNDECIDED)]
     return {
         "verdict": str(report.verdict),
         "claims": len(counted),
-        **{str(verdict): counts[verdict] for verdict in Verdict},
+        **{str(verdict): counts[verdict] for verdict in Certainty},
         "controls": len(controls),
-        "controls_refuted": sum(finding.verdict is Verdict.REFUTED for finding in controls),
+        "controls_refuted": sum(finding.verdict is Certainty.REFUTED for finding in controls),
         "ended_early": report.ended_early,
         **({"m": report.context["m"]} if "m" in report.context else {}),
         **({"doubtful": doubtful} if doubtful else {}),

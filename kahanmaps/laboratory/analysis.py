@@ -20,14 +20,14 @@ from typing import Any
 from kahanmaps.algebra.printing import attributes, format_polynomial
 from kahanmaps.algebra.small_systems import SPENT
 from kahanmaps.algebra.work import Budget, units_at
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.laboratory.analyses.part import Part, Run
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
-from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.known import Known, KnownStatement
+from kahanmaps.laboratory.findings import Findings, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
@@ -67,12 +67,12 @@ class Analysis(Findings, Printed):
         return conclude(self)
 
     @property
-    def sections(self) -> list[tuple[str, list[KnownStatement]]]:
+    def sections(self) -> list[tuple[str, list[Statement]]]:
         """The report: titles and their statements, those that have some."""
         return self._sections(self._titled)
 
     @property
-    def final_sections(self) -> list[tuple[str, list[KnownStatement]]]:
+    def final_sections(self) -> list[tuple[str, list[Statement]]]:
         """The first of them, up to the one that is not complete yet."""
         waiting = (k for k, part in enumerate(self._titled) if {part.name, *part.reads}.intersection(self.pending))
         return self._sections(self._titled[: next(waiting, None)])
@@ -83,9 +83,9 @@ class Analysis(Findings, Printed):
         titled = [part for part in self.parts if part.statements is not None]
         return sorted(titled, key=lambda part: TITLES.index(part.title) if part.title in TITLES else len(TITLES))
 
-    def _sections(self, parts: Sequence[Part]) -> list[tuple[str, list[KnownStatement]]]:
+    def _sections(self, parts: Sequence[Part]) -> list[tuple[str, list[Statement]]]:
         told = [(part.title, list(part.statements(self))) for part in parts if part.statements is not None]
-        skipped = [] if self.pending else [KnownStatement(Known.NOTE, text) for text in self.skipped]
+        skipped = [] if self.pending else [Statement(Certainty.NOTE, text) for text in self.skipped]
         return [(title, lines) for title, lines in (*told, ("not done", skipped)) if lines]
 
     def rows(self) -> list[dict[str, str]]:

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.curves import Ended
-from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
 
@@ -49,7 +48,7 @@ class _Verdict(NamedTuple):
     kind: str
     sentence: str
     sense: str = ""
-    ground: Known | None = Known.MEASURED
+    ground: Certainty | None = Certainty.MEASURED
 
 
 class _Facts:
@@ -59,7 +58,7 @@ class _Facts:
         degrees = found.degrees
         self.found, self.degrees, self.count = found, degrees, found.integral_count
         self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
-        self.grown = degrees.known if degrees is not None else Known.MEASURED
+        self.grown = degrees.known if degrees is not None else Certainty.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
         # How many integrals there are; where that is a lower bound, the sentence says so.
@@ -78,7 +77,7 @@ class _Facts:
         if found.dim > 2 and not self.is_linear:
             for one in reversed(found.poisson.tensors if found.poisson is not None else ()):
                 proved = (one.verdict, one.jacobi, one.involution)
-                if one.is_liouville_integrable and all(verdict is Verdict.PROVED for verdict in proved):
+                if one.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
                     self.liouville = f"with the Poisson tensor {one.name}"
             if isinstance(found.normal_form, SystemNormalForm):
                 self.liouville = "as a member of the commuting family"
@@ -96,7 +95,11 @@ def conclude(found: Findings) -> Conclusion:
         sentence += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
     if facts.liouville:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
-    sense, ground, growth = verdict.sense or verdict.kind, str(verdict.ground or ""), facts.growth
+    sense, ground, growth = (
+        verdict.sense or verdict.kind,
+        "" if verdict.ground is None else str(verdict.ground),
+        facts.growth,
+    )
     if verdict.kind == "not integrable":
         growth = Growth.EXPONENTIAL  # also where that is estimated only
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
@@ -114,13 +117,13 @@ def _linear(facts: _Facts) -> _Verdict | None:
         return None
     eps, B = facts.found.eps, facts.found.file.system.B
     if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
-        return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Known.PROVED)
+        return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Certainty.PROVED)
     proof = None if facts.degrees is None else facts.degrees.proof
     closes = facts.closes and f"; {facts.closes}"
     if proof is not None and proof.is_identity:
         closes = f"; {proof.reason} (proved)"
     sentence = f"The system is linear, and so is its Kahan map; {facts.integrals}{closes}."
-    return _Verdict("linear", sentence, ground=Known.PROVED)
+    return _Verdict("linear", sentence, ground=Certainty.PROVED)
 
 
 def _contradictory(facts: _Facts) -> _Verdict | None:
@@ -142,7 +145,7 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
     proof = facts.degrees.proof if facts.degrees is not None else None
     if proof is not None and proof.is_identity:
         sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals}."
-        return _Verdict("linearisable", sentence, ground=Known.PROVED)
+        return _Verdict("linearisable", sentence, ground=Certainty.PROVED)
     if facts.closes:
         return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.phrase}.")
     if facts.growth is Growth.ZERO:
@@ -165,14 +168,14 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
         f"function is an integral; {facts.phrase}{facts.basis}."
     )
-    return _Verdict("not integrable", sentence, _confining(found), Known.PROVED)
+    return _Verdict("not integrable", sentence, _confining(found), Certainty.PROVED)
 
 
 def _on_curves(facts: _Facts) -> _Verdict | None:
     """Where the orbits lie on curves, proved; or not, of maps whose growth is not known."""
     found, proved = facts.found, 0
     if found.integrals is not None:  # independent ones
-        proved = sum(verdict is Verdict.PROVED for _, verdict in found.integrals.formulas)
+        proved = sum(verdict is Certainty.PROVED for _, verdict in found.integrals.formulas)
         proved = max(proved, 0 if found.integrals.symbols else found.integrals.by_theorems)
     if found.dim > 1 and proved >= found.dim - 1:
         sense = "superintegrable" if found.dim > 2 else "integrable"
@@ -181,7 +184,7 @@ def _on_curves(facts: _Facts) -> _Verdict | None:
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
-        return _Verdict("integrable", sentence, sense, Known.PROVED)
+        return _Verdict("integrable", sentence, sense, Certainty.PROVED)
     on_curves = orbits_lie_on_curves(found)
     if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
@@ -197,7 +200,7 @@ def _by_growth(facts: _Facts) -> _Verdict | None:
     if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
         sentence = f"Not integrable in the sense of complexity: {facts.phrase}{facts.basis if exact else ''}{although}."
-        ground = facts.grown if exact else Known.ESTIMATED
+        ground = facts.grown if exact else Certainty.ESTIMATED
         return _Verdict("not integrable", sentence, _confining(facts.found), ground)
     if facts.growth in _POLYNOMIAL:
         sentence = f"Integrable in the sense of complexity: {facts.phrase}{facts.basis}; {integrals}."
@@ -216,9 +219,9 @@ _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
 )
 
 
-def _sense(liouville: str, ground: Known | None = Known.MEASURED) -> tuple[str, Known | None]:
+def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tuple[str, Certainty | None]:
     if liouville:
-        return "Liouville integrable", Known.PROVED
+        return "Liouville integrable", Certainty.PROVED
     return "integrable in the sense of complexity", ground
 
 

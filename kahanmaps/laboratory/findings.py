@@ -8,6 +8,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.work import Budget
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.family.tensor import TensorStructure
@@ -25,6 +26,14 @@ from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 from kahanmaps.laboratory.vector_field.equivalence import Equivalence
 from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One line of a report and how it is known."""
+
+    status: Certainty
+    text: str
 
 
 @dataclass

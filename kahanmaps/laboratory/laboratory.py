@@ -17,7 +17,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring, substitute
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
@@ -208,7 +208,7 @@ class Laboratory:
 
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
-    ) -> tuple[Verdict, Evidence]:
+    ) -> tuple[Certainty, Evidence]:
         """Whether the map, or the flow, keeps I or dx/phi, as identities.verdict_on has it; of a flow by expansion.
 
         What is no shorter than what was too long to expand is not expanded.
@@ -216,19 +216,19 @@ class Laboratory:
         if self.field is not None and self.flow:
             kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
             evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
-            return (Verdict.PROVED if kept else Verdict.REFUTED), evidence
+            return (Certainty.PROVED if kept else Certainty.REFUTED), evidence
         map_ = self.map if self.root is None else self.file.map
         told: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
         separated = self._separated
         terms = len(function.numerator) + len(function.denominator)
         expands = separated is None and terms < self._too_long.get(is_density, math.inf)
         verdict, evidence = verdict_on(map_, function, **told, factor=factor, expands=expands)
-        if verdict is Verdict.SUPPORTED and separated is not None:
+        if verdict is Certainty.SUPPORTED and separated is not None:
             given = separated.function(function), None if factor is None else separated.function(factor)
             there, proof = verdict_on(separated.system, given[0], **told, factor=given[1])
-            if there is not Verdict.SUPPORTED:
+            if there is not Certainty.SUPPORTED:
                 return there, replace(proof, summary=f"{proof.summary}, in coordinates in which the planes separate")
-        elif verdict is Verdict.SUPPORTED and expands:
+        elif verdict is Certainty.SUPPORTED and expands:
             self._too_long[is_density] = terms
         return verdict, evidence
 

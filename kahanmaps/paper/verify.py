@@ -33,7 +33,7 @@ from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.printing import format_number
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.checks.decide import Decision, Trial, decide
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
@@ -219,7 +219,7 @@ class Verifier:
             text = f"{len(found)} controls of {tried['claims']} claims, all refuted at exact points"
             if without or not found:
                 text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
-            verdict = Verdict.UNDECIDED if without or not found else Verdict.PROVED
+            verdict = Certainty.UNDECIDED if without or not found else Certainty.PROVED
             claimed = "every claim fails on some input that breaks one of its hypotheses"
             found.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
         return found
@@ -317,16 +317,16 @@ class Verifier:
         """The finding on one claim."""
         reason = self.outside(claim)
         if reason is not None:
-            return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", reason))
+            return self._finding(claim, Certainty.UNDECIDED, Evidence("outside the hypotheses", reason))
         if claim.kind is not ClaimKind.EQUAL:
             return self._verify_existence(claim)
         statement = ClaimAtPoints(self, claim)
         decision = decide(statement, self.settings.seed, self.settings.error_bits)
         found = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
-        if claim.misprint and decision.verdict is Verdict.SUPPORTED:
+        if claim.misprint and decision.verdict is Certainty.SUPPORTED:
             silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
-            return replace(found, verdict=Verdict.UNDECIDED, evidence=silent, also=(found.evidence,), applies=False)
-        if claim.misprint or decision.verdict is Verdict.REFUTED:
+            return replace(found, verdict=Certainty.UNDECIDED, evidence=silent, also=(found.evidence,), applies=False)
+        if claim.misprint or decision.verdict is Certainty.REFUTED:
             return found
         try:
             proof = self.proof(claim, statement.needs, *statement.bound)
@@ -335,12 +335,12 @@ class Verifier:
             also = tuple(self.also(claim))
         except Contradiction as error:
             text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
-            return self._finding(claim, Verdict.REFUTED, Evidence("contradiction", text), witness=error.witness)
+            return self._finding(claim, Certainty.REFUTED, Evidence("contradiction", text), witness=error.witness)
         if proof is not None:
-            if decision.verdict is Verdict.SUPPORTED:
-                return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *also))
+            if decision.verdict is Certainty.SUPPORTED:
+                return self._finding(claim, Certainty.PROVED, proof, (decision.evidence, *also))
             if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
-                return self._finding(claim, Verdict.PROVED, proof, also)
+                return self._finding(claim, Certainty.PROVED, proof, also)
         return replace(found, also=(*found.also, *also))
 
     def _verify_existence(self, claim: Claim) -> Finding:
@@ -352,7 +352,7 @@ class Verifier:
             objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
                 text = "no prime was found at which chi splits into distinct factors"
-                return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+                return self._finding(claim, Certainty.UNDECIDED, Evidence("random points over GF(p)", text))
             try:
                 outcome = evaluate(claim, objects)
             except LookupError:  # the roots of chi are needed, and this field does not have them
@@ -369,20 +369,20 @@ class Verifier:
                     text += f", and it cannot be larger: {claim.at_most}"
                 # Modulo p a rank may be smaller and an equation hold that does not hold over Q, but not conversely.
                 is_proof = claim.kind is ClaimKind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
-                verdict = Verdict.PROVED if is_proof else Verdict.SUPPORTED
+                verdict = Certainty.PROVED if is_proof else Certainty.SUPPORTED
                 return self._finding(claim, verdict, Evidence(method, text, {"points": tried}))
             if tried >= _POINTS:
                 break
         if outcome is None or not outcome.pairs:
             text = f"the claim is not defined at any of {_MAX_UNDEFINED} random points"
-            return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+            return self._finding(claim, Certainty.UNDECIDED, Evidence("random points over GF(p)", text))
         text = "both sides agree" if claim.kind is ClaimKind.DIFFERENT else "not attained"
         if claim.in_general:
             special = f"stated in general; for this member {text} at {tried} random points: {self.what_is_special()}"
             evidence = Evidence("special member", special, {"points": tried})
-            return replace(self._finding(claim, Verdict.UNDECIDED, evidence), applies=False)
+            return replace(self._finding(claim, Certainty.UNDECIDED, evidence), applies=False)
         evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
-        return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
+        return self._finding(claim, Certainty.REFUTED, evidence, witness=witness_of(outcome))
 
     def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
         """A proof, if there is one."""
@@ -477,11 +477,11 @@ class Verifier:
                 continue
             outcome = self._broken(claim, name)
             if outcome is None:
-                verdict, what = Verdict.UNDECIDED, "not defined, or no roots of chi"
+                verdict, what = Certainty.UNDECIDED, "not defined, or no roots of chi"
             elif outcome.holds or not outcome.pairs:
-                verdict, what = Verdict.SUPPORTED, "the claim holds all the same"
+                verdict, what = Certainty.SUPPORTED, "the claim holds all the same"
             else:
-                verdict, what = Verdict.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
+                verdict, what = Certainty.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
             evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
@@ -510,7 +510,7 @@ class Verifier:
     def _finding(
         self,
         claim: Claim,
-        verdict: Verdict,
+        verdict: Certainty,
         evidence: Evidence,
         also: tuple[Evidence, ...] = (),
         witness: Witness | None = None,
@@ -573,10 +573,10 @@ class ClaimAtPoints:
                 if found := next((found for found in outcomes(self._claim, exact) if not found.holds), None):
                     outcome = found
                     evidence = Evidence("exact rational point", "fails at a rational point, exactly")
-                yield Trial(decision=Decision(Verdict.REFUTED, evidence, witness_of(outcome)))
+                yield Trial(decision=Decision(Certainty.REFUTED, evidence, witness_of(outcome)))
             elif not outcome.pairs:
                 text = "it does not apply to this member: there is nothing to compare"
-                yield Trial(decision=Decision(Verdict.UNDECIDED, Evidence("outside the hypotheses", text)))
+                yield Trial(decision=Decision(Certainty.UNDECIDED, Evidence("outside the hypotheses", text)))
             else:
                 yield Trial(objects.K.characteristic)
 

@@ -10,7 +10,7 @@ from fractions import Fraction
 import pytest
 from check_helpers import QUICK, file_of, hamiltonian_of, system_of
 
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness, combined
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness, combined
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
@@ -20,12 +20,12 @@ from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.version import __version__
 
-P, R, S, U = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+P, R, S, U = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
 
 WITNESS = Witness(("1/2", "0"), "1/10", ("1",), ("2",), "I(x~)", "I(x)")
 
 
-def finding(verdict: Verdict, control: bool = False) -> Finding:
+def finding(verdict: Certainty, control: bool = False) -> Finding:
     witness = WITNESS if verdict is R else None
     return Finding("a claim", verdict, Evidence("method", "why"), witness=witness, control=control)
 
@@ -38,9 +38,9 @@ def test_a_verdict_says_whether_the_claim_holds(verdict, holds):
     assert verdict.holds is holds
 
 
-@pytest.mark.parametrize("result", [*Verdict, finding(R), Report("integrals", (finding(P),))])
+@pytest.mark.parametrize("result", [*Certainty, finding(R), Report("integrals", (finding(P),))])
 def test_a_result_has_no_truth_value_and_says_what_to_ask_instead(result):
-    with pytest.raises(TypeError, match=r"truth value of a (Verdict|Finding|Report) is ambiguous: use \.holds"):
+    with pytest.raises(TypeError, match=r"truth value of a (Certainty|Finding|Report) is ambiguous: use \.holds"):
         bool(result)
     assert result.holds in (True, False, None)
 

@@ -16,7 +16,7 @@ from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rat
 from hypothesis import assume, given
 
 from kahanmaps.checks import judge, theorems
-from kahanmaps.checks.claims import Report, Verdict
+from kahanmaps.checks.claims import Certainty, Report
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
@@ -29,7 +29,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 pytestmark = pytest.mark.usefixtures("at_points_only")
-PROVED, REFUTED, SUPPORTED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED
+PROVED, REFUTED, SUPPORTED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED
 
 
 def pair(f: QuadraticSystem, g: QuadraticSystem, how: Settings = QUICK, **more: object) -> Report:

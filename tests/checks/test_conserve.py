@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claims import Finding, Verdict
+from kahanmaps.checks.claims import Certainty, Finding
 from kahanmaps.checks.conserve import check_integrals, known_integrals
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
@@ -40,7 +40,7 @@ from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonia
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
 pytestmark = pytest.mark.usefixtures("at_points_only")
 
 HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
@@ -64,7 +64,7 @@ def check_claim(system: QuadraticSystem, text: str, how: Settings = QUICK) -> Fi
     return found
 
 
-def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Verdict]:
+def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Certainty]:
     return verdicts(check_integrals(SystemFile.from_hamiltonian(hamiltonian), how))
 
 

@@ -21,11 +21,11 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize
 from kahanmaps.algebra.fields import QQ, Field
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, decide, log2_error, small_points
 from kahanmaps.errors import SingularMatrix, SingularStep
 
-SUPPORTED, REFUTED, UNDECIDED = Verdict.SUPPORTED, Verdict.REFUTED, Verdict.UNDECIDED
+SUPPORTED, REFUTED, UNDECIDED = Certainty.SUPPORTED, Certainty.REFUTED, Certainty.UNDECIDED
 
 
 @dataclass(frozen=True)

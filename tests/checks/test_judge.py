@@ -9,14 +9,14 @@ from flint import fmpq
 
 from kahanmaps.checks import judge as judge_module
 from kahanmaps.checks import theorems
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision, Identity
 from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import OrbitRun, Settings
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 
-PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
 PROOF = theorems.evidence("Theorem 1", [("a hypothesis", True)])
 
 

@@ -39,7 +39,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks import preserve, theorems
-from kahanmaps.checks.claims import Finding, Verdict
+from kahanmaps.checks.claims import Certainty, Finding
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings
@@ -51,7 +51,7 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
 pytestmark = pytest.mark.usefixtures("at_points_only")
 
 PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
@@ -286,7 +286,7 @@ def test_a_map_without_an_inverse_has_no_measure_to_judge():
     """x' = -x, y' = -y at eps = 1 sends everything to 0, where both sides of the law vanish for many phi."""
     contraction = file_of(system_of("x y", "-x", "-y"))
     phi = parse_rational_function("x", ["x", "y", "eps"])
-    assert check_measure(contraction, Settings(eps=fmpq(1)), phi).verdict is Verdict.UNDECIDED
+    assert check_measure(contraction, Settings(eps=fmpq(1)), phi).verdict is Certainty.UNDECIDED
     right = parse_rational_function("x*y", ["x", "y", "eps"])
     assert check_measure(contraction, Settings(eps=fmpq(1, 2)), right).holds is True
     assert check_measure(contraction, Settings(eps=fmpq(1, 2)), phi).verdict is REFUTED

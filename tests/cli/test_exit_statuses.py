@@ -10,29 +10,30 @@ from pathlib import Path
 import pytest
 from helpers import table
 
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps_cli.screen.render import exit_status
 
 COMMANDS = table(Path(__file__).with_name("exit_statuses.txt"))
 TOP = "euler_top --start 1,2,3 --eps 1/10"
 
 
-def report(verdict: Verdict, ended_early: bool = False, control: Verdict = Verdict.REFUTED) -> Report:
+def report(verdict: Certainty, ended_early: bool = False, control: Certainty = Certainty.REFUTED) -> Report:
     """A report of one claim and one control."""
     findings = [Finding("c", v, Evidence("m", "s"), control=c) for v, c in ((verdict, False), (control, True))]
     return Report("commute", tuple(findings), ended_early=ended_early)
 
 
-@pytest.mark.parametrize(
-    ("verdict", "status"), [(Verdict.PROVED, 0), (Verdict.SUPPORTED, 0), (Verdict.REFUTED, 1), (Verdict.UNDECIDED, 3)]
-)
+STATUSES = {"proved": 0, "supported": 0, "refuted": 1, "undecided": 3}
+
+
+@pytest.mark.parametrize(("verdict", "status"), [(Certainty(word), status) for word, status in STATUSES.items()])
 def test_every_verdict_has_its_exit_status(verdict, status):
     assert exit_status(report(verdict)) == status
 
 
 def test_an_undecided_check_gives_3(kahanmaps, monkeypatch):
     context = {"system": "henon_heiles", "eps": "every", "time_step": "every"}
-    undecided = Report("poisson", report(Verdict.UNDECIDED).findings, context)
+    undecided = Report("poisson", report(Certainty.UNDECIDED).findings, context)
     monkeypatch.setattr("kahanmaps.checks.preserve.check_poisson", lambda *_: undecided)
     assert kahanmaps("check-poisson henon_heiles --json").status == 3
 

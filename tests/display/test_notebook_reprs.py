@@ -10,7 +10,7 @@ from small_databases import ok, planned
 import kahanmaps as km
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 
 EVIL = '<script>alert("x")</script>\x1b[31m'
 LARGEST = 100_000  # characters of any representation
@@ -176,7 +176,7 @@ def test_hostile_and_huge_findings_are_escaped_and_cut():
     witness = Witness((long,) * 50, long, (EVIL,), (long,), EVIL, EVIL, EVIL, {EVIL: (long,)})
     evidence = Evidence(EVIL, long, {"hypotheses": [long] * 99, "theorem": EVIL})
     place = {"misprint": EVIL, "broken": long, "section": 3, "section_title": EVIL}
-    finding = Finding(EVIL + long, Verdict.REFUTED, evidence, (evidence,) * 99, witness, long, EVIL, place=place)
+    finding = Finding(EVIL + long, Certainty.REFUTED, evidence, (evidence,) * 99, witness, long, EVIL, place=place)
     html_of(finding)
     html_of(Report(EVIL, (finding,) * 1000, {"system": EVIL, "eps": long, "time_step": long}, [EVIL] * 100))
 

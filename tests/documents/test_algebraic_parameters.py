@@ -5,14 +5,14 @@ import pytest
 import kahanmaps as km
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.roots import parse_root
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import BadPrime, InputError
 
 TOP = "x' = a*y*z; y' = -x*z; z' = x*y"
 ROOT = "root of t^2 - 2 near 1.4"
 
 
-def verdict(integral: str, a: str = ROOT) -> Verdict:
+def verdict(integral: str, a: str = ROOT) -> Certainty:
     file = km.System(TOP, a=a)
     return km.check_integrals(
         file, extra={"I": km.parse_rational_function(integral, file.claim_names, file.parameters)}
@@ -22,11 +22,11 @@ def verdict(integral: str, a: str = ROOT) -> Verdict:
 @pytest.mark.parametrize(
     ("integral", "expected"),
     [
-        ("(y^2 + z^2)/(1 + eps^2*x^2)", Verdict.PROVED),
-        ("(1 + eps^2*x^2)/(1 - a*eps^2*y^2)", Verdict.PROVED),
-        ("(1 + eps^2*x^2)/(1 - 2/a*eps^2*y^2)", Verdict.PROVED),  # for a^2 = 2 only
-        ("(1 + eps^2*x^2)/(1 + a*eps^2*y^2)", Verdict.REFUTED),  # that of the conjugate system
-        ("(1 + eps^2*x^2)/(1 - 2*eps^2*y^2)", Verdict.REFUTED),
+        ("(y^2 + z^2)/(1 + eps^2*x^2)", Certainty.PROVED),
+        ("(1 + eps^2*x^2)/(1 - a*eps^2*y^2)", Certainty.PROVED),
+        ("(1 + eps^2*x^2)/(1 - 2/a*eps^2*y^2)", Certainty.PROVED),  # for a^2 = 2 only
+        ("(1 + eps^2*x^2)/(1 + a*eps^2*y^2)", Certainty.REFUTED),  # that of the conjugate system
+        ("(1 + eps^2*x^2)/(1 - 2*eps^2*y^2)", Certainty.REFUTED),
     ],
 )
 def test_claims_are_proved_or_refuted_over_the_number_field(integral, expected):
@@ -36,10 +36,10 @@ def test_claims_are_proved_or_refuted_over_the_number_field(integral, expected):
 def test_a_density_that_is_zero_at_the_root_is_refused():
     file = km.System("x' = a*y; y' = -x", a=ROOT)
 
-    def measure(phi: str) -> Verdict:
+    def measure(phi: str) -> Certainty:
         return km.check_measure(file, extra=km.parse_rational_function(phi, file.claim_names, file.parameters)).verdict
 
-    assert measure("a^2 + 2") is Verdict.PROVED
+    assert measure("a^2 + 2") is Certainty.PROVED
     for phi in ("a^2 - 2", "(a^4 - 4)*x"):
         with pytest.raises(InputError, match="identically 0 at a root of t"):
             measure(phi)
@@ -63,20 +63,20 @@ def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
 def test_a_refutation_has_a_witness_over_the_number_field():
     report = km.check_commute(km.System(TOP, a=ROOT), km.System("x' = 2*y*z; y' = -x*z; z' = x*y"))
     witness = report.findings[0].witness
-    assert report.verdict is Verdict.REFUTED
+    assert report.verdict is Certainty.REFUTED
     assert witness is not None
     assert witness.field == "QQ[t]/(t^2 - 2)"
     assert witness.left != witness.right
     orbit = km.check_commute(km.System("x' = 2*y*z; y' = -x*z; z' = x*y"), km.System(TOP, a=ROOT))
-    assert orbit.verdict is Verdict.REFUTED  # the orbit is one over Q, the identity one over the number field
+    assert orbit.verdict is Certainty.REFUTED  # the orbit is one over Q, the identity one over the number field
 
 
 def test_maps_with_the_root_commute_with_their_own_multiples_only_where_they_should():
     linear = "x' = a*y; y' = -x"
     assert km.check_commute(km.System(linear, a=ROOT), km.System("x' = 3*a*y; y' = -3*x", a=ROOT)).verdict is (
-        Verdict.PROVED
+        Certainty.PROVED
     )
-    assert km.check_commute(km.System(linear, a=ROOT), km.System("x' = 3*y; y' = -3*x")).verdict is Verdict.REFUTED
+    assert km.check_commute(km.System(linear, a=ROOT), km.System("x' = 3*y; y' = -3*x")).verdict is Certainty.REFUTED
     for other in ("root of t^2 - 3", "root of t^2 - 2 near -1.4", "root of t^2 - 2"):
         with pytest.raises(InputError, match="the same algebraic number"):
             km.check_commute(km.System(linear, a=ROOT), km.System(linear, a=other))

@@ -13,7 +13,7 @@ from helpers import quick
 
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure
@@ -22,7 +22,7 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.sources import SOURCES
 
-HOLDS = {Verdict.PROVED, Verdict.SUPPORTED}
+HOLDS = {Certainty.PROVED, Certainty.SUPPORTED}
 
 over_the_catalogue = pytest.mark.parametrize("name", names())
 # The largest take seconds, and nothing here depends on their size.
@@ -100,7 +100,7 @@ def test_every_altered_claim_is_refuted_with_a_rational_witness(name):
     found = findings(file)
     assert len(found) == len(file.integrals) + (file.density is not None)
     for finding in found:
-        assert finding.verdict is Verdict.REFUTED, finding.claim
+        assert finding.verdict is Certainty.REFUTED, finding.claim
         assert finding.witness.field == "QQ"
         assert finding.witness.left != finding.witness.right
 
@@ -111,9 +111,9 @@ def test_every_altered_claim_is_refuted_with_a_rational_witness(name):
 @pytest.mark.parametrize("name", ["paper_m2", "paper_m3", "paper_m3_irreducible"])
 def test_the_maps_of_a_member_commute_and_the_control_does_not(name):
     report = check_commute(load(name), settings=Settings(steps=2))
-    assert report.verdict is Verdict.PROVED
+    assert report.verdict is Certainty.PROVED
     (control,) = [finding for finding in report.findings if finding.control]
-    assert control.verdict is Verdict.REFUTED
+    assert control.verdict is Certainty.REFUTED
 
 
 # Degrees.

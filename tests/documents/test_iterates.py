@@ -4,7 +4,7 @@ import pytest
 from flint import fmpq
 
 import kahanmaps as km
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.iterates import parse_with_iterates
 from kahanmaps.errors import InputError
 
@@ -42,13 +42,13 @@ def test_what_is_no_formula_is_refused(text, words):
 @pytest.mark.parametrize(
     ("claim", "verdict"),
     [
-        ("x*y~ - y*x~", Verdict.PROVED),
-        ("x*y~~ - y*x~~", Verdict.PROVED),
-        ("(x*y~ - y*x~)/(x*x~ + y*y~)", Verdict.PROVED),
-        ("F*G~ - G*F~, F = x, G = y", Verdict.PROVED),
-        ("x*y~ + y*x~", Verdict.REFUTED),
-        ("x~", Verdict.REFUTED),
-        ("x*y~ - 2*y*x~", Verdict.REFUTED),
+        ("x*y~ - y*x~", Certainty.PROVED),
+        ("x*y~~ - y*x~~", Certainty.PROVED),
+        ("(x*y~ - y*x~)/(x*x~ + y*y~)", Certainty.PROVED),
+        ("F*G~ - G*F~, F = x, G = y", Certainty.PROVED),
+        ("x*y~ + y*x~", Certainty.REFUTED),
+        ("x~", Certainty.REFUTED),
+        ("x*y~ - 2*y*x~", Certainty.REFUTED),
     ],
 )
 @pytest.mark.parametrize("eps", [None, "2/7"])
@@ -93,4 +93,4 @@ def test_what_the_search_prints_is_a_claim_that_holds():
     text = km.load("lagrange_top").to_toml().partition("[integrals]")[0] + found.toml_section()
     report = km.check_integrals(km.parse_system(text))
     assert [one.claim.split()[0] for one in report.findings] == [f"I{k}" for k in range(1, 5)]
-    assert report.verdict is Verdict.PROVED
+    assert report.verdict is Certainty.PROVED

@@ -13,7 +13,7 @@ from task_helpers import made, member, perform
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
@@ -96,8 +96,8 @@ def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(na
     counted = [f for f in report.findings if f.applies and not f.control]
     controls = [f for f in report.findings if f.control]
     assert result["claims"] == len(counted)
-    assert all(result[str(verdict)] == sum(f.verdict is verdict for f in counted) for verdict in Verdict)
-    refuted = sum(f.verdict is Verdict.REFUTED for f in controls)
+    assert all(result[str(verdict)] == sum(f.verdict is verdict for f in counted) for verdict in Certainty)
+    refuted = sum(f.verdict is Certainty.REFUTED for f in controls)
     assert (result["controls"], result["controls_refuted"]) == (len(controls), refuted)
     doubtful = [f for f in counted if f.verdict.holds is not True]
     assert result.get("doubtful", []) == [json.loads(json.dumps(f.to_json())) for f in doubtful]

@@ -76,4 +76,4 @@ def test_associated_systems_over_a_number_field_commute_with_the_member_and_othe
         # The square of B + 1 is not 1.
         wrong = replace(found[0], coefficients=(found[0].coefficients[0] + 1, *found[0].coefficients[1:]))
         wrong_file = km.SystemFile.from_conjugate(wrong)
-        assert km.check_commute(km.SystemFile.from_member(member), wrong_file).verdict is km.Verdict.REFUTED
+        assert km.check_commute(km.SystemFile.from_member(member), wrong_file).verdict is km.Certainty.REFUTED

@@ -8,7 +8,7 @@ from helpers import quick
 from search_helpers import system, values_on_orbits
 
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -32,7 +32,7 @@ def found_with(symbols, seed):
 def test_two_alike_pencils_give_the_same_formulas_for_every_seed(seed):
     texts, verdicts, reason = found_with("a3 b3", seed)
     assert (texts, reason) == (found_with("a3 b3", 0)[0], "")
-    assert (len(texts), verdicts) == (2, {Verdict.PROVED})
+    assert (len(texts), verdicts) == (2, {Certainty.PROVED})
     for text in texts:
         values = values_on_orbits(FAMILY, text, ["1/9"], starts=1, steps=2, a3=5, b3=-4)
         assert {len(each) for each in values} == {1}

@@ -10,7 +10,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
@@ -84,7 +84,7 @@ def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
     file = parse_system("variables = ['x', 'y']\nparameters.a = 5\n[map]\nimage = ['y', '(y + 1)/(a*x)']")
     found = darboux_polynomials(file, 3, symbols=symbols)
     [space] = found.spaces
-    assert (space.cofactor, space.verdict, found.reason) == (cofactor, Verdict.PROVED, "")
+    assert (space.cofactor, space.verdict, found.reason) == (cofactor, Certainty.PROVED, "")
     assert [len(P) for P in space.polynomials] == [1, 7 if not symbols else 9]
     assert str(space.polynomials[0]) == "x*y"
 

@@ -12,7 +12,7 @@ from search_helpers import random_system, system, value_of
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.inline import System
@@ -61,7 +61,7 @@ def test_densities_satisfy_the_definition_exactly(name):
     assert found.densities
     assert found.reason == found.note == ""
     for one in found.densities:
-        assert one.verdict is Verdict.PROVED
+        assert one.verdict is Certainty.PROVED
         assert all(holds_exactly(file, one.text, eps) for eps in ("1/10", "-2/3"))
 
 
@@ -81,7 +81,7 @@ def test_quotients():
     # x, y, z are multiplied by m, 1/m, 1/m: det dPhi = 1/m, so that 1/x is a density as y and z are
     file = system("x y z", "x", "-y", "-z")
     assert {one.text for one in find_densities(file).densities} == {"y", "z"}
-    for text, verdict in (("1/x", Verdict.PROVED), ("y", Verdict.PROVED), ("x", Verdict.REFUTED)):
+    for text, verdict in (("1/x", Certainty.PROVED), ("y", Certainty.PROVED), ("x", Certainty.REFUTED)):
         function = parse_rational_function(text, ["x", "y", "z", "eps"])
         assert density_verdict(with_symbols(file), function, None)[0] is verdict
 
@@ -92,7 +92,7 @@ def test_maps_that_are_not_invertible_have_no_density():
     found = find_densities(file, eps=1)
     assert (found.densities, "not invertible" in found.reason) == ((), True)
     function = parse_rational_function("x", ["x", "y", "eps"])
-    assert density_verdict(with_symbols(file), function, fmpq(1))[0] is Verdict.UNDECIDED
+    assert density_verdict(with_symbols(file), function, fmpq(1))[0] is Certainty.UNDECIDED
     assert "no value anywhere" in find_densities(system("x y", "x", "3*y"), eps=1).reason
 
 
@@ -130,7 +130,7 @@ def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypa
     saddle = system("x y", "x", "-y")  # det(I - eps f') = 1 - eps^2
     assert module._theorem(Laboratory(saddle, (), fmpq(1))) is None
     found = module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
-    assert (found.verdict, found.function.denominator) == (Verdict.PROVED, 1)
+    assert (found.verdict, found.function.denominator) == (Certainty.PROVED, 1)
     point = (fmpq(3), fmpq(-2), fmpq(5), fmpq(7))
     determinants = [KahanMap(load("henon_heiles").system, "1/2").determinant(x) for x in (point, (fmpq(0),) * 4)]
     values = [found.function.numerator(*x, fmpq(1, 2)) for x in (point, (fmpq(0),) * 4)]
@@ -144,7 +144,7 @@ def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched(mo
     monkeypatch.setattr("kahanmaps.laboratory.preserve.densities._MAX_DEGREE", 3)
     top = System("x' = y*z; y' = -3*x*z; z' = 2*x*y")
     found = find_densities(top)
-    assert [(one.degree(3), one.verdict) for one in found.densities] == [(4, Verdict.PROVED)]
+    assert [(one.degree(3), one.verdict) for one in found.densities] == [(4, Certainty.PROVED)]
     assert found.degree == 4
     assert find_densities(top, integrals=()).densities == ()
 

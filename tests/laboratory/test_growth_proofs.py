@@ -7,11 +7,11 @@ import pytest
 from flint import fmpq, fmpz_mat, fmpz_poly
 
 from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import degrees, proofs
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.proofs import exponent_matrix, linear_iterate, monomial_growth, spectral_radius
-from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
@@ -43,7 +43,7 @@ def by_formulas(variables: str, image: str):
 def test_the_growth_of_monomial_maps_is_proved(variables, image, growth, rate, monkeypatch):
     map_ = by_formulas(variables, image)
     found = degree_growth(map_)
-    assert (str(found.growth), found.dynamical_degree.text, found.known) == (growth, rate, Known.PROVED)
+    assert (str(found.growth), found.dynamical_degree.text, found.known) == (growth, rate, Certainty.PROVED)
     monkeypatch.setattr(degrees, "exponent_matrix", lambda map_, eps: None)
     measured = degree_growth(map_, max_terms=6, patterns=OPEN, enclosed=False)
     assert (measured.degrees, bool(measured.primes)) == (found.degrees[:7], True)
@@ -106,7 +106,7 @@ def test_a_map_that_is_monomial_at_one_eps_only():
 def test_maps_of_finite_order_are_proved_periodic(image, period):
     found = degree_growth(by_formulas("x,y", image), max_terms=12, patterns=OPEN)
     assert (found.proof and found.proof.period) == period
-    assert period is None or (found.proof.is_identity and found.known is Known.PROVED)
+    assert period is None or (found.proof.is_identity and found.known is Certainty.PROVED)
 
 
 def test_a_wrong_period_is_not_proved(monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
@@ -32,7 +32,7 @@ def function(text: str):
 @pytest.fixture
 def blind(monkeypatch):
     """Random points that let everything pass."""
-    passed = Decision(Verdict.SUPPORTED, Evidence("random points over GF(p)", "held"))
+    passed = Decision(Certainty.SUPPORTED, Evidence("random points over GF(p)", "held"))
     monkeypatch.setattr(identities, "decide", lambda identity, seed: passed)
 
 
@@ -40,23 +40,23 @@ def blind(monkeypatch):
 @pytest.mark.parametrize("eps", [None, fmpq(1, 3)])
 def test_an_expansion_refutes_what_random_points_let_pass(blind, is_density, eps):
     verdict, evidence = VERDICTS[is_density](ROTATION, function("x^2 - y^2 + eps"), eps)
-    assert verdict is Verdict.REFUTED
+    assert verdict is Certainty.REFUTED
     assert evidence.method == "exact rational point"  # which the expansion asks for
 
 
 def test_the_proof_for_every_eps_is_for_eps_and_not_for_a_coordinate():
     # Conserved where eps = x or eps = y, and nowhere else.
     for name in ("x", "y"):
-        assert integral_verdict(ROTATION, function(f"(eps - {name})^2"), None)[0] is Verdict.REFUTED
-    assert integral_verdict(ROTATION, function("eps*(x^2 + y^2)"), None)[0] is Verdict.PROVED
+        assert integral_verdict(ROTATION, function(f"(eps - {name})^2"), None)[0] is Certainty.REFUTED
+    assert integral_verdict(ROTATION, function("eps*(x^2 + y^2)"), None)[0] is Certainty.PROVED
 
 
 @pytest.mark.parametrize("is_density", [False, True])
 def test_a_function_without_values_at_the_eps_in_force_is_undecided(is_density):
     system = LOTKA_VOLTERRA if is_density else ROTATION
     phi = function("x*y/(10*eps - 1)" if is_density else "x/(10*eps - 1)")
-    assert VERDICTS[is_density](system, phi, fmpq(1, 10))[0] is Verdict.UNDECIDED
-    assert VERDICTS[is_density](system, phi, fmpq(1, 9))[0] is (Verdict.PROVED if is_density else Verdict.REFUTED)
+    assert VERDICTS[is_density](system, phi, fmpq(1, 10))[0] is Certainty.UNDECIDED
+    assert VERDICTS[is_density](system, phi, fmpq(1, 9))[0] is (Certainty.PROVED if is_density else Certainty.REFUTED)
 
 
 def test_a_density_that_is_zero_at_the_eps_in_force_is_wrong_use():
@@ -84,11 +84,11 @@ def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_boun
     system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
     I = parse_rational_function("(x^2 + y^2)/(a^2 - 1)", ["x", "y", "a", "eps"])
     verdict, evidence = integral_verdict(system, I, None)
-    assert verdict is Verdict.SUPPORTED
+    assert verdict is Certainty.SUPPORTED
     assert "for every eps and every a where a^2 - 1 is not 0; false with probability below 2^-1" in evidence.summary
     # A symbol is drawn like a coordinate: what holds for a = 1 alone is refuted.
     wrong = parse_rational_function("x^2 + a*y^2", ["x", "y", "a", "eps"])
-    assert integral_verdict(system, wrong, None)[0] is Verdict.REFUTED
+    assert integral_verdict(system, wrong, None)[0] is Certainty.REFUTED
 
 
 @pytest.mark.slow
@@ -97,4 +97,4 @@ def test_what_check_integrals_proves_is_proved_where_it_is_found():
     file = load("repaired_icosahedral")
     [one] = find_integrals(file).integrals
     [finding] = check_integrals(file).findings
-    assert one.verdict is finding.verdict is Verdict.PROVED
+    assert one.verdict is finding.verdict is Certainty.PROVED

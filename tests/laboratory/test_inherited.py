@@ -7,7 +7,7 @@ from flint import fmpq
 from search_helpers import system, values_on_orbits
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -77,7 +77,7 @@ def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singul
 @pytest.mark.parametrize("eps", [None, "1/9"])
 def test_what_a_theorem_gives_is_written_out_where_relations_show_nothing(eps):
     (one,) = find_integrals(DRIVEN, eps=eps, max_degree=1).integrals
-    assert (one.origin, one.verdict) == ("modified Hamiltonian (cmoq-2013)", Verdict.PROVED)
+    assert (one.origin, one.verdict) == ("modified Hamiltonian (cmoq-2013)", Certainty.PROVED)
     values = values_on_orbits(DRIVEN, one.text, ["1/9"])
     assert [len(each) for each in values] == [1, 1, 1]
     assert len(set().union(*values)) > 1

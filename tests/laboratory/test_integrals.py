@@ -11,7 +11,7 @@ from search_helpers import integrals_of, random_system, ranks, system, values_on
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
@@ -36,7 +36,7 @@ def test_the_integrals_of_the_literature_are_found(name):
     found = integrals_of(name)
     functions = [one.function for one in found.integrals]
     assert len(functions) == found.codimension == FOUND[name]
-    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
     assert (found.is_complete, found.reason, found.note) == (True, "", "")
     known = list(file.integrals.values())
     number, of_known, of_all = independent(functions, file, known)
@@ -61,7 +61,7 @@ def test_the_exact_orbits_tell_a_wrong_formula():
 def test_formulas_with_symbols_are_those_with_numbers(name, symbols):
     general = integrals_of(name, *symbols)
     assert (len(general.integrals), general.symbols) == (load(name).catalog["codimension"], tuple(symbols))
-    assert all(one.verdict is Verdict.PROVED for one in general.integrals)
+    assert all(one.verdict is Certainty.PROVED for one in general.integrals)
     rng = random.Random(name)
     chosen = {symbol: fmpq(rng.randint(1, 9), rng.randint(1, 9)) for symbol in symbols}
     file = load(name, chosen)
@@ -168,7 +168,7 @@ def test_spaces_that_are_conjugate_over_an_extension_do_no_harm(seed):
     """At eps = 1, y + sqrt(-3) x and its conjugate have constant cofactors: spaces modulo one prime in two only."""
     found = find_integrals(system("x y", "y", "-3*x"), eps=1, seed=seed)
     assert [one.text for one in found.integrals] == ["3*x^2 + y^2", "x*(x^2 - y^2)"]
-    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
 
 
 def test_quotients_of_affine_functions_come_first():
@@ -184,7 +184,7 @@ def test_affine_integrals_are_proved_in_any_dimension():
     sites = [f"{names_[i]}*({names_[(i + 1) % n]} - {names_[i - 1]})" for i in range(n)]
     file = system(" ".join(names_), *sites)
     found = find_integrals(file, max_degree=1)
-    assert [(one.verdict, one.evidence.method) for one in found.integrals] == [(Verdict.PROVED, "theorem")]
+    assert [(one.verdict, one.evidence.method) for one in found.integrals] == [(Certainty.PROVED, "theorem")]
 
 
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):

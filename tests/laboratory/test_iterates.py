@@ -11,7 +11,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -63,10 +63,10 @@ def values_along_orbit(file, ratio, count=3):
 def test_all_four_integrals_of_tops_and_spin_systems_have_formulas(file, numbers, proved):
     laboratory, affine, plain, ratios = searched(file)
     assert (affine, len(plain), len(ratios)) == numbers
-    assert all(laboratory.verdict_on(function)[0] is Verdict.PROVED for function in plain)
+    assert all(laboratory.verdict_on(function)[0] is Certainty.PROVED for function in plain)
     verdicts = [verdict_on_ratio(laboratory, ratio)[0] for ratio in ratios]
     assert all(verdict.holds for verdict in verdicts)
-    assert verdicts.count(Verdict.PROVED) == proved
+    assert verdicts.count(Certainty.PROVED) == proved
     for ratio in ratios:
         first, *others = values_along_orbit(file, ratio)
         assert others == [first, first]
@@ -84,7 +84,7 @@ def test_functions_get_letters_that_no_variable_begins_with():
 def test_formulas_hold_for_every_value_of_a_symbol():
     laboratory, _, _, [ratio, *_] = searched(load("clebsch_first_flow"), wanted=1, symbols=["w1"])
     assert "w1" in ratio.text
-    assert verdict_on_ratio(laboratory, ratio)[0] is Verdict.PROVED
+    assert verdict_on_ratio(laboratory, ratio)[0] is Certainty.PROVED
 
 
 # kirchhoff_generic has no relations at all; those of the others belong to the one integral that they have.
@@ -102,7 +102,7 @@ def test_a_ratio_that_is_not_conserved_is_refuted():
     laboratory, _, _, [ratio, *_] = searched(file, wanted=1)
     P, Q = ratio.functions
     wrong = replace(ratio, functions=(P + 1, Q))
-    assert verdict_on_ratio(laboratory, wrong)[0] is Verdict.REFUTED
+    assert verdict_on_ratio(laboratory, wrong)[0] is Certainty.REFUTED
     assert len(set(values_along_orbit(file, wrong))) == 3
 
 
@@ -111,7 +111,7 @@ def test_ratios_of_functions_of_rank_two_are_no_integrals_but_those_of_minors_ar
     minors = ratios[-1]
     assert minors.lift.rank == 2
     single = replace(minors, lift=minors.lift._replace(rank=1), numerator=(0,), denominator=(1,))
-    assert verdict_on_ratio(laboratory, single)[0] is Verdict.REFUTED
+    assert verdict_on_ratio(laboratory, single)[0] is Certainty.REFUTED
 
 
 def test_an_orbit_that_closes_has_as_many_rows_as_points():

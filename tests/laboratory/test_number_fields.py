@@ -7,7 +7,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.interpolation import reconstruct
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.roots import parse_root
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.preserve.closed_forms import primitive_over, reconstruct_at
 
@@ -24,15 +24,15 @@ def test_integrals_and_densities_are_found_and_proved_over_the_number_field(equa
     integrals, densities = km.find_integrals(file), km.find_density(file)
     assert [str(one.verdict) for one in integrals.integrals] == ["proved"] * count
     assert integrals.codimension == count
-    assert densities.densities[0].verdict is Verdict.PROVED
+    assert densities.densities[0].verdict is Certainty.PROVED
     # What is printed is read back, and checked by another way.
     read = km.parse_system("\n".join([file.to_toml(), integrals.toml_section(), densities.toml_section()]))
-    assert km.check_integrals(read).verdict is km.check_measure(read).verdict is Verdict.PROVED
+    assert km.check_integrals(read).verdict is km.check_measure(read).verdict is Certainty.PROVED
 
 
 def test_what_was_found_for_one_number_is_refuted_for_others():
     found = km.find_integrals(km.System(TOP, a="root of t^2 - 2")).toml_section()
-    for other, expected in (("root of t^2 - 2", Verdict.PROVED), ("root of t^2 - 3", Verdict.REFUTED)):
+    for other, expected in (("root of t^2 - 2", Certainty.PROVED), ("root of t^2 - 3", Certainty.REFUTED)):
         file = km.parse_system(km.System(TOP, a=other).to_toml() + found)
         assert km.check_integrals(file).verdict is expected
 

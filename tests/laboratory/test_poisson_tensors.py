@@ -11,7 +11,7 @@ from search_helpers import random_system, system
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
@@ -19,7 +19,7 @@ from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson import poisson_tensors
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 
-PROVED, REFUTED = Verdict.PROVED, Verdict.REFUTED
+PROVED, REFUTED = Certainty.PROVED, Certainty.REFUTED
 
 
 def a_map(variables, image, inverse, **parameters):

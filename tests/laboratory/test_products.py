@@ -10,7 +10,7 @@ from search_helpers import random_system, system, value_of
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -94,20 +94,20 @@ def test_numbers_other_than_1_make_integrals_that_depend_on_time():
         "((-eps - 1)/(eps - 1))^-n*x",
         "((-2*eps + 1)/(2*eps + 1))^-n*z",
     ]
-    assert {one.integral.verdict for one in found.in_time} == {Verdict.PROVED}
+    assert {one.integral.verdict for one in found.in_time} == {Certainty.PROVED}
     kahan = file.map.at("1/5")
     x = kahan.point([3, 1, 7])
     assert kahan.step(x)[2] == fmpq(1 - fmpq(2, 5)) / (1 + fmpq(2, 5)) * x[2]
     wrong = parse_rational_function("2", ["x", "y", "z", "eps"])
     I = found.in_time[0].integral.function
-    assert verdict_on(file.map, I, None, is_density=False, factor=wrong)[0] is Verdict.REFUTED
+    assert verdict_on(file.map, I, None, is_density=False, factor=wrong)[0] is Certainty.REFUTED
 
 
 def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
     # x_{n+3} x_n = 3 + x_{n+1} + x_{n+2}: det dPhi = -(3 + y + z)/x^2, while xyz is multiplied by (3 + y + z)/x^2
     todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
     found = find_densities(todd)
-    assert (found.turning.text, found.turning.verdict) == ("x*y*z", Verdict.PROVED)
+    assert (found.turning.text, found.turning.verdict) == ("x*y*z", Certainty.PROVED)
     assert found.note == "|dx/phi| is invariant for phi = x*y*z: phi(x~) = -det dPhi(x) phi(x) (proved)"
     kahan = todd.map.at(1)
     x = kahan.point([1, 2, 5])

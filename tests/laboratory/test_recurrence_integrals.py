@@ -4,7 +4,7 @@ import pytest
 from search_helpers import ranks
 
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve import integrals, search
@@ -56,7 +56,7 @@ def test_all_integrals_of_recurrences_are_found(case, count, scales, order):
     file = image_of(names, last, scales, order)
     found = find_integrals(file)
     assert (len(found.integrals), found.codimension, found.reason) == (count, count, "")
-    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
     texts = ["".join(f"({scales[names.index(c)]}*{c})" if c in names else c for c in text) for text in known]
     functions = [parse_rational_function(text, [*file.variables, "eps"]) for text in texts]
     number, _, of_all = ranks([one.function for one in found.integrals], functions, Laboratory(file).maps[0])

@@ -11,7 +11,7 @@ from kahanmaps import KahanMap
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import laboratory
@@ -51,7 +51,7 @@ def test_without_planes_over_Q_there_are_no_such_coordinates(name):
 
 
 def test_integrals_of_members_are_proved_where_their_planes_separate():
-    assert [one.verdict for one in integrals()] == [Verdict.PROVED] * 3
+    assert [one.verdict for one in integrals()] == [Certainty.PROVED] * 3
     assert all(one.evidence.summary.endswith("in coordinates in which the planes separate") for one in integrals())
 
 
@@ -59,12 +59,12 @@ def test_what_is_not_preserved_is_refuted_there_too(monkeypatch):
     lab, (I, *_) = Laboratory(load("paper_m3")), integrals()
     x1 = I.function.numerator.context().gens()[0]
     wrong = RationalFunction(I.function.numerator + x1, I.function.denominator)
-    assert lab.verdict_on(wrong)[0] is Verdict.REFUTED
+    assert lab.verdict_on(wrong)[0] is Certainty.REFUTED
     # Even where random points let everything pass.
-    passed = Decision(Verdict.SUPPORTED, Evidence("random points over GF(p)", "held"))
+    passed = Decision(Certainty.SUPPORTED, Evidence("random points over GF(p)", "held"))
     monkeypatch.setattr(identities, "decide", lambda identity, seed: passed)
-    assert lab.verdict_on(wrong)[0] is Verdict.REFUTED
-    assert lab.verdict_on(I.function)[0] is Verdict.PROVED
+    assert lab.verdict_on(wrong)[0] is Certainty.REFUTED
+    assert lab.verdict_on(I.function)[0] is Certainty.PROVED
 
 
 def test_what_is_no_shorter_than_what_was_too_long_is_not_expanded(monkeypatch):
@@ -73,7 +73,7 @@ def test_what_is_no_shorter_than_what_was_too_long_is_not_expanded(monkeypatch):
     def judged(map_, function, eps, seed, *, is_density, factor, expands):
         if expands:
             tried.append((len(function.numerator), is_density))
-        return Verdict.SUPPORTED, Evidence("random points over GF(p)", "held")
+        return Certainty.SUPPORTED, Evidence("random points over GF(p)", "held")
 
     monkeypatch.setattr(laboratory, "verdict_on", judged)
     lab, names = Laboratory(load("euler_top")), [*load("euler_top").variables, "eps"]

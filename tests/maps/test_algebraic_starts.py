@@ -6,7 +6,7 @@ from flint import fmpq
 import kahanmaps as km
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.roots import AlgebraicPoint, parse_algebraic_point, parse_root
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import over_number_field
 
@@ -52,7 +52,7 @@ def test_a_check_tries_its_claims_along_such_an_orbit():
     start = start_of("1,t,1", t="root of t^2 + 1").over(I.number_field)
     settings = km.Settings(eps="1/3", start=start, steps=3)
     held, *_, refuted = km.check_integrals(km.load("euler_top"), settings, {"F1": "F1", "B": "x1*x2"}).findings
-    assert (held.verdict, refuted.verdict) == (Verdict.PROVED, Verdict.REFUTED)
+    assert (held.verdict, refuted.verdict) == (Certainty.PROVED, Certainty.REFUTED)
     assert "held exactly at 4 points of an orbit" in held.also[-1].summary
     assert "fails at step 0 of an exact orbit" in refuted.also[-1].summary
 

@@ -11,7 +11,7 @@ import pytest
 from helpers import together
 from paper.members import member, named, point, verifier_of
 
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.paper import verify
 from kahanmaps.paper.registry import Claim, ClaimKind, claims, evaluate
@@ -152,7 +152,7 @@ SIGNS = {
 def test_a_display_with_a_sign_or_a_letter_changed_is_refuted_with_a_witness(function, examine):
     # With A = B the transposed matrix of (46) is seen for a member that is not in normal form only.
     finding = examine(fabricated(function))
-    assert finding.verdict is Verdict.REFUTED
+    assert finding.verdict is Certainty.REFUTED
     assert finding.evidence.method == "exact rational point"
     assert finding.witness.left != finding.witness.right
 
@@ -162,7 +162,7 @@ def test_a_display_with_a_sign_or_a_letter_changed_is_refuted_with_a_witness(fun
 
 def test_a_true_claim_is_proved_with_points_beside(examine):
     finding = examine(fabricated(true_claim))
-    assert finding.verdict is Verdict.PROVED
+    assert finding.verdict is Certainty.PROVED
     assert [evidence.method for evidence in finding.also] == ["random points over GF(p)"]
 
 
@@ -170,7 +170,7 @@ def test_without_a_proof_a_true_claim_is_supported(monkeypatch, examine):
     monkeypatch.setattr(verify, "normal_form_proof", lambda *_: None)
     monkeypatch.setattr(verify, "PROOF_BUDGET", 100)
     finding = examine(named("invariant-measure"))
-    assert finding.verdict is Verdict.SUPPORTED
+    assert finding.verdict is Certainty.SUPPORTED
     assert int(finding.evidence.data["error_bound"].removeprefix("2^-")) >= 100
 
 
@@ -184,26 +184,26 @@ def test_a_claim_that_holds_at_points_but_not_in_normal_form_is_a_contradiction(
 
     monkeypatch.setattr(verify.objects_over, "normal_form_objects", broken)
     finding = examine(fabricated(lambda o: [(o.dot(o.x, o.J * o.x), o.K.zero)]))
-    assert (finding.verdict, finding.evidence.method) == (Verdict.REFUTED, "contradiction")
+    assert (finding.verdict, finding.evidence.method) == (Certainty.REFUTED, "contradiction")
     assert finding.witness is not None
 
 
 def test_a_claim_that_compares_nothing_is_undecided(examine):
     finding = examine(fabricated(nothing))
-    assert finding.verdict is Verdict.UNDECIDED
+    assert finding.verdict is Certainty.UNDECIDED
     assert "nothing to compare" in finding.evidence.summary
 
 
 def test_where_the_roots_are_not_rational_the_witness_is_over_a_prime_field(examine):
     finding = examine(fabricated(lambda o: [(o.B(0), o.I)]), "m=2, irreducible")
-    assert finding.verdict is Verdict.REFUTED
+    assert finding.verdict is Certainty.REFUTED
     assert finding.evidence.method == "point over GF(p)"
     assert finding.witness.field.startswith("GF(")
 
 
 def test_different_sides_are_proved_different_by_a_point(examine):
     finding = examine(fabricated(false_claim, kind=ClaimKind.DIFFERENT))
-    assert finding.verdict is Verdict.PROVED
+    assert finding.verdict is Certainty.PROVED
     where = finding.evidence.summary.removeprefix("both sides differ at ")
     method = {"an exact rational point": "exact rational point"}.get(where, "point over GF(p)")
     assert (finding.evidence.method, where.startswith("a point over GF(")) == (method, method == "point over GF(p)")
@@ -211,21 +211,21 @@ def test_different_sides_are_proved_different_by_a_point(examine):
 
 @pytest.mark.parametrize("pairs", [true_claim, lambda o: [*false_claim(o), *true_claim(o)]])
 def test_one_pair_that_agrees_refutes_that_all_differ(pairs, examine):
-    assert examine(fabricated(pairs, kind=ClaimKind.DIFFERENT)).verdict is Verdict.REFUTED
+    assert examine(fabricated(pairs, kind=ClaimKind.DIFFERENT)).verdict is Certainty.REFUTED
 
 
 def test_a_rank_that_is_attained_is_proved_at_a_rational_point(examine):
     finding = examine(fabricated(lambda o: [(o.rank(o.df), o.n)], kind=ClaimKind.ATTAINED))
-    assert finding.verdict is Verdict.PROVED
+    assert finding.verdict is Certainty.PROVED
     assert finding.evidence.method == "exact rational point"
 
 
 def test_a_rank_that_is_not_attained_is_refuted(examine):
     finding = examine(fabricated(lambda o: [(o.rank(o.df), o.n + 1)], kind=ClaimKind.ATTAINED))
-    assert finding.verdict is Verdict.REFUTED
+    assert finding.verdict is Certainty.REFUTED
     assert (finding.witness.left, finding.witness.right) == (("4",), ("5",))
 
 
 def test_a_false_claim_is_refuted_for_the_member_in_general():
     finding = verifier_of(None, 2).verify_claim(fabricated(false_claim))
-    assert finding.verdict is Verdict.REFUTED
+    assert finding.verdict is Certainty.REFUTED

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.paper.claims.further_claims import STATEMENTS
 from kahanmaps.paper.claims.survivors import smallest_counterexample, survivors, table
 from kahanmaps.paper.variations import VARIATIONS
@@ -23,11 +23,11 @@ def test_every_cell_is_proved_or_refuted_by_a_counterexample_and_the_page_shows_
         for name, sign in zip(VARIATIONS, signs, strict=True)
     }
     found = {(one.place["statement"], one.place["variation"]): one.verdict for one in report.findings}
-    words = {"+": Verdict.PROVED, "-": Verdict.REFUTED}
+    words = {"+": Certainty.PROVED, "-": Certainty.REFUTED}
     assert found == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
     assert table(report) in PAGE.read_text(encoding="utf-8")
     for one in report.findings:
-        assert (one.verdict is Verdict.REFUTED) is one.control is (one.witness is not None)
+        assert (one.verdict is Certainty.REFUTED) is one.control is (one.witness is not None)
         assert one.witness is None or one.witness.left != one.witness.right
 
 

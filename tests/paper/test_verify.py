@@ -14,7 +14,7 @@ from helpers import quick
 from paper.members import LARGE_SPECTRA, SPECTRA, file, member, verifier_of
 
 from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.associated import FamilyMember
@@ -25,7 +25,7 @@ from kahanmaps.paper.controls import CONTROLS
 from kahanmaps.paper.registry import ClaimKind, claims
 from kahanmaps.paper.verify import Verifier, VerifyOptions, verify
 
-PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
 QUICK = ("m=1", "m=2, split")
 LONGER = [pytest.mark.slow, pytest.mark.timeout(900)]
 over_members = pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from fontTools.ttLib import TTFont
 from page_helpers import Page, letters_of_formulas, letters_of_the_font, require_sound
 
 import kahanmaps as km
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.display.formulas import formula
 from kahanmaps.display.latex import GREEK_NAMES
 from kahanmaps.errors import InputError
@@ -192,7 +192,7 @@ def test_a_claim_is_whole_on_a_page_and_what_is_too_long_is_told():
     witness = Witness(numbers, numbers[0], numbers, numbers, "left", "right", vectors=dict.fromkeys("abcdef", numbers))
     also = tuple(Evidence("exact", f"a further reason, number {k}") for k in range(9))
     decided = Evidence("theorem", "", {"theorem": "T", "hypotheses": [f"hypothesis {k}" for k in range(20)]})
-    finding = Finding("c", Verdict.REFUTED, decided, also, witness, formula="x" * 7_000)
+    finding = Finding("c", Certainty.REFUTED, decided, also, witness, formula="x" * 7_000)
     page = require_sound(report_html(Report("commute", (finding,)), pictures=False))
     for number in numbers:
         assert page.text.count(number) >= 9

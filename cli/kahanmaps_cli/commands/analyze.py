@@ -106,7 +106,7 @@ class _Report:
             tell(lib.analysis_head(found))
         self.tell(found.final_sections)
 
-    def tell(self, sections: Sequence[tuple[str, Sequence[lib.KnownStatement]]]) -> None:
+    def tell(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
         """Print the sections that have not been printed yet."""
         if self.progress is not None and len(sections) > self._told:
             self.progress.clear()

@@ -105,7 +105,7 @@ def command(system: str | None, **options: Any) -> int:
             search("the page")
             html = lib.report_html(reports, file=file, left_out=left_out, **how)
             verdict = lib.combined(report.verdict for report in reports)
-            status = {lib.Verdict.REFUTED: 1, lib.Verdict.UNDECIDED: 3}.get(verdict, 0)
+            status = {lib.Certainty.REFUTED: 1, lib.Certainty.UNDECIDED: 3}.get(verdict, 0)
     content = html.encode()
     if deliver(options["output"], content) and not options["quiet"]:
         say(f"{options['output']}: {len(content)} bytes")

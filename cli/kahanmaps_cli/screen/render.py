@@ -51,9 +51,9 @@ def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet
 
 def exit_status(report: lib.Report) -> int:
     """0 holds, 1 refuted, 3 undecided, or an orbit that was asked for and ended early."""
-    if report.verdict is lib.Verdict.REFUTED:
+    if report.verdict is lib.Certainty.REFUTED:
         return 1
-    if report.verdict is lib.Verdict.UNDECIDED or report.ended_early:
+    if report.verdict is lib.Certainty.UNDECIDED or report.ended_early:
         return 3
     return 0
 

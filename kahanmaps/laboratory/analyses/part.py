@@ -11,8 +11,7 @@ from typing import Any
 from kahanmaps.algebra.printing import plain
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.known import KnownStatement
+from kahanmaps.laboratory.findings import Findings, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -40,7 +39,7 @@ class Part:
     name: str
     look: Callable[..., Any]
     title: str = ""
-    statements: Callable[[Any], Sequence[KnownStatement]] | None = None
+    statements: Callable[[Any], Sequence[Statement]] | None = None
     of: Of = Of.FIELDS
     share: float = 0.1  # of the whole budget
     result: str = ""  # the name, unless another is given

@@ -7,7 +7,7 @@ from typing import Any
 
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.family.tensor import TensorStructure, tensor_structure
 from kahanmaps.invariants.growth import Growth
@@ -84,7 +84,7 @@ def _degrees(run: Run, **given: Any) -> DegreeGrowth:
 
 def _curves(run: Run, effort: Budget, **_: Any) -> Pencil | None:
     """On which curves a planar map with one integral moves."""
-    proved = [one for one in run.integrals if one.verdict is Verdict.PROVED]
+    proved = [one for one in run.integrals if one.verdict is Certainty.PROVED]
     if run.dim != 2 or len(proved) != 1 or run.has_symbols:
         return None
     return pencil_of(proved[0].name, proved[0].function, run.found.eps, seed=run.seed, effort=effort)

@@ -29,6 +29,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.printing import attributes, format_number
 from kahanmaps.algebra.work import Budget
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.hard_stop import TimeLimit
@@ -46,7 +47,6 @@ from kahanmaps.laboratory.growth.proofs import (
 )
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
-from kahanmaps.laboratory.known import Known
 from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMENSION, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
 from kahanmaps.laboratory.singular.written import with_eps
@@ -211,15 +211,15 @@ class DegreeGrowth(Printed):
         return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
 
     @property
-    def known(self) -> Known:
+    def known(self) -> Certainty:
         """How the growth is known; the bounds of `enclosure` are proved whatever this says."""
         if self.proof is not None:
-            return Known.PROVED
+            return Certainty.PROVED
         if self.explained is not None:
-            return Known.EXPLAINED
+            return Certainty.EXPLAINED
         if self.recurrence is not None or self.ended == Ended.CONSTANT:
-            return Known.MEASURED
-        return Known.ESTIMATED if self.looks_exponential else Known.UNDECIDED
+            return Certainty.MEASURED
+        return Certainty.ESTIMATED if self.looks_exponential else Certainty.UNDECIDED
 
     @property
     def growth_text(self) -> str:

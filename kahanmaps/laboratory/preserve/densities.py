@@ -18,7 +18,7 @@ from flint import fmpq, fmpz
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_factored
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
@@ -52,7 +52,7 @@ class FoundDensity:
     """A density phi(x, eps): the measure dx/phi is invariant, with the verdict on that; `product` is phi in factors."""
 
     function: RationalFunction
-    verdict: Verdict
+    verdict: Certainty
     evidence: Evidence
     product: str = ""
 
@@ -108,7 +108,7 @@ class DensitySearch(Search):
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
         """The one that stands for all, which are this one times integrals: the shortest, proved if any is."""
-        return tuple(sorted(self.densities, key=lambda one: (one.verdict is not Verdict.PROVED, len(one.text)))[:1])
+        return tuple(sorted(self.densities, key=lambda one: (one.verdict is not Certainty.PROVED, len(one.text)))[:1])
 
     @property
     def further(self) -> str:
@@ -218,13 +218,13 @@ def densities_of(
         # The first search for integrals is worth as much as high degrees; a caller who has done it needs none.
         second = budget if integrals is not None or product is not None else next(stages)
         densities, tried, cut = _search(laboratory, product, max_degree, second, progress)
-        none_proved = densities and all(one.verdict is not Verdict.PROVED for one in densities)
+        none_proved = densities and all(one.verdict is not Certainty.PROVED for one in densities)
         if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
             # x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree.
             x = ring(laboratory.map.names).gens()
             phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
             proof = product_density_invariant(laboratory.system, phi)
-            densities = densities if proof is None else [FoundDensity(phi, Verdict.PROVED, proof), *densities]
+            densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
     found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
     if found.is_open:
         if integrals is None:
@@ -323,12 +323,12 @@ def _products(
 
 def _judged(
     laboratory: Laboratory, phi: RationalFunction, factor: RationalFunction | None = None
-) -> tuple[Verdict, Evidence]:
+) -> tuple[Certainty, Evidence]:
     """The verdict on dx/phi: by the lemma on Lotka-Volterra systems, or as an identity."""
     if laboratory.system is not None and not laboratory.flow:
         proof = product_density_invariant(laboratory.system, phi)
         if proof is not None:
-            return Verdict.PROVED, proof
+            return Certainty.PROVED, proof
     return laboratory.verdict_on(phi, is_density=True, factor=factor)
 
 
@@ -351,7 +351,7 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     evidence = Evidence(
         "theorem", "f = J grad H with a constant skew matrix J: dx/det(I - eps f'(x)) is invariant (cmoq-2013)"
     )
-    return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Verdict.PROVED, evidence)
+    return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Certainty.PROVED, evidence)
 
 
 def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:

@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.functions import DEFAULT_BUDGET
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import MAX_DIMENSION, settle
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
@@ -38,7 +38,7 @@ def verdict_on(
     is_density: bool,
     factor: RationalFunction | None = None,
     expands: bool = True,
-) -> tuple[Verdict, Evidence]:
+) -> tuple[Certainty, Evidence]:
     """Whether I(x~) = I(x); of a density phi whether phi(x~) = det dPhi(x) phi(x), which says that dx/phi is invariant.
 
     Both are for every value of the symbols of the map and, if `eps` is None, every eps.
@@ -109,7 +109,7 @@ def verdict_on(
     return judged(identity, seed, expands=expands and n <= MAX_DIMENSION)
 
 
-def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verdict, Evidence]:
+def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Certainty, Evidence]:
     """The verdict on an identity, by random points and, if `expands`, by expansion."""
     decision = decide(identity, seed)
     found = settle(identity, decision, seed, _BUDGET) if expands else decision

@@ -20,7 +20,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, degree, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
@@ -66,7 +66,7 @@ class FoundIntegral:
     name: str
     function: RationalFunction
     origin: str
-    verdict: Verdict
+    verdict: Certainty
     evidence: Evidence
     product: str = ""  # the formula in factors, where it is known so
 
@@ -163,7 +163,7 @@ class IntegralSearch(Search):
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.found)
 
     @property
-    def formulas(self) -> list[tuple[str, Verdict]]:
+    def formulas(self) -> list[tuple[str, Certainty]]:
         """The formulas, those in iterates last, each with its verdict."""
         every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
         return [(one.text, one.verdict) for one in every]
@@ -454,7 +454,7 @@ class _Collected:
             is_affine = function.is_polynomial and all(sum(map(int, m[:n])) <= 1 and not m[-1] for m in monomials)
             system = None if laboratory.flow else laboratory.system
             if is_affine and system is not None and is_kept_by_flow(system, function):
-                verdict = Verdict.PROVED  # v.x with v.f = 0; v may contain the symbols
+                verdict = Certainty.PROVED  # v.x with v.f = 0; v may contain the symbols
             else:
                 verdict, evidence = laboratory.verdict_on(function)
             if verdict.holds:
@@ -490,7 +490,7 @@ class _Collected:
             if k < affine:
                 terms = zip(context.gens(), inherited.quotient.integrals[k], strict=False)
                 form = RationalFunction(sum((x * v for x, v in terms), context.constant(0)), context.constant(1))
-                self._add(row, form, AFFINE, Verdict.PROVED, _AFFINE_EVIDENCE)
+                self._add(row, form, AFFINE, Certainty.PROVED, _AFFINE_EVIDENCE)
                 continue
             field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
             eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
@@ -505,7 +505,7 @@ class _Collected:
             summary = f"{summary}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
             evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k - affine))})
             formula = self._normalized((function, "modified Hamiltonian (cmoq-2013)", ""))
-            self._add(row, *formula[:2], Verdict.PROVED, evidence)
+            self._add(row, *formula[:2], Certainty.PROVED, evidence)
 
     def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
         """Products of powers of known polynomials, and such that depend on time."""

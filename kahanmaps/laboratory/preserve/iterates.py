@@ -26,7 +26,7 @@ from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.displayed import latex
@@ -120,7 +120,7 @@ class IntegralInIterates:
     name: str
     ratio: RatioOfIterates
     origin: str
-    verdict: Verdict
+    verdict: Certainty
     evidence: Evidence
 
     @property
@@ -139,7 +139,7 @@ class IntegralInIterates:
 
 def verdict_on_ratio(
     laboratory: Laboratory, ratio: RatioOfIterates, too_long: set[int] | None = None
-) -> tuple[Verdict, Evidence]:
+) -> tuple[Certainty, Evidence]:
     """Whether I has the same value a step later, as an identity for the map of the laboratory.
 
     `too_long` collects the lengths of orbits that cannot be multiplied out; no ratio of such a length or more is tried.

@@ -33,7 +33,7 @@ from kahanmaps.algebra.small_systems import (
     without_contained,
 )
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Finding, Verdict, combined
+from kahanmaps.checks.claims import Certainty, Finding, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
 from kahanmaps.displayed import Printed
@@ -148,10 +148,10 @@ class CommutingSystems(Printed):
         return [g for g in self.solutions if not g.trivial]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Certainty:
         """The weakest verdict on what was found; undecided where the list may not be complete."""
         found = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
-        return combined([*found, *([] if self.complete else [Verdict.UNDECIDED])])
+        return combined([*found, *([] if self.complete else [Certainty.UNDECIDED])])
 
     def rows(self) -> list[dict[str, str]]:
         """A row for each g other than 0, f and -f, for `pandas.DataFrame(found.rows())` and the like."""
@@ -266,9 +266,9 @@ class _Search:
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
             finding = judge_field(f, field_at(self.space, weights), self.settings)
-            if finding.verdict is Verdict.REFUTED:
+            if finding.verdict is Certainty.REFUTED:
                 found.discarded += 1
-            elif finding.verdict is Verdict.UNDECIDED:
+            elif finding.verdict is Certainty.UNDECIDED:
                 found.undecided.append(f"one solution: {finding.evidence.summary}")
             else:
                 found.solutions.append(self._field(weights, finding))
@@ -321,7 +321,7 @@ class _Search:
             return
         self.settings.progress(f"a family with {len(family.free)} parameters")
         finding = judge_family(self.f, self.space, family, self.settings)
-        if finding.verdict is not Verdict.REFUTED:
+        if finding.verdict is not Certainty.REFUTED:
             self._add_family(family, finding)
         elif level + 1 < len(ORDERS) and self._in_budget():
             self._solve(family, level + 1)
@@ -332,7 +332,7 @@ class _Search:
             )
 
     def _add_family(self, family: SolutionComponent, finding: Finding) -> None:
-        if finding.verdict is Verdict.UNDECIDED:
+        if finding.verdict is Certainty.UNDECIDED:
             self.found.undecided.append(f"a family with {len(family.free)} parameters: {finding.evidence.summary}")
             return
         # A family found later, at a higher order, may hold an earlier one.

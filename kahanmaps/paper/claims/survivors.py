@@ -15,7 +15,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import monomials
-from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.checks.settings import Settings
 from kahanmaps.paper.claims.further_claims import STATEMENTS
 from kahanmaps.paper.objects import PaperObjects
@@ -47,8 +47,8 @@ def survivors(m: int = 3, settings: Settings | None = None) -> Report:
         claim = by_key[finding.place["key"]]
         fails = finding.formula.startswith(_KEY)
         verdict, evidence, witness = finding.verdict, finding.evidence, finding.witness
-        if fails and verdict is Verdict.PROVED:
-            verdict = Verdict.REFUTED
+        if fails and verdict is Certainty.PROVED:
+            verdict = Certainty.REFUTED
             found = smallest_counterexample(functions[claim.statement], claim.variation)
             if found is not None:
                 text, witness = found

@@ -18,7 +18,7 @@ from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
@@ -58,7 +58,7 @@ class DarbouxPolynomials:
 
     cofactor: str
     polynomials: tuple[fmpq_mpoly, ...]
-    verdict: Verdict
+    verdict: Certainty
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -146,7 +146,7 @@ def darboux_polynomials(
         for P in settled.functions:
             K = darboux_cofactor(laboratory.field, P)
             assert K is not None  # or it would not have been listed
-            spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
+            spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Certainty.PROVED))
         if settled.degree < degree:
             reason = f"degrees above {settled.degree} are not settled: {settled.reason}"
     if flow or laboratory.defect:
@@ -239,7 +239,7 @@ def _written(
     outcomes = [_judged(laboratory, cofactors, product, c, P) for P in polynomials]
     if not all(outcome.holds for outcome in outcomes):
         return f"a formula for the cofactor {text} did not pass as an identity"
-    verdict = Verdict.PROVED if all(one is Verdict.PROVED for one in outcomes) else Verdict.SUPPORTED
+    verdict = Certainty.PROVED if all(one is Certainty.PROVED for one in outcomes) else Certainty.SUPPORTED
     factor = format_rational_function(c)
     if factor != "1":
         text = f"{factor if c.is_polynomial and len(c.numerator) == 1 else f'({factor})'}*{text}".removesuffix("*1")
@@ -252,7 +252,7 @@ def _judged(
     product: CofactorProduct,
     c: RationalFunction,
     P: fmpq_mpoly,
-) -> Verdict:
+) -> Certainty:
     """Whether P(x~) = c P(x) prod C^k, the denominators multiplied out."""
     map_, n = laboratory.map, laboratory.map.dim
 

@@ -32,7 +32,7 @@ from kahanmaps.algebra.polynomials import (
 )
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial
 from kahanmaps.algebra.work import Budget
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -66,14 +66,14 @@ class Limit:
     leading: RationalFunction
     order: int
     second: RationalFunction | None
-    kept: Verdict
+    kept: Certainty
     on_solutions: bool = False
 
     @property
     def text(self) -> str:
         """What it is, and what the map makes of it."""
         done = "one of the map tends to"
-        if self.kept.holds or self.kept is Verdict.REFUTED:
+        if self.kept.holds or self.kept is Certainty.REFUTED:
             done = f"the map keeps ({self.kept})" if self.kept.holds else "the map deforms"
         series = f"{self.combination} {'tends to' if self.on_solutions else '='} {self.name}"
         series += " where the points are those of a solution" * self.on_solutions

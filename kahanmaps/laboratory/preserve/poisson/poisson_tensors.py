@@ -26,7 +26,7 @@ from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
 from kahanmaps.algebra.work import Budget, count
-from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
@@ -78,14 +78,14 @@ class FoundTensor:
 
     name: str
     tensor: GivenTensor
-    verdict: Verdict
+    verdict: Certainty
     evidence: Evidence
-    jacobi: Verdict
+    jacobi: Certainty
     jacobi_evidence: Evidence
     rank: int
     casimirs: tuple[str, ...] = ()
     in_involution: tuple[str, ...] = ()
-    involution: Verdict | None = None
+    involution: Certainty | None = None
 
     @property
     def text(self) -> str:
@@ -154,7 +154,7 @@ class PoissonSearch(Search):
     integrals: tuple[FoundIntegral, ...]
     degree: int
     denominator: RationalFunction | None
-    pencil: Verdict | None
+    pencil: Certainty | None
     reason: str
 
     @property
@@ -477,7 +477,7 @@ def _with_brackets(
     return replace(found, casimirs=tuple(casimirs), in_involution=names, involution=involution)
 
 
-def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Verdict, Evidence]:
+def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
     """The verdict on an identity, which is not multiplied out when the budget is spent."""
     return judged(identity, laboratory.seed, expands=not budget.is_spent)
 
