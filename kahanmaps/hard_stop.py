@@ -39,16 +39,19 @@ def time_limit(seconds: float | None) -> Iterator[None]:
     def stop(*_: Any) -> None:
         raise TimeLimit(f"the time limit of {seconds:g} s is over")
 
+    stop.ends_a_time_limit = True  # type: ignore[attr-defined]
     outer, interval = signal.getitimer(signal.ITIMER_REAL)
-    if 0 < outer <= seconds:  # another limit around this one is over before it
+    before = signal.getsignal(signal.SIGALRM)
+    is_nested = outer > 0 and getattr(before, "ends_a_time_limit", False)
+    if is_nested and outer <= seconds:  # the limit around this one is over first
         yield
         return
-    previous = signal.signal(signal.SIGALRM, stop)
+    signal.signal(signal.SIGALRM, stop)
     try:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         yield
     finally:
         left, _ = signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
-        if outer:
-            signal.setitimer(signal.ITIMER_REAL, max(outer - (seconds - left), 1e-6), interval)
+        signal.signal(signal.SIGALRM, before)
+        if outer:  # a timer of somebody else begins anew
+            signal.setitimer(signal.ITIMER_REAL, max(outer - (seconds - left) * is_nested, 1e-6), interval)

@@ -43,9 +43,6 @@ class Budget:
     """Units of counted work that may be spent from now on.
 
     >>> budget = Budget(100)
-    >>> first, second = budget.share([1, 3])
-    >>> first.units, second.units
-    (25.0, 75.0)
     >>> stages = budget.share([1, 3])
     >>> next(stages).units
     25.0

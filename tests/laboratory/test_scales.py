@@ -200,7 +200,7 @@ def test_symmetries(name, how):
 def test_commuting_fields(name, how):
     """g for y is M g(M^-1 y), and runs faster as f does."""
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (commuting_systems(one.file.system, "quadratic", seconds=300) for one in (same, image))
+    found, moved = (commuting_systems(one.file.system, "quadratic", effort=3) for one in (same, image))
     assert found.complete
     assert moved.complete
     assert len(found.families) == len(moved.families)

@@ -145,7 +145,9 @@ class ModularFlow(ModularMap):
             return table[place]
 
         series = [monomial(place).coeffs() for place in (range(len(factors)) if support is None else support)]
-        return list(islice(zip_longest(*series, fillvalue=nmod(0, p)), orders))
+        # Coefficients end with the last one that is not 0: where all solutions are short, so are their lists.
+        rows: list[Values] = list(islice(zip_longest(*series, fillvalue=nmod(0, p)), orders))
+        return rows + [[nmod(0, p)] * columns] * (orders - len(rows))
 
 
 def is_kept_by_flow(
