@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import os
 import shlex
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -135,7 +134,7 @@ class Search(Progress):
         """Whether the seconds are over, or were at the end of the block."""
         if self._was_over is not None:
             return self._was_over
-        return self._seconds is not None and signal.getitimer(signal.ITIMER_REAL)[0] == 0
+        return self._time_is_over()
 
     @property
     def ending(self) -> str:
@@ -147,7 +146,7 @@ class Search(Progress):
         if left is not None and self._since is not None:
             left = max(1e-6, left - (time.monotonic() - self._since))
         self._limit, self._budget = lib.time_limit(left), lib.Budget()
-        self._limit.__enter__()
+        self._time_is_over = self._limit.__enter__()
         return super().__enter__()
 
     def __exit__(

@@ -403,7 +403,7 @@ def _terms(
     """
     import numpy as np
 
-    from kahanmaps.maps.residues.families import NOWHERE, Family
+    from kahanmaps.maps.residues.families import LONG, NOWHERE, Family
 
     if terms is not None and not 1 <= terms <= 2 * _MOST_TERMS:
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
@@ -418,6 +418,8 @@ def _terms(
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
     room = max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
+    # Compiles the kernel, where there is nothing yet that Ctrl-C could keep.
+    family.degrees(np.resize(tried, (LONG, count)), eps, 1, room, random.Random(0))
     return measured, room, family.units([1, *found[:measured]])
 
 

@@ -110,6 +110,7 @@ class Family:
             walk(start[here], exponents, layout, values[here], weights, self._inverses, float(p), float(self._nu),
                  room, found[here])  # fmt: skip
 
+        part(count)  # no members: compiles in this thread, which Ctrl-C can end; the pool waits for its own
         with ThreadPoolExecutor(jobs) as pool:
             for _ in pool.map(part, range(0, count, _CHUNK)):
                 pass
