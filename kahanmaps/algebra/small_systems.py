@@ -27,11 +27,9 @@ from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
 from kahanmaps.algebra.work import Budget, count
 
-MAX_BASIS, MAX_TERMS, MAX_BITS = (
-    120,
-    400,
-    4_000,
-)  # of a Groebner basis: polynomials, terms of one, bits of a coefficient
+MAX_BASIS = 120  # polynomials of a Groebner basis
+MAX_TERMS = 400  # of one of them
+MAX_BITS = 4_000  # of a coefficient
 MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored, which takes some 20 ms then
 SPENT = "the budget was spent (--effort)"
 MAX_PARTS = 400  # points, families and unsolved parts together

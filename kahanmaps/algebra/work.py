@@ -99,16 +99,6 @@ def units_at(effort: int, units: float) -> float:
     return units * 2.0 ** (effort - 1)
 
 
-def count_elimination(rows: int, columns: int) -> None:
-    """Count the reduction of a matrix modulo a prime below 2^64 to echelon form."""
-    count(rows * columns * (2 + min(rows, columns)) / 500)
-
-
-def count_products(products: int, bits: int = 64) -> None:
-    """Count so many products of terms, or of numbers, with entries of about so many bits."""
-    count(products * (0.05 + bits / 20_000))
-
-
 def counted_cache(size: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """A decorator: keep the last results of a function, and count its work whenever a result is asked for."""
 

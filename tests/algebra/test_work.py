@@ -4,15 +4,7 @@ import threading
 
 import pytest
 
-from kahanmaps.algebra.work import (
-    Budget,
-    count,
-    count_elimination,
-    count_products,
-    counted,
-    counted_cache,
-    units_at,
-)
+from kahanmaps.algebra.work import Budget, count, counted, counted_cache, units_at
 from kahanmaps.errors import InputError
 
 
@@ -111,14 +103,3 @@ def test_threads_count_for_themselves():
     thread.start()
     thread.join()
     assert (budget.spent, others) == (0, [1000])
-
-
-def test_larger_sizes_count_more():
-    def units(function, *sizes):
-        budget = Budget()
-        function(*sizes)
-        return budget.spent
-
-    assert units(count_elimination, 100, 100) * 4 <= units(count_elimination, 200, 200)
-    assert units(count_elimination, 100, 200) == units(count_elimination, 100, 200)
-    assert units(count_products, 10_000) < units(count_products, 10_000, 5_000)
