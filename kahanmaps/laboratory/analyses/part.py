@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Flag, auto
 from math import inf
@@ -39,7 +39,7 @@ class Part:
     name: str
     look: Callable[..., Any]
     title: str = ""
-    statements: Callable[[Any], Sequence[Statement]] | None = None
+    statements: Callable[[Any], Iterable[Statement]] | None = None
     of: Of = Of.FIELDS
     share: float = 0.1  # of the whole budget
     result: str = ""  # the name, unless another is given

@@ -160,7 +160,7 @@ def scan(
             known, missed = run.components(rng)
     run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
     before = known
-    known, missed = run.improved(
+    known, missed = run.each(
         before, "confirms component", _UNTIL[2], lambda one, check: _confirmed(one, family, before, rng, check)
     )
     run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
@@ -175,7 +175,7 @@ def scan(
             enough[one.degrees] = growth
         return replace(one, growth=growth)
 
-    known, missed = run.improved(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
+    known, missed = run.each(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
     run.omit(missed, f"the growth on {missed} components")
     kinds = {one.degrees: one.growth.growth for one in reversed(known) if one.growth is not None}
     kinds |= {one.degrees: Growth.UNKNOWN for one in known if one.degrees not in kinds}
@@ -193,7 +193,7 @@ def scan(
             told = analyze(member, eps=step, effort=analysis, seed=family.seed)
             return replace(one, verdict=told.conclusion)
 
-        known, missed = run.improved(known, "analysis of a member on component", 1, with_verdict)
+        known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     sweeps = tuple(run.sweeps)
     left = tuple(_left(one, known) for one in sweeps)
@@ -305,9 +305,16 @@ class _Sweeping:
         totals = accumulate((_size(len(self.family.names), [one]) for one in further), initial=self.total)
         return [one for one, total in zip(further, islice(totals, 1, None), strict=True) if total <= most]
 
-    def each(self, items: Sequence[Any], what: str, part: float, work: Callable[..., Any]) -> list[Any]:
-        """What `work` makes of each within a part of the budget, None where that is spent."""
-        done, check = [], self.until(part)
+    def each(
+        self,
+        items: Sequence[Any],
+        what: str,
+        part: float,
+        work: Callable[..., Any],
+        left: Callable[[Any], Any] = lambda one: one,
+    ) -> tuple[list[Any], int]:
+        """What `work` makes of each within a part of the budget, `left` of those for which it is spent; how many."""
+        done, missed, check = [], 0, self.until(part)
         for k, one in enumerate(items):
             try:
                 self.doing = f"scan: {what} {k + 1} of {len(items)}"
@@ -315,25 +322,21 @@ class _Sweeping:
                 done.append(work(one, check))
             except (TimeOver, TimeLimit) as end:
                 self.is_interrupted |= isinstance(end, TimeLimit)
-                done.append(None)
-        return done
+                missed += 1
+                done.append(left(one))
+        return done, missed
 
     def components(self, rng: random.Random) -> tuple[list[Component], int]:
         """The components, those with smaller degrees first, and how many sequences of degrees they are missing for."""
         names, classes = self.family.names, sorted({degrees for one in self.sweeps for degrees in one.classes})
-
-        def of(degrees: Degrees, check: Callable[[], None]) -> list[Component]:
-            return conditions(degrees, self.sweeps, names, rng, check)
-
-        found = self.each(classes, "conditions for sequence of degrees", _UNTIL[1], of)
-        return [one for some in found if some is not None for one in some], found.count(None)
-
-    def improved(
-        self, known: Sequence[Component], what: str, part: float, work: Callable[..., Component]
-    ) -> tuple[list[Component], int]:
-        """The components with what `work` makes of each within a part of the budget, and how many are as before."""
-        found = self.each(known, what, part, work)
-        return [one if new is None else new for one, new in zip(known, found, strict=True)], found.count(None)
+        found, missed = self.each(
+            classes,
+            "conditions for sequence of degrees",
+            _UNTIL[1],
+            lambda degrees, check: conditions(degrees, self.sweeps, names, rng, check),
+            left=lambda _: [],
+        )
+        return [one for some in found for one in some], missed
 
 
 def _growth(one: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:

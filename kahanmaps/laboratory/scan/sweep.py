@@ -88,27 +88,13 @@ def sweep(
     check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Sweep:
-    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms.
+    """The slow members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
 
-    Args:
-        map_: a map with symbols, the parameters of the family.
-        count: how many parameters vary: the symbols, and perhaps eps as the last one, which is never 0.
-        prime: below 2^13.
-        eps: an exact number, or None for generic eps, in GF(p^2).
-        terms, room: see `Family.degrees`.
-        on: None for all members, else how many random affine subspaces of parameter space, and their dimension.
-        units: of work for one member.
-        seed: of everything random.
-        jobs: threads.
-        check: is called now and then, and may raise TimeOver.
-        progress: is told how many members are done, of how many.
-
-    Returns:
-        A `Sweep`.
-
-    Raises:
-        InputError: where the map exists nowhere, or the degrees need more room.
-        TimeOver: from `check`.
+    The `count` parameters that vary are the symbols of the map, and perhaps eps as the last one, which is never 0;
+    otherwise `eps` is an exact number, or None for generic eps, in GF(p^2). `room` and `jobs` are as for
+    `Family.degrees`. Tried are all members, or those `on` so many random affine subspaces of parameter space, of a
+    dimension; one counts as `units` of work. `check` is called now and then, and may raise TimeOver; `progress` is told
+    how many members are done, of how many. Raises InputError where the map exists nowhere, or degrees need more room.
     """
     import numpy as np
 

@@ -79,15 +79,10 @@ class Family:
     ) -> NDArray[np.int64]:
         """The degrees d_1, ..., d_terms of each member, one a row, on one random line each.
 
-        Args:
-            members: residues of the symbols, one member a row; with one more column, that of eps.
-            eps: an exact number, or None for a random element of GF(p^2) for each member, where eps is no column.
-            terms: how many steps.
-            room: the largest degree that is worked out before common factors are removed; beyond it the degrees are -2
-                (TOO_LARGE), and -1 (NOWHERE) where the iterate exists nowhere.
-            rng: of the lines.
-            kernel: "numpy" or "numba".
-            jobs: threads.
+        `members` are residues of the symbols, one member a row; one more column is that of eps. Else `eps` is an exact
+        number, or None for a random element of GF(p^2) for each member. `room` is the largest degree that is worked out
+        before common factors are removed; beyond it degrees are -2 (TOO_LARGE), and -1 (NOWHERE) where the iterate
+        exists nowhere. The `kernel` is "numpy" or "numba", `jobs` are threads.
         """
         draw = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
