@@ -13,8 +13,6 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.conclusion import doubt_of_heights
 from kahanmaps.laboratory.findings import Findings, Statement
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, under_map
-from kahanmaps.laboratory.preserve.integrals import IntegralSearch
-from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 from kahanmaps.laboratory.singular.outcomes import SingularityOutcome
 from kahanmaps.laboratory.symmetry.commuting import CommutingField
 from kahanmaps.laboratory.symmetry.symmetries import MATRICES
@@ -61,8 +59,47 @@ def of_vector_field(found: Findings) -> Iterator[Statement]:
 
 def of_integrals(found: Findings) -> Iterator[Statement]:
     """Formulas, what is measured along orbits, relations there, and the curves of a planar integral."""
-    if found.integrals is not None:
-        yield from _of_search(found.integrals, found.relations)
+    if (search := found.integrals) is not None:
+        texts = [(one, one.short_text) for one in search.integrals] + [(one, one.text) for one in search.in_iterates]
+        yield from (Statement(one.verdict, f"{one.name} = {text}  [{one.origin}]") for one, text in texts)
+        for timed in search.in_time:
+            text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
+            yield Statement(timed.integral.verdict, text)
+        profile = search.profile
+        if search.by_theorems:
+            number = counted(search.by_theorems, "independent integral")
+            status = MEASURED if search.symbols else PROVED  # of symbols random values are looked at
+            yield Statement(status, f"{number} by theorems: {search.theorems}")
+        if not profile.nullities:
+            yield Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}")
+        elif profile.period is not None:
+            yield Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}")
+        else:
+            text = "orbits show no integral"
+            if search.codimension:
+                seen = "" if search.is_exact else "at least "
+                number = f"{seen}{counted(search.codimension, 'independent integral')}"
+                text = (
+                    f"generic orbits lie on varieties of codimension {seen}{search.codimension}, which means {number}"
+                )
+            none = max((degree for degree, k in enumerate(profile.nullities, 1) if not k), default=0)
+            relations = [f"none up to degree {none}" if none > 1 else "none of degree 1"] if none else []
+            spaces = [(degree, k) for degree, k in enumerate(profile.nullities, 1) if k]
+            relations += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
+            yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relations)}")
+            if not profile.agree:
+                yield Statement(NOTE, "the orbits that were compared do not agree")
+        yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations)
+        if integrals := list(dict.fromkeys(name for relation in found.relations for name in relation.integrals)):
+            text = "are constant on each orbit and differ between orbits, so they are integrals"
+            if len(integrals) == 1:
+                text = "is constant on each orbit and differs between orbits, so it is an integral"
+            yield Statement(NOTE, f"{_listed(integrals)} {text}")
+        if functions := list(dict.fromkeys(name for relation in found.relations for name in relation.functions_of_eps)):
+            depend = "depends" if len(functions) == 1 else "depend"
+            yield Statement(NOTE, f"{_listed(functions)} {depend} on eps only")
+        if search.reason and profile.nullities:
+            yield Statement(NOTE, search.reason)
     if isinstance(found.normal_form, SystemNormalForm):
         number = counted(found.normal_form.form.m, "independent integral")
         yield Statement(PROVED, f"{number}, as a member of the commuting family")
@@ -72,47 +109,6 @@ def of_integrals(found: Findings) -> Iterator[Statement]:
         follows = f"but {against}" if against else found.pencil.motion(growth)
         text = "; ".join(filter(None, [found.pencil.text, follows]))
         yield Statement(UNDECIDED if against else MEASURED, text)
-
-
-def _of_search(search: IntegralSearch, along_orbits: Sequence[SparseRelation]) -> Iterator[Statement]:
-    texts = [(one, one.short_text) for one in search.integrals] + [(one, one.text) for one in search.in_iterates]
-    yield from (Statement(one.verdict, f"{one.name} = {text}  [{one.origin}]") for one, text in texts)
-    for timed in search.in_time:
-        text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
-        yield Statement(timed.integral.verdict, text)
-    profile = search.profile
-    if search.by_theorems:
-        number = counted(search.by_theorems, "independent integral")
-        status = MEASURED if search.symbols else PROVED  # of symbols random values are looked at
-        yield Statement(status, f"{number} by theorems: {search.theorems}")
-    if not profile.nullities:
-        yield Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}")
-    elif profile.period is not None:
-        yield Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}")
-    else:
-        text = "orbits show no integral"
-        if search.codimension:
-            seen = "" if search.is_exact else "at least "
-            number = f"{seen}{counted(search.codimension, 'independent integral')}"
-            text = f"generic orbits lie on varieties of codimension {seen}{search.codimension}, which means {number}"
-        none = max((degree for degree, k in enumerate(profile.nullities, 1) if not k), default=0)
-        relations = [f"none up to degree {none}" if none > 1 else "none of degree 1"] if none else []
-        spaces = [(degree, k) for degree, k in enumerate(profile.nullities, 1) if k]
-        relations += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
-        yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relations)}")
-        if not profile.agree:
-            yield Statement(NOTE, "the orbits that were compared do not agree")
-    yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in along_orbits)
-    if integrals := list(dict.fromkeys(name for relation in along_orbits for name in relation.integrals)):
-        text = "are constant on each orbit and differ between orbits, so they are integrals"
-        if len(integrals) == 1:
-            text = "is constant on each orbit and differs between orbits, so it is an integral"
-        yield Statement(NOTE, f"{_listed(integrals)} {text}")
-    if functions := list(dict.fromkeys(name for relation in along_orbits for name in relation.functions_of_eps)):
-        depend = "depends" if len(functions) == 1 else "depend"
-        yield Statement(NOTE, f"{_listed(functions)} {depend} on eps only")
-    if search.reason and profile.nullities:
-        yield Statement(NOTE, search.reason)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -299,7 +299,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     forms = _Forms(poles, factors(here.inverse.equations[0]), infinity)
     kinds: dict[Key, list[_Curve]] = {}
     for line in range(_MOST_LINES):
-        if limits.is_over:
+        if limits.budget.is_spent:
             break
         field = GF(random_prime(rng, _BITS))
         try:
@@ -317,7 +317,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
                 return degree, _resolved(kinds, forms, degree, zeros)
             except OrdersUnknown:
                 continue  # a hypersurface without points modulo the primes so far
-    if limits.is_over or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
+    if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
         raise OrdersUnknown("the contracted hypersurfaces could not be told apart at random points")
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in kinds.items()

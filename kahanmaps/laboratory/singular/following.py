@@ -189,11 +189,6 @@ class Range:
     budget: Budget
     enough: int
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the budget is spent."""
-        return self.budget.is_spent
-
 
 @dataclass(frozen=True)
 class Course:
@@ -225,11 +220,11 @@ class Course:
             try:
                 for step in islice(images_of_curve(*start, precision, tangents, functions), count):
                     run.append(step)
-                    if self.limits.is_over:
+                    if self.limits.budget.is_spent:
                         return run, len(run) == count
                 return run, True
             except PrecisionTooLow:
-                if precision >= most or self.limits.is_over:
+                if precision >= most or self.limits.budget.is_spent:
                     return run, False
                 precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
@@ -278,7 +273,7 @@ class Course:
                     return Orders(rows[:last], (), reached, True)
             found = [find_recurrence(column) for column in zip(*rows, strict=True)]
             repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
-            is_cut = not is_whole and not limits.is_over  # by the precision
+            is_cut = not is_whole and not limits.budget.is_spent  # by the precision
             is_far = len(run) >= min(limits.reach, limits.along)
             if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
                 laws = tuple(one.characteristic for one in found if one is not None)
@@ -335,7 +330,7 @@ class Course:
             constants = [nmod_poly([x], self.prime) for x in at]
             if None in orders_of(self.equations, self.tracked.functions, step, constants, 1):
                 return step, step
-            if self.limits.is_over:
+            if self.limits.budget.is_spent:
                 return None, step
         return None, reach
 

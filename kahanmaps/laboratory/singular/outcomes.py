@@ -274,7 +274,7 @@ def outcome_of(
     outcomes: dict[int, Hypersurface] = {}  # by the primes
     found, note = _UNKNOWN, BUDGET_SPENT
     for _ in range(_TRIES):
-        if len(outcomes) == _POINTS or limits.is_over:
+        if len(outcomes) == _POINTS or limits.budget.is_spent:
             break
         field = GF(random_prime(rng))
         try:
@@ -296,11 +296,11 @@ def outcome_of(
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            note = BUDGET_SPENT if limits.is_over else "the series lost all their terms"
+            note = BUDGET_SPENT if limits.budget.is_spent else "the series lost all their terms"
             break
     if len(outcomes) == _POINTS:
         first, second = outcomes.values()
-        found, note = _agreed(first, second, limits.is_over)
+        found, note = _agreed(first, second, limits.budget.is_spent)
     known = replace(found, polynomial=text, degree=int(one.form.total_degree()), is_pole=one.is_pole, note=note)
     return replace(known, multiplicity=one.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
@@ -343,7 +343,7 @@ def unwritten(
     alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
     degrees: dict[int, int] = {}
     for line in range(4 * _LINES):
-        if limits.is_over or (line >= _LINES and set(degrees) <= {key[0] for key in found}):
+        if limits.budget.is_spent or (line >= _LINES and set(degrees) <= {key[0] for key in found}):
             break
         field = GF(random_prime(rng))
         try:
@@ -355,7 +355,7 @@ def unwritten(
         degrees |= seen
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
-            if tangents is None or limits.is_over:
+            if tangents is None or limits.budget.is_spent:
                 continue
             direction = [rng.randrange(field.prime) for _ in critical.point]
             run, _ = Course(equations, critical.point, direction, limits).steps(limits.shown, most=_FEW_TERMS)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from flint import fmpq, fmpz_poly
@@ -100,11 +100,11 @@ class SingularityRun(Printed):
     eps: fmpq
     denominator: str
     map_degree: int
-    critical_degree: int | None
-    hypersurfaces: tuple[Hypersurface, ...]
-    stopped: bool
-    is_undefined: bool
-    is_dominant: bool
+    critical_degree: int | None = None
+    hypersurfaces: tuple[Hypersurface, ...] = ()
+    stopped: bool = False
+    is_undefined: bool = False
+    is_dominant: bool = True
     word: Word | None = None
 
     def rows(self) -> list[dict[str, Any]]:
@@ -216,40 +216,39 @@ def singularities(
             line.step(1)
         except Stopped as end:
             raise InputError(f"found a composition that is too long here: {end.message}") from end
+        run = SingularityRun(exact_eps, "?", line.degree)
         if not _is_dominant(map_, exact_eps):
-            return SingularityRun(exact_eps, "?", line.degree, None, (), False, False, False)
-        run = _map_by_map(map_, exact_eps, line.degree, seed, limits, progress)
-        if run is None and not over.is_bilinear:
+            return replace(run, is_dominant=False)
+        if (known := _map_by_map(map_, run, seed, limits, progress)) is not None:
+            return known
+        if not over.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
                 "such with equations that are linear in both points: of these the singularities are known by random "
                 "points"
             ) from None
-        if run is None:
-            at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
-            run = SingularityRun(exact_eps, "?", line.degree, None, at_random, limits.is_over, False, True)
-        return run
-    degree, below = map_form.degree, map_form.denominator
+        at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
+        return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
+    below = map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    denominator = affine(below * (-1) ** (map_.dim * len(over.factors)), map_)
+    run = SingularityRun(exact_eps, affine(below * (-1) ** (map_.dim * len(over.factors)), map_), map_form.degree)
     is_undefined = bool(below.is_zero())  # det(I - eps f'(x)) = 0 for all x
     if is_undefined or not _is_dominant(map_, exact_eps):
-        return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
+        return replace(run, is_undefined=is_undefined, is_dominant=False)
     if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
     every, critical_degree = written(map_form)
     if critical_degree is None and len(over.factors) > 1:
-        run = _map_by_map(map_, exact_eps, degree, seed, limits, progress)
-        if run is not None:
-            return run
+        known = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
+        if known is not None:
+            return known
     tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
     found: list[Hypersurface] = []
     is_cut = False
     for one in every:
-        is_cut = limits.is_over
+        if is_cut := limits.budget.is_spent:
+            break
         try:
-            if is_cut:
-                break
             text = name_of(one.form, map_)
             progress(f"following {text[:40]}")
             found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
@@ -258,26 +257,21 @@ def singularities(
                 raise
             is_cut = True
             break
-    if is_cut:
-        return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), True, False, True)
-    if critical_degree is None:
+    if critical_degree is None and not is_cut:
         progress("following critical points")
         too_large = "the hypersurfaces that this map contracts are too large to be written down"
         found += unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
-    stopped = limits.is_over and (critical_degree is None or any(h.settled_at is None for h in found))
-    return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
+    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in found))
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(found), stopped=is_cut)
 
 
 def _map_by_map(
-    map_: BirationalMap, eps: fmpq, degree: int, seed: int, limits: Range, progress: Callable[[str], None]
+    map_: BirationalMap, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
     """The same for a composition whose maps are followed one by one; None where one of them is too large."""
-    rng = random.Random(f"map by map {seed_for(seed, map_.subject, eps)}")
-    followed = followed_map_by_map(map_, eps, rng, limits, progress)
-    if followed is None:
-        return None
-    word, found = followed
-    return SingularityRun(eps, "?", degree, None, tuple(found), limits.is_over, False, True, word)
+    rng = random.Random(f"map by map {seed_for(seed, map_.subject, run.eps)}")
+    found = followed_map_by_map(map_, run.eps, rng, limits, progress)
+    return found and replace(run, word=found[0], hypersurfaces=tuple(found[1]), stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -428,13 +422,13 @@ def patterns(
                     known = _not_dominant(value)
                 elif period_of(equations) > 1:
                     outcomes = outcomes_at_random(map_, value, rng, limits)
-                    known = _unknown(_STOPPED) if limits.is_over else _patterns(0, outcomes)
+                    known = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
                 else:
                     try:
                         degree, hypersurfaces = contracted(map_, value, rng, limits)
                         known = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
                     except OrdersUnknown as error:
-                        known = _unknown(_STOPPED if limits.is_over else str(error))
+                        known = _unknown(_STOPPED if limits.budget.is_spent else str(error))
                 several.add(known)
             found = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
     return found

@@ -109,7 +109,7 @@ def followed_map_by_map(
     found = []
     for stage, (own, _) in enumerate(several):
         for one in own:
-            if not one.multiplicity or limits.is_over:
+            if not one.multiplicity or limits.budget.is_spent:
                 continue
             text = name_of(one.form, map_)
             progress(f"following {text[:40]}")

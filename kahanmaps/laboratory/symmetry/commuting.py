@@ -261,7 +261,7 @@ class _Search:
         signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in single if p not in trivial}
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
-            if not self._in_budget() and weights not in trivial:
+            if self.budget.is_spent and weights not in trivial:
                 found.undecided.append(f"{SPENT}: {len(others) + 3 - k} solutions were not judged")
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
@@ -279,7 +279,7 @@ class _Search:
         self.settings.progress(f"equations at eps^{order}, {len(part.free)} unknowns")
         found.order = max(found.order, order)
         rng = random.Random(f"commuting {self.settings.seed} {order}")
-        equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self._in_budget)
+        equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self.budget)
         equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
         gens = part.values[0].context().gens()
         T = decoupling(equations, len(gens))
@@ -290,13 +290,26 @@ class _Search:
             part = SolutionComponent(tuple(v.compose(*moved, ctx=zero.context()) for v in part.values))
         solutions = solve_system(equations, part.values, self.budget)
         found.irrational += [text for text in solutions.irrational if text not in found.irrational]
-        for component in solutions.components:
-            if component.free:
-                self._family(component, level)
+        self.points += [component for component in solutions.components if not component.free]
+        for family in [component for component in solutions.components if component.free]:
+            if any(known.contains(family) for known in self.families):
+                continue
+            if self.budget.is_spent:
+                self._leave(family, SPENT)
+                continue
+            self.settings.progress(f"a family with {len(family.free)} parameters")
+            finding = judge_family(self.f, self.space, family, self.settings)
+            if finding.verdict is not Certainty.REFUTED:
+                self._add_family(family, finding)
+            elif level + 1 < len(ORDERS) and not self.budget.is_spent:
+                self._solve(family, level + 1)
             else:
-                self.points.append(component)
+                found.undecided.append(
+                    f"a family with {len(family.free)} parameters solves the equations up to eps^{order}, "
+                    "and not all of it commutes"
+                )
         for component in solutions.unsolved:
-            if level + 1 < len(ORDERS) and self._in_budget():
+            if level + 1 < len(ORDERS) and not self.budget.is_spent:
                 self._solve(component, level + 1)
             else:
                 self._leave(component, solutions.reason)
@@ -312,24 +325,6 @@ class _Search:
             self.found.undecided.append(message)
         elif len(self.found.undecided) == MAX_TOLD:
             self.found.undecided.append("and more equations that were not solved")
-
-    def _family(self, family: SolutionComponent, level: int) -> None:
-        if any(known.contains(family) for known in self.families):
-            return
-        if not self._in_budget():
-            self._leave(family, SPENT)
-            return
-        self.settings.progress(f"a family with {len(family.free)} parameters")
-        finding = judge_family(self.f, self.space, family, self.settings)
-        if finding.verdict is not Certainty.REFUTED:
-            self._add_family(family, finding)
-        elif level + 1 < len(ORDERS) and self._in_budget():
-            self._solve(family, level + 1)
-        else:
-            self.found.undecided.append(
-                f"a family with {len(family.free)} parameters solves the equations up to eps^{ORDERS[level]}, "
-                "and not all of it commutes"
-            )
 
     def _add_family(self, family: SolutionComponent, finding: Finding) -> None:
         if finding.verdict is Certainty.UNDECIDED:
@@ -355,9 +350,6 @@ class _Search:
         g = field_at(self.space, weights)
         names = [name for name, factor in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(factor)]
         return CommutingField(g, matrix, names[0] if names else "", finding)
-
-    def _in_budget(self) -> bool:
-        return not self.budget.is_spent
 
 
 def find_commuting(

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.small_systems import independent
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
@@ -77,17 +77,17 @@ def commutator_equations(
     weights: Sequence[fmpq_mpoly],
     order: int,
     rng: random.Random,
-    go_on: Callable[[], bool],
+    budget: Budget,
 ) -> list[fmpq_mpoly]:
     """Equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every eps.
 
     `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
-    integer points. Points are added until two in a row bring nothing new; `go_on` says whether there is time for
-    one more. Returns linearly independent polynomials in b. Source: kahan-1993.
+    integer points, as many until two in a row bring nothing new, or the `budget` is spent. Returns linearly independent
+    polynomials in b. Source: kahan-1993.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
-    >>> commutator_equations(f, [f], ring(["b"]).gens(), 4, random.Random(1), lambda: True)
+    >>> commutator_equations(f, [f], ring(["b"]).gens(), 4, random.Random(1), Budget())
     [b^3 - b]
     """
     n = f.dim
@@ -95,7 +95,7 @@ def commutator_equations(
     of_g = _Terms(combination(basis, weights, weights[0].context().constant(0)), n)
     found: list[fmpq_mpoly] = []
     idle = 0
-    while idle < 2 and go_on():
+    while idle < 2 and not budget.is_spent:
         point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
         x: Series = [point, *([fmpq(0)] * n for _ in range(order))]
         left, right = of_f.step(of_g.step(x)), of_g.step(of_f.step(x))

@@ -223,19 +223,18 @@ def _add_infinitesimal(found: Symmetries) -> None:
     count(200 + len(table) * len(columns) * (3 + len(columns) / 50))
     # In echelon form from the right, with s last, the linear fields come first and are a basis of their own.
     basis = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
-    found.infinitesimal = [_infinitesimal(f, [fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
+
+    def infinitesimal(vector: Sequence[fmpq], weight: int) -> Infinitesimal:
+        return Infinitesimal(f.variables, fmpq_mat(n, n, vector[: n * n]), tuple(vector[n * n :]), weight)
+
+    found.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
     scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
     if f.is_homogeneous:  # S = I, rather than another one
         found.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
     elif scalings:
         vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
-        found.scaling = _infinitesimal(f, [e / vector[-1] for e in vector[:-1]], 1)
+        found.scaling = infinitesimal([e / vector[-1] for e in vector[:-1]], 1)
     found.searched.append("affine infinitesimal symmetries and scalings: all")
-
-
-def _infinitesimal(f: QuadraticSystem, vector: Sequence[fmpq], weight: int) -> Infinitesimal:
-    n = f.dim
-    return Infinitesimal(f.variables, fmpq_mat(n, n, vector[: n * n]), tuple(vector[n * n :]), weight)
 
 
 def _add_signed(found: Symmetries, budget: Budget) -> None:

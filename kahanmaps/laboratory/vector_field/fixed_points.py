@@ -165,20 +165,15 @@ def _on(system: QuadraticSystem, part: SolutionComponent, basis: Sequence[fmpq_m
     ]
     dimension = max(sizes)
     count = len(quotient_monomials(basis, free) or ()) if basis else 1
-    return FixedPoints(
-        part.values, tuple(basis), dimension, None if dimension else count, _characteristic(system, part.values, basis)
-    )
-
-
-def _characteristic(system: QuadraticSystem, point: Sequence[fmpq_mpoly], basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-    """det(lambda I - f'), reduced modulo the equations of the points."""
+    # det(lambda I - f'), reduced modulo the equations of the points
     n = system.dim
     letter = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
-    joint = ring([letter, *names_of(point[0])])
+    joint = ring([letter, *names_of(part.values[0])])
     eigenvalue, *x = joint.gens()
-    at_point = [p.compose(*x, ctx=joint) for p in point]
+    at_point = [p.compose(*x, ctx=joint) for p in part.values]
     rows = [
         [*((eigenvalue if i == j else 0) - p.derivative(j).compose(*at_point, ctx=joint) for j in range(n)), None]
         for i, p in enumerate(system.rhs)
     ]
-    return normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint) for p in basis])
+    eigenvalues = normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint) for p in basis])
+    return FixedPoints(part.values, tuple(basis), dimension, None if dimension else count, eigenvalues)
