@@ -128,6 +128,13 @@ def test_numbers_are_printed_per_time_and_per_step(kahanmaps):
     assert float(rows[2][2]) == pytest.approx(-2.2745 / 5, abs=1e-3)
 
 
+def test_where_the_transient_is_cut_nothing_was_counted_and_no_number_is_printed(kahanmaps):
+    outcome = kahanmaps("lyapunov riccati --eps 1/10 --steps 100 --transient 100000000 --random 2 --seconds 0.3")
+    assert outcome.status == 3
+    assert "steps\tnone counted: stopped in the transient, after " in outcome.out
+    assert "nan" not in outcome.out
+
+
 def test_starts_from_a_file(kahanmaps, tmp_path):
     (tmp_path / "starts.csv").write_text("x,y\n1,0\n1/2,1/3\n")
     found = kahanmaps("lyapunov harmonic --eps 1/10 --steps 50 --json --starts", tmp_path / "starts.csv").json

@@ -10,7 +10,7 @@ from helpers import together
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
@@ -66,6 +66,9 @@ def test_known_functions_are_claims_and_then_H_and_where_nothing_is_known_the_op
     assert list(functions_of(load("paper_m2"), EPS)) == ["I1", "I2", "modified H", "H~_1", "H"]
     with pytest.raises(InputError, match=r"found no known integral of circle.*--integral NAME=EXPR"):
         known_functions(CIRCLE, EPS)
+    text = 'variables = ["x", "y"]\n[system]\nrhs = ["y", "-x"]\n[integrals]\nA = "x*y~ - y*x~"'
+    with pytest.raises(InputError, match=r"found only known integrals of w that contain x~.*\(A\).*--integral"):
+        known_functions(parse_system(text, "w"), EPS)
 
 
 def test_expressions_may_contain_eps_and_have_a_name_each():
@@ -168,6 +171,12 @@ def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
     assert all(line.get_ydata().max() < axes.get_ylim()[1] for axes in figure.axes for line in axes.lines)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Kahan", "RK4", "implicit midpoint"]
     assert figure.legends[0].get_title().get_text() == r"time step $2\varepsilon = 1/10$"
+
+
+def test_the_label_of_a_panel_is_not_broken_within_a_formula():
+    found = survey(load("euler_top"), [1, "1/2", "1/3"], 9, [("", "(x1^2 - 3*x2^2 + 7*x3^2)/(1 - x2^2)")])
+    [axes] = drawn(found).axes
+    assert axes.get_ylabel() == "relative error of\n" + "(x1^2 - 3*x2^2 + 7*x3^2)/(1 - ".replace(" ", "\xa0")
 
 
 def test_an_exact_0_is_in_the_band_and_not_left_out():

@@ -74,6 +74,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
     tell(f"# {file.name}{lib.eps_told(eps, file.map)}, double precision")
     tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
+    if found.stopped and not found.steps:  # the means of nothing would be nan
+        tell(f"steps\tnone counted: stopped in the transient, after {found.transient} of its steps")
+        return
     tell(f"steps\t{found.steps} after {found.transient}")
     columns = {"per unit of time": found.mean} if file.map.time_steps else {}
     columns |= {"per step": found.per_step, "spread": found.spread, "change from half": found.change}

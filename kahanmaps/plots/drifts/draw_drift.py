@@ -76,7 +76,9 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
                     axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
                 elif len(heights) and not survey.ends[curve.method].is_whole:
                     axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)
-            label = f"{'relative' if survey.relative[name] else 'absolute'} error of {survey.labels[name]}"
+            # A line is broken before the name, and never within: the name may be a formula with blanks in it.
+            named = survey.labels[name].replace(" ", "\N{NO-BREAK SPACE}")
+            label = f"{'relative' if survey.relative[name] else 'absolute'} error of {named}"
             axes.set_ylabel(label if label.endswith("$") else wrapped(label, room, style.font_size, most=2))
         for k, axes in enumerate(panels):
             if k >= count:

@@ -107,10 +107,11 @@ def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
     if "H" in every:
         chosen.append("H")
     if not chosen:
-        raise InputError(
-            f"found no known integral of {file.name}, expected one: give --integral NAME=EXPR, an expression in the "
-            "variables and eps"
-        )
+        found = f"found no known integral of {file.name}, expected one"
+        if file.integrals_in_iterates:
+            names = ", ".join(file.integrals_in_iterates)
+            found = f"found only known integrals of {file.name} that contain x~ ({names}), expected others"
+        raise InputError(f"{found}: give --integral NAME=EXPR, an expression in the variables and eps")
     return [every[name] for name in dict.fromkeys(chosen)]
 
 
