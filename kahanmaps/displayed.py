@@ -114,7 +114,7 @@ def latex_form(value: object) -> str:
     raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as a formula")
 
 
-_FILES = {"documents": "systems", "family": "systems"}
+_FILES = {"documents": "systems", "family": "systems", "maps": "systems"}
 
 
 def _load(value: object) -> None:

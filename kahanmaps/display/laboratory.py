@@ -17,7 +17,7 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.display import markup
-from kahanmaps.display.formulas import formula
+from kahanmaps.display.latex import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
 from kahanmaps.displayed import html_form, text_form
 from kahanmaps.laboratory.analysis import Analysis

@@ -2,9 +2,9 @@
 
 style             sizes in centimetres, fonts, colours that the colour-blind and a grey printer tell apart
 figures           an empty figure in a style, its texts and legend; as a file (PDF, SVG, PNG) or as SVG inside a page
-growth            degrees of iterates, heights of exact orbits (growth_records: read from JSON)
+growth            degrees of iterates, heights of exact orbits
 scan              the plane of two parameters, with what a scan found in it
-squares           do two maps commute, seen from one point (draw_squares)
+squares           do two maps commute, seen from one point
 drifts            how far integrals drift along float orbits
 portraits         orbits of planar maps and of sections, equilibria, the flow
 curves            invariant curves, and the planes they lie in

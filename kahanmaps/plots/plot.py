@@ -16,7 +16,7 @@ from kahanmaps.maps.floats.doubles import start_rows
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.automatic_starts import automatic_starts
+from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.plots.portraits.portrait import portrait_of
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, walked
 from kahanmaps.plots.style import Style
@@ -90,7 +90,7 @@ def draw_orbits(
 
 
 def _drawn(found: Trajectories, axes: Sequence[int]) -> Axes:
-    from kahanmaps.plots.portraits.draw_portrait import draw_portrait
+    from kahanmaps.plots.portraits.portrait import draw_portrait
 
     if not all(0 <= k < len(found.variables) for k in axes):
         raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(found.variables)}")

@@ -1,15 +1,19 @@
 """Do two Kahan maps commute, seen from one point: the lattice Phi_f^i Phi_g^j x, reached along both orders. Exact.
 
-The square x, Phi_f x, Phi_g x has two candidates for its fourth corner, Phi_g(Phi_f x) and Phi_f(Phi_g x). What is
-drawn is computed here, `draw_squares.py` draws it.
+The square x, Phi_f x, Phi_g x has two candidates for its fourth corner, Phi_g(Phi_f x) and Phi_f(Phi_g x). In the
+picture arrows of f start from points reached by g first, arrows of g from points reached by f first; a ring marks where
+g ends, a dot where f does. Where the maps commute every ring holds its dot.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from flint import arb, fmpq
 
 from kahanmaps.algebra.fields import rational
@@ -18,8 +22,16 @@ from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.recognise import recognised_hamiltonian, recognised_member
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.plots.curves.plane_cubics import Floats
+from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, wrapped
+from kahanmaps.plots.portraits.windows import outside, window_of
+from kahanmaps.plots.style import COLOURS, Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MAX_STEPS = 12
 MAX_BITS = 300_000  # of the numerators and denominators of one coordinate: seconds for a step
@@ -168,3 +180,212 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         g = g.scaled(rational(eps2) / rational(eps))
     return MapPair(file.map, g, ("f", "g"), note)
+
+
+_F, _G, _GAP = COLOURS[1], COLOURS[5], COLOURS[0]
+_LARGEST = 1e150  # what can be squared
+_SEEN = 0.06  # of the width of a panel: a gap below it is shown magnified
+
+
+def draw_squares(
+    found: Sequence[Squares],
+    style: Style,
+    axes: tuple[int, int] | None = None,
+    captions: Sequence[str] = (),
+) -> Figure:
+    """One panel for each pair of maps, in two coordinates: those given, or those in which the squares are widest.
+
+    `captions` stand above the panels, in place of the names of the maps. Raises InputError for numbers that are none of
+    variables, and for a start beyond the range of what can be drawn.
+    """
+    dim = found[0].pair.f.dim
+    if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in found):
+        raise InputError(f"found a start with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
+    chosen = widest_axes(found) if axes is None else axes
+    if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
+        raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
+    with drawing(style):
+        from matplotlib.lines import Line2D
+
+        letter = style.font_size * 2.54 / 72
+        side = style.width / max(len(found), 1.25) - 4.2 * letter
+        figure = new_figure(style, (side + 10 * letter) / style.width)
+        for k, panel in enumerate(figure.subplots(1, len(found), squeeze=False).ravel()):
+            caption = captions[k] if k < len(captions) else ""
+            _draw(panel, found[k], chosen, caption, letter / side, style)
+        handles = [
+            Line2D([], [], color=_F, marker="o", markersize=3, label=r"$\Phi_f$"),
+            Line2D([], [], color=_G, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
+
+
+def widest_axes(found: Sequence[Squares]) -> tuple[int, int]:
+    """The two coordinates in which the thinnest of the squares is thickest, and a gap is seen if there is one."""
+    dim = found[0].pair.f.dim
+    if dim == 1:
+        return 0, 0
+
+    def score(pair: tuple[int, int]) -> float:
+        widths = []
+        for squares in found:
+            table = _table(squares.g_after_f)
+            x, fx, gx = table[0, 0], table[-1, 0], table[0, -1]
+            sides = np.stack([fx - x, gx - x])
+            size = np.nanmax(np.abs(sides), initial=0.0)
+            if np.isnan(sides).any() or size == 0:
+                continue
+            widths.append(np.linalg.svd(sides[:, pair] / size, compute_uv=False)[-1])
+            if squares.closes is False:
+                gaps = np.abs(table - _table(squares.f_after_g))
+                widths.append(np.nanmax(gaps[..., pair], initial=0.0) / np.nanmax(gaps, initial=0.0))
+        return float(min(widths, default=0.0))
+
+    return max(combinations(range(dim), 2), key=score)
+
+
+def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, letter: float, style: Style) -> None:
+    """One panel; `letter` is the size of the letters in units of its side."""
+    one, other = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
+    every = np.concatenate([one.reshape(-1, 2), other.reshape(-1, 2)])
+    every = every[np.isfinite(every).all(axis=1)]
+    # Margins on each side, in units of the range of the points: the names of corners need room, more in small panels.
+    if squares.steps > 1:
+        window = np.array(window_of(every, one[0, 0][None]))
+        needed = np.array([[1.3 * letter], [1.7 * letter]])
+        margins = np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed)))
+    else:  # five points, all of which are wanted
+        window = np.array([every.min(axis=0), every.max(axis=0)]).T
+        window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
+        needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
+        margins = np.maximum([[0.42], [0.36]], needed / (1 - 2 * needed))
+    window = window + margins * np.diff(window, axis=1) * np.array([-1, 1])
+    axes.set_box_aspect(1)
+    variables = squares.pair.f.variables
+    axes.set(
+        xlim=window[0], ylim=window[1], xlabel=label_of(variables[chosen[0]]), ylabel=label_of(variables[chosen[1]])
+    )
+    axes.locator_params(nbins=5)
+    if caption:
+        equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
+        title = plain(wrapped(equations, style.font_size / letter, style.font_size))
+    else:
+        f, g = (re.sub(r"^f_(.*)", r"f_{\1}", name).replace("grad ", r"\nabla ") for name in squares.pair.names)
+        title = f"$f = {f}$,  $g = {g}$"
+    beyond = outside(every, tuple(map(tuple, window)))
+    note = f"\n{beyond} of {len(every)} points outside" if beyond else ""
+    axes.set_title(f"{title}\n{squares.verdict}{note}")
+    _draw_lattices(axes, one, other)
+    gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]
+    is_small = bool(np.hypot(*gap) < _SEEN)
+    if squares.steps == 1:
+        corners = [(one[0, 0], "$x$", ""), (one[1, 0], r"$\Phi_f x$", ""), (one[0, 1], r"$\Phi_g x$", "")]
+        if squares.closes or (squares.closes is False and is_small):
+            sign = "=" if squares.closes else r"\neq"
+            corners.append((one[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$", ""))
+        else:  # the names of the last two corners stand side by side
+            sides = ("right", "left") if one[1, 1, 0] < other[1, 1, 0] else ("left", "right")
+            corners += [(one[1, 1], r"$\Phi_g\Phi_f x$", sides[0]), (other[1, 1], r"$\Phi_f\Phi_g x$", sides[1])]
+        middle = np.nanmean(np.stack([point for point, _, _ in corners]), axis=0)
+        for point, text, side in corners:
+            _label(axes, point, text, middle, letter, side)
+    else:
+        _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0), letter)
+    if squares.closes is False and is_small and np.any(gap != 0):
+        _magnify(axes, one, other, every, window, style)
+
+
+def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
+    """Arrows, rings where steps of g end, dots where steps of f end, and dotted lines across the gaps."""
+    from matplotlib.patches import FancyArrowPatch
+
+    steps = len(one) - 1
+    width, size = (1.1, 5.5) if steps == 1 else (0.8, 4.0) if steps <= 4 else (0.5, 2.6)
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": width, "mutation_scale": 4 + 5 * width}
+    arrow |= {"shrinkA": 2, "shrinkB": 2.5, "zorder": 2}
+    for i in range(steps + 1):
+        for j in range(steps + 1):
+            arrows = [(one[i, j], one[i, j + 1], _G)] if j < steps else []
+            arrows += [(other[i, j], other[i + 1, j], _F)] if i < steps else []
+            for start, end, colour in arrows:
+                if np.isfinite([*start, *end]).all() and not np.array_equal(start, end):
+                    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=colour, **arrow))
+            if not np.array_equal(one[i, j], other[i, j], equal_nan=True):
+                ends = np.stack([one[i, j], other[i, j]])
+                axes.plot(ends[:, 0], ends[:, 1], color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
+    ring: dict[str, Any] = {"linestyle": "none", "marker": "o", "zorder": 3}
+    rings, dots = one.reshape(-1, 2), other.reshape(-1, 2)
+    axes.plot(*rings.T, color=_G, markersize=size, markerfacecolor="white", markeredgewidth=0.8, **ring)
+    axes.plot(*dots.T, color=_F, markersize=0.5 * size, markeredgewidth=0, **{**ring, "zorder": 4})
+
+
+def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floats, style: Style) -> None:
+    """The last corners once more, as large as it takes to see that they are two; in the emptiest corner."""
+    lengths = np.diff(window, axis=1)[:, 0]
+    inside = (every - window[:, 0]) / lengths
+    if len(one) == 2:  # the name of the last corner is there as well
+        corner = (one[-1, -1] - window[:, 0]) / lengths
+        inwards, down = -np.sign(corner - 0.5)
+        name = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
+        inside = np.concatenate([inside, np.array(name)])
+    places = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
+    x, y = max(places, key=lambda place: np.hypot(*(inside - np.array(place) - 0.16).T).min())
+    inset = axes.inset_axes((x, y, 0.32, 0.32), zorder=7)
+    ends = np.stack([one[-1, -1], other[-1, -1]])
+    half = 1.1 * (np.abs(ends[1] - ends[0]) / lengths).max() * lengths
+    inset.set_xlim(ends[:, 0].mean() - half[0], ends[:, 0].mean() + half[0])
+    inset.set_ylim(ends[:, 1].mean() - half[1], ends[:, 1].mean() + half[1])
+    inset.set_xticks([])
+    inset.set_yticks([])
+    factor = rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$"
+    how: dict[str, Any] = {"xycoords": "axes fraction", "fontsize": style.smallest}
+    beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **how)
+    _draw_lattices(inset, one[-2:, -2:], other[-2:, -2:])
+    inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
+
+
+def _in_two_digits(number: float) -> str:
+    """A positive number for a formula: 6.1, 180, or with a power of ten."""
+    digits, power = f"{number:.1e}".split("e")
+    return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
+
+
+def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
+    """A text beside a point, away from the middle of them all; long ones above or below, moved so as to stay inside.
+
+    `side` says how a long one is aligned, to which there is another one beside it.
+    """
+    if not np.isfinite(point).all():
+        return
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    low, length = limits[:, 0], limits[:, 1] - limits[:, 0]
+    away = (point - middle) / length
+    away = away / (np.hypot(*away) or 1)
+    x, y = point
+    maps = text.count("Phi")
+    if maps > 1:
+        width = 1.6 * letter * maps
+        aligned = side or "center"
+        before = {"left": 0.0, "center": width / 2, "right": width}[aligned]
+        across = (x - low[0]) / length[0]
+        x = low[0] + length[0] * min(max(across, before + 0.02), max(before, 0.98 - width + before))
+        offset = 0.0, 9.0 if away[1] >= 0 else -9.0
+    else:
+        aligned = "center" if abs(away[0]) < 0.4 else "left" if away[0] > 0 else "right"
+        offset = 7 * away[0], 7 * away[1]
+    raised = "center" if abs(away[1]) < 0.4 and maps < 2 else "bottom" if away[1] >= 0 else "top"
+    beside(axes, text, (float(x), float(y)), offset, 2, ha=aligned, va=raised, zorder=5)
+
+
+def _table(lattice: Lattice) -> Floats:
+    """The points as machine numbers, nan where there is none or it is too large for them."""
+    dim = next(len(point) for row in lattice for point in row if point is not None)
+    missing = (float("nan"),) * dim
+    found = np.array(
+        [
+            [missing if point is None else [float(arb(entry).mid()) for entry in point] for point in row]
+            for row in lattice
+        ]
+    )
+    return np.where(np.abs(found) < _LARGEST, found, np.nan)

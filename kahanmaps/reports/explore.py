@@ -15,11 +15,11 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.printing import format_number, format_rational_function
 from kahanmaps.display import markup
-from kahanmaps.display.formulas import formula
+from kahanmaps.display.latex import formula
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.maps.floats.doubles import to_float, to_floats
-from kahanmaps.plots.portraits.automatic_starts import automatic_starts
+from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.reports.page import CHARACTERS, Html, Section, system_section
 from kahanmaps.reports.pictures import DEFAULT_EPS
 

@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display import markup
-from kahanmaps.display.formulas import formula
+from kahanmaps.display.latex import formula
 from kahanmaps.display.systems import equations_html
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, printable

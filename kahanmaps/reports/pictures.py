@@ -19,10 +19,8 @@ from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
 from kahanmaps.plots.figures import require_matplotlib, svg_text
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.automatic_starts import automatic_starts
-from kahanmaps.plots.portraits.draw_portrait import draw_portrait
-from kahanmaps.plots.portraits.flow import plane_flow
-from kahanmaps.plots.portraits.portrait import portrait_of
+from kahanmaps.plots.portraits.flow import automatic_starts, plane_flow
+from kahanmaps.plots.portraits.portrait import draw_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.plots.style import Style
 

@@ -14,9 +14,8 @@ from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.checks.claims import Report, combined
 from kahanmaps.display import checks, markup
-from kahanmaps.display.formulas import formula, typeset
 from kahanmaps.display.laboratory import eps_sentence, result_html
-from kahanmaps.display.latex import latex_polynomial, latex_rational_function
+from kahanmaps.display.latex import formula, latex_polynomial, latex_rational_function, typeset
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.family.system_normal_form import SystemNormalForm

@@ -26,7 +26,7 @@ from helpers import table
 from small_databases import ok, planned
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.growth_records import curves_of_record, degrees_of_record
+from kahanmaps.plots.growth import curves_of_record, degrees_of_record
 from kahanmaps_cli.main import main
 from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.runs.ensemble_starts import read_starts

@@ -43,7 +43,7 @@ def test_print_shows_the_part_of_one_value_of_what_is_printed_for_several(kahanm
 
 def test_every_result_that_is_printed_has_rows():
     import_module("kahanmaps.display.laboratory")
-    import_module("kahanmaps.display.maps")
+    import_module("kahanmaps.display.systems")
     kinds, below = [], [Printed]
     while below:
         below = [kind for parent in below for kind in parent.__subclasses__()]

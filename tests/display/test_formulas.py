@@ -11,8 +11,15 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.display.formulas import equations, formula, matrix, typeset
-from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
+from kahanmaps.display.latex import (
+    equations,
+    formula,
+    latex_name,
+    latex_polynomial,
+    latex_rational_function,
+    matrix,
+    typeset,
+)
 from kahanmaps.reports.page import mathml
 
 NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]

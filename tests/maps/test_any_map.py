@@ -16,7 +16,7 @@ from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
-from kahanmaps.display.maps import orbit_html
+from kahanmaps.display.systems import orbit_html
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.heights import height, height_growth

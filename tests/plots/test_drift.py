@@ -14,8 +14,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
-from kahanmaps.plots.drifts.draw_drift import clipped_from, draw_drift
-from kahanmaps.plots.drifts.drift import _Bins, _edges, small_start, survey_drift
+from kahanmaps.plots.drifts.drift import _Bins, _edges, clipped_from, draw_drift, small_start, survey_drift
 from kahanmaps.plots.drifts.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

@@ -5,8 +5,7 @@ import pytest
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.maps.floats.classical import VectorField
-from kahanmaps.plots.portraits.automatic_starts import COUNT, automatic_starts
-from kahanmaps.plots.portraits.flow import equilibria, plane_flow, solution
+from kahanmaps.plots.portraits.flow import COUNT, automatic_starts, equilibria, plane_flow, solution
 from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.systems.quadratic import QuadraticSystem
 

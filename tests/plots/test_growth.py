@@ -13,8 +13,15 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.plots.growth import draw_degrees, draw_heights
-from kahanmaps.plots.growth_records import HeightCurve, curves_of_record, degrees_of_record, fit_of, height_curves
+from kahanmaps.plots.growth import (
+    HeightCurve,
+    curves_of_record,
+    degrees_of_record,
+    draw_degrees,
+    draw_heights,
+    fit_of,
+    height_curves,
+)
 
 TENTH = fmpq(1, 10)
 SQUARES = tuple(2 * n * n + 1 for n in range(12))  # of the Kahan map of the Euler top

@@ -13,10 +13,9 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves, panels_of
+from kahanmaps.plots.curves.draw_invariant_curves import Disc, draw_invariant_curves, panels_of, view_of
 from kahanmaps.plots.curves.invariant_curves import MAX_POINTS, find_invariant_curves
-from kahanmaps.plots.curves.plane_views import Disc, view_of
-from kahanmaps.plots.curves.symmetric_planes import ONE_LINE, THREE_LINES, ZERO
+from kahanmaps.plots.curves.plane_cubics import ONE_LINE, THREE_LINES, ZERO
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem

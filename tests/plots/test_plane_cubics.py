@@ -7,13 +7,13 @@ import pytest
 from flint import arb, ctx
 
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.plots.curves.plane_cubics import PlaneCubic
-from kahanmaps.plots.curves.plane_views import Disc, Rectangle
-from kahanmaps.plots.curves.symmetric_planes import (
+from kahanmaps.plots.curves.draw_invariant_curves import Disc, Rectangle
+from kahanmaps.plots.curves.plane_cubics import (
     ONE_LINE,
     REPEATED,
     THREE_LINES,
     ZERO,
+    PlaneCubic,
     symmetric_coordinates,
     transformed,
 )

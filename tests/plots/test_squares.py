@@ -12,8 +12,15 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots import squares as module
-from kahanmaps.plots.draw_squares import _in_two_digits, draw_squares, widest_axes
-from kahanmaps.plots.squares import MapPair, pair_of_systems, pairs_of_member, squares
+from kahanmaps.plots.squares import (
+    MapPair,
+    _in_two_digits,
+    draw_squares,
+    pair_of_systems,
+    pairs_of_member,
+    squares,
+    widest_axes,
+)
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -13,8 +13,7 @@ from page_helpers import Page, letters_of_formulas, letters_of_the_font, require
 
 import kahanmaps as km
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
-from kahanmaps.display.formulas import formula
-from kahanmaps.display.latex import GREEK_NAMES
+from kahanmaps.display.latex import GREEK_NAMES, formula
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation

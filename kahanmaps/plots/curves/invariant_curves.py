@@ -27,8 +27,7 @@ from kahanmaps.errors import HypothesisError, InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.splitting import Splitting
-from kahanmaps.plots.curves.plane_cubics import PlaneCubic
-from kahanmaps.plots.curves.symmetric_planes import COMPLEX, Matrix, symmetric_coordinates, transformed
+from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transformed
 
 MAX_POINTS = 1_000_000
 MAX_STARTS = 7  # as many colours as there are
@@ -57,7 +56,7 @@ class InvariantPlane:
     """One plane of the normal form: its root of chi, as a number and as text, and one orbit for each start.
 
     `h` are the coefficients of the cubic in the coordinates (u, v), complex where the root is; `shape` says what h is:
-    one of the constants of `symmetric_planes`. `index` is the number of the plane in its splitting, `block` its map in
+    one of the constants of `plane_cubics`. `index` is the number of the plane in its splitting, `block` its map in
     the coordinates (u, v), and `matrix` leads to them from those of the splitting.
     """
 

@@ -1,10 +1,14 @@
-"""A phase portrait as numbers: orbits projected to two or three axes, with a colour for each point."""
+"""A phase portrait: orbits projected to two or three axes, with a colour for each point; drawn as dots or lines.
+
+The flow and level curves are below the orbits, a bar for the colours beside them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +16,16 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.curves.level_sets import Levels
+from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, legend_above, new_figure, points
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.portraits.flow import Flow
+from kahanmaps.plots.portraits.flow import CENTRE, DEGENERATE, FOCUS, NODE, SADDLE, Flow
 from kahanmaps.plots.portraits.trajectories import Trajectories
-from kahanmaps.plots.portraits.windows import Window, outside, window_of
+from kahanmaps.plots.portraits.windows import Window, inside, main_range, outside, window_of
+from kahanmaps.plots.style import COLOUR_MAP, COLOURS, MARKS, Style
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from kahanmaps.plots.drifts.drift_functions import WatchedFunction
 
 _MAX_NEIGHBOURS = 2000  # points: distances are taken pair by pair, and a curve through so many looks smooth
@@ -158,3 +166,198 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     lengths = np.linalg.norm(held[pairs[:, 0]] - held[pairs[:, 1]], axis=1)
     longest = max(_LONG * float(np.median(lengths)), _WIDE * float(np.linalg.norm(np.ptp(held, axis=0))))
     return np.asarray(rows[pairs[lengths <= longest]], dtype=np.int64)
+
+
+_ASPECT = 0.75
+_EULER, _LEVEL = "#BBBBBB", {"colors": "#999999", "linewidths": 0.5}
+_MAX_JOINED = 1_000_000  # points: ten seconds, half a gigabyte
+_MAX_RINGS = 40  # starts that are marked: more of them would cover the picture
+_MAX_MARKED = 60  # points of an orbit, up to which each is worth a mark of its orbit's own
+_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+
+_ARROWS: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
+_SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 2))}
+_SOLUTION = {"color": "#888888", "linewidth": 0.5}
+_FILLED: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
+_OPEN: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
+_EQUILIBRIA: dict[str, dict[str, Any]] = {
+    SADDLE: {"marker": "x", "markeredgecolor": "black", "markeredgewidth": 1.2, "markersize": 5},
+    CENTRE: {"marker": "o", "markersize": 5, **_OPEN},
+    FOCUS: {"marker": "D", "markersize": 4.5, **_OPEN},
+    NODE: {"marker": "s", "markersize": 5, **_FILLED},
+    DEGENERATE: {"marker": "*", "markersize": 7, **_FILLED},
+}
+
+
+def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = "") -> Figure:
+    """Draw a portrait: dots, or with `lines` orbits joined; `equal` gives both axes the same unit.
+
+    `note` stands above the right corner, small. Raises InputError for more than a million points to be joined.
+    """
+    count = found.points[..., 0].size
+    if lines and count > _MAX_JOINED:
+        raise InputError(f"found {count} points to join by lines, expected at most {_MAX_JOINED}: draw dots")
+    in_space = len(found.labels) == 3
+    with drawing(style):
+        import matplotlib as mpl
+        from matplotlib.collections import LineCollection
+
+        aspect = _ASPECT
+        if in_space:
+            aspect = 0.9 if found.values is None else 0.8
+        elif equal:  # height over width as the window asks for it, a colour bar beside it
+            (x0, x1), (y0, y1) = found.window
+            aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if found.values is not None else 1.0)))
+        figure = new_figure(style, aspect)
+        if in_space:
+            mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
+        axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
+        if found.flow is not None:
+            # What is drawn of the differential equation below the orbits, its equilibria above them, and a legend.
+            flow, handles = found.flow, dict[str, Any]()
+            if len(flow.places):
+                axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
+            looks = (("separatrix", flow.separatrices, _SEPARATRIX), ("flow", flow.solutions, _SOLUTION))
+            for word, curve, look in ((word, curve, look) for word, curves, look in looks for curve in curves):
+                seen = _inside(curve[:, None], found.window)[:, 0] if in_space else curve
+                (handles[word],) = axes.plot(*seen.T, zorder=1.2, **look)
+            for kind, point in flow.equilibria:
+                mark = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
+                (handles[kind],) = axes.plot(*point[:, None], **mark)
+            if handles:
+                legend_above(figure, list(handles.values()), list(handles), style)
+        if found.levels is not None:
+            pieces = [piece for pieces in found.levels for piece in pieces]
+            axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
+        if found.euler is not None:
+            # In the plane lines go on to the edge; what is far beyond it may be too large to draw.
+            around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in found.window)
+            # Dashes, for in a grey copy the colours say less.
+            dashes: dict[str, Any] = {"linewidth": 0.6, "linestyle": (0, (5, 2)), "rasterized": count > RASTERISE_ABOVE}
+            for orbit in _inside(found.euler, found.window if in_space else around).swapaxes(0, 1):
+                if lines:
+                    axes.plot(*orbit.T, color=_EULER, zorder=1.5, **dashes)
+                else:
+                    points(axes, *orbit.T, color=_EULER, zorder=1.5, of=count)
+        # Axes in space do not cut off what lies outside of them.
+        shown = _inside(found.points, found.window) if in_space else found.points
+        if found.values is None and shown.shape[1] <= len(COLOURS):
+            _draw_few(axes, shown, lines, found)
+        elif found.values is None:
+            _draw_many(axes, shown, lines, found)
+        else:
+            seen = found.values[~np.isnan(_inside(shown, found.window)).any(axis=2)]
+            low, high = main_range(seen)
+            drawn = _draw_coloured(axes, shown, found.values, range(shown.shape[1]), (low, high), lines, found)
+            beyond = bool((seen < low).any()), bool((seen > high).any())
+            how: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
+            figure.colorbar(drawn, ax=axes, **how).set_label(found.value_label)
+        for side, label, limits in zip("xyz", found.labels, found.window, strict=False):
+            axes.set(**{f"{side}label": label, f"{side}lim": limits})
+        if note:
+            axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
+        if in_space:
+            _make_room(axes, found.window if equal else None)
+        elif equal:
+            axes.set_aspect("equal", adjustable="box")
+    return figure
+
+
+def _draw_few(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
+    """A colour and a mark for each orbit; where there are many dots only the start gets the mark."""
+    count = shown.shape[0] * shown.shape[1]
+    for k, orbit in enumerate(shown.swapaxes(0, 1)):
+        how: dict[str, Any] = {"color": COLOURS[k], "zorder": 2}
+        is_marked = not lines and len(orbit) <= _MAX_MARKED
+        if lines:
+            pairs = found.pairs(k)
+            path = orbit
+            if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between the lines: plot takes many of them at once
+                ends = orbit[pairs]
+                path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
+            axes.plot(*path.T, linewidth=0.6, rasterized=count > RASTERISE_ABOVE, **how)
+        else:
+            points(axes, *orbit.T, **how, **({"markersize": 3.0, "marker": MARKS[k]} if is_marked else {}), of=count)
+        if not is_marked:
+            start = {"marker": MARKS[k], "markersize": 4.0, "markeredgecolor": "white", "markeredgewidth": 0.5}
+            axes.plot(*orbit[:1].T, linestyle="none", **start, **{**how, "zorder": 3})
+
+
+def _draw_many(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
+    """Orbits in the colours of the map, the widest below, so that those inside are seen; a ring is a start."""
+    orbits = shown.shape[1]
+    with np.errstate(all="ignore"):
+        extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
+        extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
+        scale = extent.max(axis=0, initial=0)
+        order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
+    numbers = np.broadcast_to(np.arange(orbits, dtype=np.float64), shown.shape[:2])
+    _draw_coloured(axes, shown, numbers, order, (0.0, orbits - 1.0), lines, found)
+    if orbits <= _MAX_RINGS:
+        how = {"markeredgecolor": "black", "markeredgewidth": 0.5, "markerfacecolor": "white", "zorder": 3}
+        axes.plot(*shown[0].T, linestyle="none", marker="o", markersize=2.6, **how)
+
+
+def _draw_coloured(
+    axes: Any,
+    shown: FloatArray,
+    values: FloatArray,
+    order: Iterable[int],
+    limits: tuple[float, float],
+    lines: bool,
+    found: Portrait,
+) -> Any:
+    """Dots of the orbits in this order, or the lines that join them, in the colours of the values."""
+    import matplotlib as mpl
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap, Normalize
+
+    # Without the lightest part of the map: dots are small, and paper is white.
+    colours = ListedColormap(mpl.colormaps[COLOUR_MAP](np.linspace(0, 0.78, 256)))
+    is_image = shown.shape[0] * shown.shape[1] > RASTERISE_ABOVE
+    how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colours, "rasterized": is_image, "zorder": 2}
+    in_space = shown.shape[2] == 3
+    if not lines:
+        first = list(order)
+        ordered, heights = shown[:, first].swapaxes(0, 1), values[:, first].swapaxes(0, 1)
+        there = ~np.isnan(ordered).any(axis=2)
+        how |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
+        return axes.scatter(*ordered[there].T, c=heights[there], **how)
+    joined = [(found.pairs(int(k)), k) for k in order]
+    ends = np.concatenate([shown[pairs, k] for pairs, k in joined])
+    heights = np.concatenate([values[pairs[:, 0], k] for pairs, k in joined])
+    there = ~np.isnan(ends).any(axis=(1, 2))
+    if in_space:
+        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+        del how["zorder"]
+        collection: Any = axes.add_collection3d(Line3DCollection(ends[there], linewidths=0.6, **how), autolim=False)
+    else:
+        collection = axes.add_collection(LineCollection(list(ends[there]), linewidths=0.6, **how), autolim=False)
+    collection.set_array(heights[there])
+    return collection
+
+
+def _inside(shown: FloatArray, window: Window) -> FloatArray:
+    """NaN for points outside the window."""
+    return np.where(inside(shown, window)[..., None], shown, np.nan)
+
+
+def _make_room(axes: Any, window: Window | None) -> None:
+    """Axes in space: light planes, few ticks, and labels inside the picture, which layouts do not look after.
+
+    With a window the box has the proportions of its sides. Of the twelve edges matplotlib draws those of three planes.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_box_aspect(None if window is None else [high - low for low, high in window], zoom=0.84)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_facecolor("white")
+        axis.pane.set_edgecolor("#BBBBBB")
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], prune="both"))
+        axis.labelpad = 0
+    limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
+    for one, other in combinations(product(*limits), 2):
+        if sum(a != b for a, b in zip(one, other, strict=True)) == 1:
+            axes.plot(*zip(one, other, strict=True), color="#BBBBBB", linewidth=0.4, zorder=0)
+    axes.tick_params(pad=0)
