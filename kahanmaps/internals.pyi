@@ -73,7 +73,6 @@ from .experiments.results.records import Record as Record
 from .experiments.results.records import option_words as option_words
 from .experiments.results.records import system_words as system_words
 from .experiments.results.store import Store as Store
-from .experiments.results.store import StoredTask as StoredTask
 from .experiments.results.summary import summarise as summarise
 from .experiments.running.local import TRIES as TRIES
 from .experiments.running.run import Batch as Batch

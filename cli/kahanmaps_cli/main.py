@@ -22,7 +22,7 @@ from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
 from kahanmaps_cli.screen.progress import as_typed, say
 from kahanmaps_cli.screen.streams import have_standard_streams, leave_nothing_to_flush, output_was_lost
-from kahanmaps_cli.screen.terminal import colour_option, with_colour_option
+from kahanmaps_cli.screen.terminal import colour_option
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -112,7 +112,7 @@ class LazyGroup(SuggestingGroup):
             return None
         module = import_module(f"kahanmaps_cli.commands.{COMMANDS[cmd_name][0]}")
         command: click.Command = module.command(cmd_name) if cmd_name in CHECKS else module.command
-        return with_colour_option(with_our_rules(command))
+        return with_our_rules(command)
 
     def hint(self, written: str, known: list[str]) -> str:
         from kahanmaps.documents.catalog import names

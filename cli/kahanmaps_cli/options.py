@@ -220,6 +220,15 @@ def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
     return are_equations(reference) or any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
 
 
+def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) -> tuple[str | None, str | None]:
+    """The first system, which an inline one is, and the second, which is the argument then."""
+    if is_inline(options) and system is not None and other is None:
+        system, other = None, system
+    if system == other == "-":
+        raise click.UsageError("found - twice, but standard input holds one system only")
+    return system, other
+
+
 def load_pair(
     reference: str | None, other: str | None, options: Mapping[str, Any]
 ) -> tuple[lib.SystemFile, lib.SystemFile | None]:
@@ -339,20 +348,14 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
         looks_like_a_path = reference.endswith((".toml", ".ode")) or os.sep in reference
         if not looks_like_a_path or os.path.lexists(reference):
             raise
-        raise lib.InputError(f"{error}{_files_like(reference)}") from error
-
-
-def _files_like(path: str) -> str:
-    """A hint at system files that are named like the one that is not there."""
-    folder, name = os.path.split(path)
-    try:
-        here = sorted(other.removesuffix(".toml") for other in os.listdir(folder or ".") if other.endswith(".toml"))
-    except OSError:
-        return f" (there is no folder {folder})"
-    close = close_to(name.removesuffix(".toml"), here)
-    if close:
-        return f", did you mean {' or '.join(os.path.join(folder, f'{other}.toml') for other in close)}?"
-    return ""
+        folder, name = os.path.split(reference)
+        try:
+            here = sorted(other.removesuffix(".toml") for other in os.listdir(folder or ".") if other.endswith(".toml"))
+            close = close_to(name.removesuffix(".toml"), here)
+            hint = f", did you mean {' or '.join(os.path.join(folder, f'{like}.toml') for like in close)}?"
+        except OSError:
+            close, hint = [folder], f" (there is no folder {folder})"
+        raise lib.InputError(f"{error}{hint if close else ''}") from error
 
 
 def _list(texts: Sequence[str]) -> list[str]:

@@ -12,6 +12,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps.errors import ExpressionError, InputError, quoted
+from kahanmaps_cli.screen.terminal import colour_option
 
 if TYPE_CHECKING:
     OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
@@ -164,7 +165,7 @@ def _require_once(command: click.Command, ctx: click.Context, args: list[str]) -
 
 @cache  # a command is given its rules once
 def with_our_rules(command: click.Command) -> click.Command:
-    """The command, and those below it, with integers of bounded length for `type=int`, and no option lost.
+    """The command, and those below it, with --color, integers of bounded length for `type=int`, and no option lost.
 
     That is to say: none that takes one value is given more than once.
     """
@@ -176,6 +177,7 @@ def with_our_rules(command: click.Command) -> click.Command:
     for parameter in command.params:
         if parameter.type is click.INT:
             parameter.type = ShortInteger()
+    command.params.append(colour_option())
     if isinstance(command, click.Group):
         for below in command.commands.values():
             with_our_rules(below)

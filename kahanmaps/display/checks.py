@@ -32,10 +32,7 @@ class DisplayLimits:
 _NOTEBOOK = DisplayLimits(_TEXT, 1_200, 60, 8)
 
 
-@html_form.register
-def word_html(verdict: Certainty) -> str:
-    """The word with its mark."""
-    return markup.verdict(verdict)
+html_form.register(Certainty, markup.verdict)
 
 
 def verdict_html(finding: Finding) -> str:

@@ -86,19 +86,19 @@ def result_text(found: object) -> str:
 
 def result_html(found: Any, map_: BirationalMap | None = None) -> str:
     """The lines of a result as a table; `map_` tells what eps is, where it is not Kahan's."""
-    rows = [[_cell(cell) for cell in line] for line in islice(lines_of(found), _ROWS + 1)]
+
+    def shown(cell: object) -> str:
+        if isinstance(cell, Shown):
+            return cell.html()
+        text = str(cell).strip().removeprefix("# ")
+        return markup.verdict(text) if text in markup.WORDS else _text(text)
+
+    rows = [[shown(cell) for cell in line] for line in islice(lines_of(found), _ROWS + 1)]
     more = "\n<p>… and more: print shows all</p>" if len(rows) > _ROWS else ""
     title, beside = _TITLES[type(found)](found)
     if map_ is not None:
         beside = eps_sentence(found.eps, map_)
     return markup.titled(title, (markup.table((), rows[:_ROWS]) if rows else "<p>none</p>") + more, beside)
-
-
-def _cell(cell: object) -> str:
-    if isinstance(cell, Shown):
-        return cell.html()
-    text = str(cell).strip().removeprefix("# ")
-    return markup.verdict(text) if text in markup.WORDS else _text(text)
 
 
 def _text(text: str, width: int = _TEXT) -> str:

@@ -20,6 +20,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.recognise import recognised_hamiltonian, recognised_member
+from kahanmaps.maps.floats.doubles import to_floats
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.plots.curves.plane_cubics import Floats
@@ -380,12 +381,6 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
 
 def _table(lattice: Lattice) -> Floats:
     """The points as machine numbers, nan where there is none or it is too large for them."""
-    dim = next(len(point) for row in lattice for point in row if point is not None)
-    missing = (float("nan"),) * dim
-    found = np.array(
-        [
-            [missing if point is None else [float(arb(entry).mid()) for entry in point] for point in row]
-            for row in lattice
-        ]
-    )
+    missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
+    found = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(found) < _LARGEST, found, np.nan)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from importlib import resources
 from pathlib import Path
@@ -199,37 +199,36 @@ def _beside(found: Analysis, name: str, pictures: Pictures) -> tuple[list[Html],
 
 def formulas_of(found: Analysis) -> dict[str, Html]:
     """HTML for statements that are formulas, by their text in `found.sections`."""
-    return {text: Html(html) for text, html in _formulas(found)}
+    shown: dict[str, str] = {}
 
-
-def _formulas(found: Analysis) -> Iterator[tuple[str, str]]:
     def evidence(statement: Any) -> str:
         because = checks.because(statement.evidence, _LIMITS)
         return f"<details><summary>evidence</summary>{because}</details>"
 
     for one in found.integrals.integrals if found.integrals is not None else ():
-        shown = formula(one.function, one.name, CHARACTERS)
+        html = formula(one.function, one.name, CHARACTERS)
         below = f'<span class="soft">{text(one.origin)}</span>\n{evidence(one)}'
-        yield f"{one.name} = {one.text}  [{one.origin}]", f"{shown}<br/>{below}"
+        shown[f"{one.name} = {one.text}  [{one.origin}]"] = f"{html}<br/>{below}"
     for relation in found.relations:
         if html := _relation(relation, (*relation.names, *found.file.variables, "eps")):
-            yield f"along orbits {relation.text}", f"along orbits {html}"
+            shown[f"along orbits {relation.text}"] = f"along orbits {html}"
     for density in found.densities.densities if found.densities is not None else ():
-        shown = formula(density.function, "phi", CHARACTERS)
-        yield f"dx/phi is invariant, phi = {density.text}", f"dx/ϕ is invariant, {shown}\n{evidence(density)}"
+        html = formula(density.function, "phi", CHARACTERS)
+        shown[f"dx/phi is invariant, phi = {density.text}"] = f"dx/ϕ is invariant, {html}\n{evidence(density)}"
     if found.degrees is not None and found.degrees.recurrence is not None and found.degrees.recurrence.closed_form:
         closed = found.degrees.recurrence.closed_form
         with suppress(KahanmapsError):  # where it is something else than a polynomial in n
-            yield f"d_n = {closed}", typeset(f"d_n = {latex_polynomial(parse_polynomial(closed, ['n']))}")
+            shown[f"d_n = {closed}"] = typeset(f"d_n = {latex_polynomial(parse_polynomial(closed, ['n']))}")
     if found.hamiltonian is not None and found.hamiltonian.hamiltonian is not None:
         hamiltonian = found.hamiltonian.hamiltonian
         kind = "the standard J" if hamiltonian.is_standard else "a constant skew J"
         html = f"Hamiltonian with {kind}, {formula(hamiltonian.H, 'H', CHARACTERS)}"
-        yield f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}", html
+        shown[f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}"] = html
     for field in found.commuting.nontrivial if found.commuting is not None else ():
         parts = "<br/>\n".join(formula(g, f"g{k}", CHARACTERS) for k, g in enumerate(field.system.rhs, start=1))
         words = "commutes with the Kahan maps of g and -g"
-        yield f"{words}, g = ({', '.join(field.rhs)})", f"{words},<br/>\n{parts}"
+        shown[f"{words}, g = ({', '.join(field.rhs)})"] = f"{words},<br/>\n{parts}"
+    return {text: Html(html) for text, html in shown.items()}
 
 
 def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:

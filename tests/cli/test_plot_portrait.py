@@ -5,7 +5,7 @@ import signal
 import numpy as np
 import pytest
 
-from kahanmaps.plots.portraits import draw_portrait as drawing
+from kahanmaps.plots.portraits import portrait as drawing
 from kahanmaps_cli.screen.progress import Progress
 
 PLOT = "plot portrait -o - --format svg"

@@ -336,7 +336,7 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 
     May be asked while a batch is running.
     """
-    with _open(db) as store:
+    with lib.Store.open(db, readonly=True) as store:
         data = _status(store, only)
     if as_json:
         print_json(data)
@@ -408,12 +408,23 @@ def show(key: str, db: str, as_json: bool) -> None:
 
     KEY: the first digits of its key, four or more; batch run --dry-run and batch export have the keys.
     """
-    with _open(db) as store:
+    with lib.Store.open(db, readonly=True) as store:
         found = store.find(key)
         if not found:
             raise lib.InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
-        for k, one in enumerate(found):
-            data = _task_data(store, one)
+        for k, (task, record, places, attempts) in enumerate(found):
+            data: dict[str, Any] = {
+                **envelope("batch show"),
+                "convention": lib.CONVENTION,
+                "key": task.key,
+                "task": task.kind,
+                "system": task.system,
+                "options": dict(task.options),
+                "places": [{"experiment": name, "number": number} for name, number in places],
+                "attempts": attempts,
+                **({} if record is None else {k: v for k, v in record.to_json().items() if k != "key"}),
+                "documents": {key: json.loads(store.document(key)) for key in task.documents},
+            }
             if as_json:
                 print_json(data)
                 continue
@@ -439,23 +450,6 @@ def show(key: str, db: str, as_json: bool) -> None:
                 tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
 
 
-def _task_data(store: lib.Store, found: lib.StoredTask) -> dict[str, Any]:
-    """A task and its record as plain data."""
-    task, record, places, attempts = found
-    return {
-        **envelope("batch show"),
-        "convention": lib.CONVENTION,
-        "key": task.key,
-        "task": task.kind,
-        "system": task.system,
-        "options": dict(task.options),
-        "places": [{"experiment": name, "number": number} for name, number in places],
-        "attempts": attempts,
-        **({} if record is None else {k: v for k, v in record.to_json().items() if k != "key"}),
-        "documents": {key: json.loads(store.document(key)) for key in task.documents},
-    }
-
-
 @command.command("export", short_help="The results as CSV, JSON lines or Parquet.")
 @_database()
 @click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
@@ -479,7 +473,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
         raise click.UsageError("missing --csv, --jsonl or --parquet")
     if form == "parquet" and output in (None, "-"):
         raise click.UsageError("--parquet needs -o FILE: it is no text")
-    with _open(db) as store, ExitStack() as stack:
+    with lib.Store.open(db, readonly=True) as store, ExitStack() as stack:
         rows = partial(store.rows, list(only) or None)
         if form == "parquet":
             lib.write_parquet(rows, str(output), stable=stable)
@@ -517,7 +511,7 @@ def summary(
     if as_json and as_markdown:
         raise click.UsageError("give --json or --markdown, not both")
     names = [name.strip() for name in by.split(",") if name.strip()]
-    with _open(db) as store:
+    with lib.Store.open(db, readonly=True) as store:
         rows = store.rows(list(only) or None, missing=True)
         result = lib.summarise(rows, names, list(values) or None, stable=stable)
     if as_json:
@@ -609,7 +603,3 @@ def tasks(name: str | None, as_json: bool) -> None:
             tell_entry(f"  {key:<12}  ", option.help)
         if "seed" not in kind.options:
             tell_entry(f"  {'seed':<12}  ", "seed of everything drawn at random (default 0)")
-
-
-def _open(db: str) -> lib.Store:
-    return lib.Store.open(db, readonly=True)

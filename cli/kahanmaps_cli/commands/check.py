@@ -29,7 +29,7 @@ def command(name: str) -> click.Command:
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
         swapped = False
         if check.is_of_pair:
-            system, other = _pair(system, other, options)
+            system, other = opt.in_order(system, other, options)
             swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)
         with Progress(options["quiet"]) as progress:
             if check.is_of_pair:
@@ -88,15 +88,6 @@ class _PairCommand(click.Command):
             before, _, _ = self.make_parser(ctx).parse_args(args[:inline])
             ctx.meta[_ARGUMENT_IS_FIRST] = isinstance(before.get("system"), str)
         return super().parse_args(ctx, args)
-
-
-def _pair(system: str | None, other: str | None, options: dict[str, Any]) -> tuple[str | None, str | None]:
-    """An inline system in the place of the first, and the argument as the second."""
-    if opt.is_inline(options) and system is not None and other is None:
-        system, other = None, system
-    if system == other == "-":
-        raise click.UsageError("found - twice, but standard input holds one system only")
-    return system, other
 
 
 def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:

@@ -57,19 +57,6 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
             raise click.UsageError("a system file holds the whole system: leave out --what, --symbolic and --name")
         _write(file.to_toml(), file.name, language, output, quiet)
         return
-    # The command that makes the same file again, without the place where it went.
-    words = ["kahanmaps", "convert", *([system] if system is not None else [])]
-    if options["variables"] is not None:
-        words.append(f"--vars={options['variables']}")
-    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
-    for name, value in options["parameters"]:
-        words += ["-p", f"{name}={value}"]
-    words += ["--to", language]
-    for text in options["parts"]:
-        words += ["--what", text]
-    for key in ("symbolic", "name"):
-        if options[key]:
-            words += [f"--{key}", options[key]]
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
     # The command that makes the same file again, without the place where it went.
@@ -79,14 +66,8 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
     words += ["--to", language, *(word for text in options["parts"] for word in ("--what", text))]
     words += [word for key in ("symbolic", "name") if options[key] for word in (f"--{key}", options[key])]
-    text = lib.convert(
-        file,
-        language,
-        parts if options["parts"] else None,
-        name=options["name"],
-        symbols=symbols,
-        command=as_typed(words),
-    )
+    how = {"name": options["name"], "symbols": symbols, "command": as_typed(words)}
+    text = lib.convert(file, language, parts if options["parts"] else None, **how)
     _write(text, file.name, language, output, quiet)
 
 

@@ -184,7 +184,21 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     if any(sign < 0 for sign in member.signs):
         tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}")
     if form is not None:
-        _print_normal_form(form, "x" if recognised is None or recognised.is_standard else "y")
+        tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
+        tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
+        tell(f"h = {formula(form.h_text)}")
+        tell(f"D = {formula(form.D_text)}")
+        tell(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
+        if form.parts:
+            total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
+            tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
+            tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
+        for part in form.parts:
+            root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
+            tell(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
+        point = "x" if recognised is None or recognised.is_standard else "y"
+        tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
+        _print_matrix(form.S)
 
 
 @command.command("space")
@@ -340,23 +354,6 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
         where = f"{output}: " if output else ""
         claimed = len(over_algebra.integrals) * int(chi.degree())
         say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
-
-
-def _print_normal_form(form: lib.NormalForm, point: str) -> None:
-    tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
-    tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
-    tell(f"h = {formula(form.h_text)}")
-    tell(f"D = {formula(form.D_text)}")
-    tell(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
-    if form.parts:
-        total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
-        tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
-        tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
-    for part in form.parts:
-        root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
-        tell(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
-    tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
-    _print_matrix(form.S)
 
 
 def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:

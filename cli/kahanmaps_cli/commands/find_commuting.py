@@ -8,9 +8,8 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search, say
-from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.runs.search import print_list
+from kahanmaps_cli.screen.progress import Search
 
 
 @click.command("find-commuting")
@@ -54,13 +53,5 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             effort=options["effort"],
             progress=search,
         )
-    if as_json:
-        context = settings.context([file], **search.work)
-        print_json({"command": "find-commuting", **context, **found.to_json()})
-    else:
-        tell(f"# find-commuting: {file.name}, {found.kind_text}, every eps (the time step is 2 eps)")
-        tell(str(found))
-    if not quiet:
-        for sentence in found.undecided:
-            say(f"undecided: {sentence}")
-    return 0 if found.complete and not search.is_over else 3
+    heading = f"# find-commuting: {file.name}, {found.kind_text}, every eps (the time step is 2 eps)"
+    return print_list("find-commuting", heading, found, search, settings.context([file], **search.work), as_json)

@@ -8,9 +8,8 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import effort_options, load_system, output_options, system_options
-from kahanmaps_cli.screen.progress import Search, say
-from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.runs.search import print_list
+from kahanmaps_cli.screen.progress import Search
 
 
 @click.command("find-symmetry")
@@ -39,13 +38,5 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = load_system(system, {**options, "quiet": quiet})
     with Search({**options, "quiet": quiet}) as search:
         found = lib.linear_symmetries(file.system, effort=options["effort"], progress=search)
-    if as_json:
-        context = lib.Settings().context([file], **search.work)
-        print_json({"command": "find-symmetry", **context, **found.to_json()})
-    else:
-        tell(f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved")
-        tell(str(found))
-    if not quiet:
-        for sentence in found.undecided:
-            say(f"undecided: {sentence}")
-    return 0 if found.complete and not search.is_over else 3
+    heading = f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved"
+    return print_list("find-symmetry", heading, found, search, lib.Settings().context([file], **search.work), as_json)

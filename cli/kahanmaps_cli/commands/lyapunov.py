@@ -54,16 +54,30 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     eps = opt.eps_of(file, options)
     starts = requested_starts(file, options, count=_DEFAULT_STARTS)
     with Search({**options, "quiet": quiet}) as search:
-        found = lib.lyapunov_exponents(
-            file.map,
-            starts,
-            lib.rational(1) if eps is None else eps,
-            steps,
-            transient=transient,
-            progress=search,
-        )
+        at = lib.rational(1) if eps is None else eps
+        found = lib.lyapunov_exponents(file.map, starts, at, steps, transient=transient, progress=search)
     if as_json:
-        print_json(_record(file, eps, options, found))
+
+        def number(value: Any) -> float | None:
+            return float(value) if isfinite(value) else None  # JSON knows no NaN
+
+        lists = {"per_time": found.mean, "per_step": found.per_step, "spread": found.spread}
+        lists["change_from_half"] = found.change
+        record = record_of(
+            "lyapunov",
+            file,
+            "float",
+            variables=list(file.variables),
+            **lib.eps_record(eps, file.map),
+            **starts_record(options, found.orbits),
+            steps_asked=steps,
+            **lib.attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
+            **{name: [number(value) for value in values] for name, values in lists.items()},
+            sum=number(found.mean.sum()),
+            log_volume=number(found.log_volume.mean()) if len(found.log_volume) else None,
+            residual=number(found.residual),
+        )
+        print_json(record)
     else:
         _print(file, eps, found)
     if found.ended and not quiet:
@@ -88,27 +102,3 @@ def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
     volume = found.log_volume.mean() if len(found.log_volume) else float("nan")
     tell(f"sum\t{found.mean.sum():.6g}")
     tell(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
-
-
-def _number(value: Any) -> float | None:
-    """JSON knows no NaN."""
-    return float(value) if isfinite(value) else None
-
-
-def _record(file: lib.SystemFile, eps: Any, options: dict[str, Any], found: lib.Lyapunov) -> dict[str, Any]:
-    lists = {"per_time": found.mean, "per_step": found.per_step, "spread": found.spread}
-    lists["change_from_half"] = found.change
-    return record_of(
-        "lyapunov",
-        file,
-        "float",
-        variables=list(file.variables),
-        **lib.eps_record(eps, file.map),
-        **starts_record(options, found.orbits),
-        steps_asked=options["steps"],
-        **lib.attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
-        **{name: [_number(value) for value in values] for name, values in lists.items()},
-        sum=_number(found.mean.sum()),
-        log_volume=_number(found.log_volume.mean()) if len(found.log_volume) else None,
-        residual=_number(found.residual),
-    )

@@ -101,7 +101,15 @@ def command(system: str | None, **options: Any) -> int:
             if options["source"] == "verify":
                 reports = [lib.verify(file, settings, lib.VerifyOptions(options["sections"] or None))]
             else:
-                reports, left_out = _checks(file, settings)
+                reports = []
+                for name, check in sorted(lib.CHECKS.items(), key=lambda named: named[1].is_of_pair):
+                    search(name)
+                    try:
+                        reports.append(check(file, None, settings) if check.is_of_pair else check(file, settings))
+                    except lib.InputError as error:
+                        left_out.append(f"{name} does not apply: {error}")
+                if not reports:
+                    raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
             search("the page")
             html = lib.report_html(reports, file=file, left_out=left_out, **how)
             verdict = lib.combined(report.verdict for report in reports)
@@ -138,18 +146,3 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bo
     if suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
         raise click.UsageError(f"found the ending {suffix} of {options['output']}, expected .html: a page is HTML")
     return is_named, any(options[name] is not None and options[name] is not False for name in DRAWN)
-
-
-def _checks(file: lib.SystemFile, settings: lib.Settings) -> tuple[list[lib.Report], list[str]]:
-    """The reports of the checks that apply, and a sentence for each that does not."""
-    reports: list[lib.Report] = []
-    left_out: list[str] = []
-    for name, check in sorted(lib.CHECKS.items(), key=lambda named: named[1].is_of_pair):
-        settings.progress(name)
-        try:
-            reports.append(check(file, None, settings) if check.is_of_pair else check(file, settings))
-        except lib.InputError as error:
-            left_out.append(f"{name} does not apply: {error}")
-    if not reports:
-        raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
-    return reports, left_out

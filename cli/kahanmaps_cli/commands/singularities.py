@@ -80,7 +80,17 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             )
         )
     else:
-        _print(file, runs, symbolic, runs[0].text if agree else verdict)
+        name = file.map.denominator_name
+        share = lib.eps_share(file.map)
+        tell(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
+        if symbolic is not None:
+            factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
+            tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
+        for run in runs:
+            at = f"eps = {run.eps}: " if file.map.has_eps else ""
+            text = str(run).replace("# ", f"\n# {at}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
+            tell("\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n")))
+        tell(f"\n# {runs[0].text if agree else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:
         if any(run.stopped for run in runs):
             why = "the budget was spent: give more --effort"
@@ -90,22 +100,6 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
         say(f"undecided: {why}")
     return 3 if verdict == lib.UNDECIDED or search.is_over else 0
-
-
-def _print(
-    file: lib.SystemFile, runs: list[lib.SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str
-) -> None:
-    name = file.map.denominator_name
-    share = lib.eps_share(file.map)
-    tell(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
-    if symbolic is not None:
-        factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-        tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
-    for run in runs:
-        at = f"eps = {run.eps}: " if file.map.has_eps else ""
-        text = str(run).replace("# ", f"\n# {at}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
-        tell("\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n")))
-    tell(f"\n# {verdict}")
 
 
 def _run_record(file: lib.SystemFile, run: lib.SingularityRun) -> dict[str, Any]:

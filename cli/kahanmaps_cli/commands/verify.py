@@ -9,7 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps.display import markup
-from kahanmaps.display.checks import headline, witness_lines
+from kahanmaps.display.checks import headline, sections_of, witness_lines
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.screen.progress import Progress
@@ -165,18 +165,10 @@ def markdown(report: lib.Report) -> str:
 
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
     tell(headline(report), style="bold")
-    by_section: dict[tuple[int, str], list[lib.Finding]] = {}
-    others = []
-    for finding in report.findings:
-        if "section" in finding.place:
-            key = (finding.place["section"], finding.place["section_title"])
-            by_section.setdefault(key, []).append(finding)
-        else:
-            others.append(finding)
-    controls = bool(report.context.get("controls"))
-    for (number, title), findings in by_section.items():
-        name = title if number == 10 else f"Section {number}. {title}"
-        console().print(_table(name, findings, verbose, controls))
+    by_section = sections_of(report.findings)
+    others = by_section.pop("", [])
+    for name, findings in by_section.items():
+        console().print(_table(name, findings, verbose, bool(report.context.get("controls"))))
     for finding in others:
         tell(f"{finding.claim}: {finding.evidence.summary}")
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):

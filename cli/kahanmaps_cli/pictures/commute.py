@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
+from kahanmaps_cli.options import eps_of, eps_options, in_order, inline_options, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
 from kahanmaps_cli.pictures.output import Drawn, picture, two_variables
 from kahanmaps_cli.screen.progress import Progress
@@ -45,11 +45,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
 
     Exit status: 0 done, 2 usage error, 3 some points are missing (a map has no value there, or numbers are too long).
     """
-    system, other = options["system"], options["other"]
-    if is_inline(options) and system is not None and other is None:
-        system, other = None, system  # the inline system is the first, the argument the second
-    if system == other == "-":
-        raise click.UsageError("found - twice, but standard input holds one system only")
+    system, other = in_order(options["system"], options["other"], options)
     if options["eps2"] is not None and other is None:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
     file, second = load_pair(system, other, options)

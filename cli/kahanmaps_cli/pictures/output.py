@@ -14,7 +14,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import printable
 from kahanmaps_cli.options import stack
-from kahanmaps_cli.params import OptionType, PointText
+from kahanmaps_cli.params import ParameterKind, PointText
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import Search, as_typed, say
 
@@ -26,19 +26,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"
 
 
-class PictureSize(OptionType):
+def _read_size(text: str) -> tuple[float, float | None]:
     """WIDTH or WIDTHxHEIGHT in centimetres."""
-
-    name = "size"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(?:x([0-9]+(?:\.[0-9]+)?))?", value.strip(), re.ASCII)
-        if match is None:
-            self.fail(f"found {value[:60]!r}, expected WIDTH or WIDTHxHEIGHT in cm, as 12 or 12x9", param, ctx)
-        width, height = match.groups()
-        return float(width), None if height is None else float(height)
+    match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(?:x([0-9]+(?:\.[0-9]+)?))?", text.strip(), re.ASCII)
+    if match is None:
+        raise lib.InputError(f"found {text[:60]!r}, expected WIDTH or WIDTHxHEIGHT in cm, as 12 or 12x9")
+    width, height = match.groups()
+    return float(width), None if height is None else float(height)
 
 
 class PictureCommand(click.Command):
@@ -60,7 +54,10 @@ picture_options: Callable[[F], F] = stack(
     ),
     click.option("--format", "kind", type=click.Choice(["pdf", "svg", "png"]), help="Instead of by the ending."),
     click.option(
-        "--size", type=PictureSize(), metavar="WxH", help="Width, or width x height, in cm (default 12 wide)."
+        "--size",
+        type=ParameterKind("size", _read_size),
+        metavar="WxH",
+        help="Width, or width x height, in cm (default 12 wide).",
     ),
     click.option("--font-size", type=float, metavar="PT", help="Size of the letters in points (default 9)."),
     click.option("--dpi", type=int, metavar="N", help="Dots per inch of PNG and of clouds of points (default 300)."),

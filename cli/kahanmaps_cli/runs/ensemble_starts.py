@@ -22,29 +22,20 @@ MAX_NUMBERS = 50_000_000  # of all starts together
 _MAGIC = b"\x93NUMPY"
 
 
-def drawn(count: int, dim: int, box: Any, seed: int) -> lib.FloatArray:
-    """Starts at random: doubles from -box to box; the same ones for the same seed."""
-    if count < 1:
-        raise InputError(f"found --random {count}, expected at least 1 start")
+def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
+    """The starts of the options: those of a file, or drawn at random, `count` of them unless the options say."""
+    if options["starts"] is not None:
+        return read_starts(options["starts"], file.variables)
+    dim, count = file.dim, options["count"] or count or 1
     if count * dim > MAX_NUMBERS:
         raise InputError(f"found --random {count}, expected at most {MAX_NUMBERS // dim} starts in dimension {dim}")
-    if seed < 0:
-        raise InputError(f"found --seed {seed}, expected 0 or more")
-    box = lib.rational(box)
+    box = lib.rational(1) if options["box"] is None else options["box"]
     if box <= 0:
         raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
     size = lib.to_float(box)
     if size == 0.0:
         raise InputError("found a --box that is 0 in machine numbers, expected a larger one")
-    return lib.starts_in_box(count, dim, size, seed)
-
-
-def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
-    """The starts of the options: those of a file, or drawn at random, `count` of them unless the options say."""
-    if options["starts"] is not None:
-        return read_starts(options["starts"], file.variables)
-    count = options["count"] if count is None or options["count"] is not None else count
-    return drawn(count, file.dim, 1 if options["box"] is None else options["box"], options["seed"] or 0)
+    return lib.starts_in_box(count, dim, size, options["seed"] or 0)
 
 
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:

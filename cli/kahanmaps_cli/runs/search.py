@@ -9,7 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import Search, say
 from kahanmaps_cli.screen.render import envelope, print_json
 from kahanmaps_cli.screen.terminal import formula, tell
 
@@ -105,3 +105,16 @@ def print_search(
             tell(count)
         for text in filter(None, (found.note, found.reason)):
             tell(f"note\t{text}")
+
+
+def print_list(name: str, heading: str, found: Any, search: Search, context: dict[str, Any], as_json: bool) -> int:
+    """A list that is complete unless it says otherwise, below its heading or as JSON; the exit status."""
+    if as_json:
+        print_json({"command": name, **context, **found.to_json()})
+    else:
+        tell(heading)
+        tell(str(found))
+    if not search.quiet:
+        for sentence in found.undecided:
+            say(f"undecided: {sentence}")
+    return 0 if found.complete and not search.is_over else 3

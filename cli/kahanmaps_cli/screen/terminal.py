@@ -166,13 +166,3 @@ def colour_option() -> click.Option:
         is_eager=True,
         help="Colours: auto (the default), always or never.",
     )
-
-
-def with_colour_option(command: click.Command) -> click.Command:
-    """The command, which knows --color from now on, as do the commands below it."""
-    if all("--color" not in parameter.opts for parameter in command.params):
-        command.params.append(colour_option())
-    if isinstance(command, click.Group):
-        for below in command.commands.values():
-            with_colour_option(below)
-    return command

@@ -558,7 +558,15 @@ class Store(Displayed):
         What is lost is no result, and leaves the task as it was.
         """
         records = [record for record in records if record.outcome is not Outcome.LOST]
-        rows = [_row_of(record) for record in records]  # what JSON cannot hold is refused here
+        rows = []
+        for record in records:  # what JSON cannot hold is refused here
+            if not math.isfinite(record.seconds):
+                raise ValueError(f"a record cannot have taken {record.seconds} seconds")
+            kept = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
+            for name in ("result", "versions"):
+                kept[name] = None if kept[name] is None else canonical(dict(kept[name]))
+            kept |= {name: kept[name] and encodable(kept[name]) for name in ("verdict", "message", "stderr")}
+            rows.append([*{**kept, "outcome": str(record.outcome), "seconds": float(record.seconds)}.values()])
         with self._transaction():
             for record, row in zip(records, rows, strict=True):
                 found = self._find_result(record.key)
@@ -720,21 +728,3 @@ def _table(text: str) -> dict[str, Any]:
     if not isinstance(table, dict):
         raise TypeError("found no table in JSON")
     return table
-
-
-def _row_of(record: Record) -> tuple[Any, ...]:
-    """The record as values of `_COLUMNS`; what JSON cannot hold is a ValueError."""
-    if not math.isfinite(record.seconds):
-        raise ValueError(f"a record cannot have taken {record.seconds} seconds")
-    return (  # not asdict, which copies results
-        str(record.outcome),
-        None if record.result is None else canonical(dict(record.result)),
-        None if record.verdict is None else encodable(record.verdict),
-        encodable(record.message),
-        encodable(record.stderr),
-        float(record.seconds),
-        record.peak_memory,
-        record.host,
-        canonical(dict(record.versions)),
-        record.finished,
-    )

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import resource
 import signal
 import sys
 import time
@@ -461,9 +462,7 @@ def _versions() -> dict[str, str]:
 
 def _limit_memory(memory: int | None, idle: int | None) -> None:
     """Bound the address space to `idle`, by default what it is now, and `memory` more; None: to what the user has."""
-    with suppress(ImportError, OSError, ValueError):  # not on Windows; not below what is used already
-        import resource
-
+    with suppress(OSError, ValueError):  # not below what is used already
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         soft = hard
         if memory is not None and (used := idle or _address_space()) is not None:
@@ -479,15 +478,11 @@ def _address_space() -> int | None:
     return None
 
 
-def _peak_memory() -> int | None:
+def _peak_memory() -> int:
     """The largest resident size since the task began, in bytes."""
     with suppress(OSError), open("/proc/self/status") as file:
         for line in file:
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
-    with suppress(ImportError):
-        import resource
-
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return peak if sys.platform == "darwin" else peak * 1024
-    return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
