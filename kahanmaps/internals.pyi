@@ -87,7 +87,6 @@ from .family.draw import draw_with_chi as draw_with_chi
 from .family.draw import draw_with_eigenvalues as draw_with_eigenvalues
 from .family.draw import parse_chi as parse_chi
 from .family.draw import random_eigenvalues as random_eigenvalues
-from .family.planar import NormalForm as NormalForm
 from .family.planar import normal_form as normal_form
 from .family.recognise import reason_against as reason_against
 from .family.recognise import recognised_hamiltonian as recognised_hamiltonian

@@ -35,6 +35,7 @@ class Batch:
         self._executor = executor
         self._grace = grace
         self._until: float | None = None
+        self.abandoned = 0
 
     @property
     def was_interrupted(self) -> bool:
@@ -51,6 +52,7 @@ class Batch:
             self._hand_out()
             while executor.in_flight:
                 if self._until is not None and time.monotonic() > self._until:
+                    self.abandoned = executor.in_flight
                     return
                 records = executor.wait(_TICK)
                 end = time.monotonic() + _SHARED * took
