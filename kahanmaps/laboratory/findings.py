@@ -15,12 +15,12 @@ from kahanmaps.family.tensor import TensorStructure
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.preserve.densities import DensitySearch
+from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch
-from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries

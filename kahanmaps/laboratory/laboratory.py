@@ -1,19 +1,26 @@
-"""The maps modulo primes on which one map is examined, and the way from what is found on them to formulas."""
+"""The maps modulo primes on which one map is examined, and the way from what is found on them to formulas.
+
+Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is known modulo a prime where g splits from its values at all
+roots of g there, by interpolation; the c_j are functions over Q, and are found as those are.
+"""
 
 from __future__ import annotations
 
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, rational
-from kahanmaps.algebra.polynomials import RationalFunction, ring, substitute
+from kahanmaps.algebra.interpolation import BlackBox, Reconstruction, reconstruct
+from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring, substitute
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget
@@ -21,8 +28,7 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.preserve.closed_forms import MAX_DEGREE, ClosedForms, Spaces, closed_forms
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
@@ -30,6 +36,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_factors,
     jacobian_factors,
 )
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.identities import Separated, separated, verdict_on
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
@@ -42,7 +49,17 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
+MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or more of them
 _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where invariant hyperplanes over Q are looked for
+Spaces = Sequence[DarbouxSpace]
+
+
+@dataclass(frozen=True)
+class ClosedForms:
+    """The bases of spaces as polynomials in the variables, the symbols and eps; None and a reason if not found."""
+
+    bases: list[list[fmpq_mpoly]] | None
+    reason: str = ""
 
 
 class Laboratory:
@@ -244,18 +261,153 @@ class Laboratory:
         variables: Sequence[str] = (),
         eps_enters: str = "",
     ) -> ClosedForms:
-        """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
+        """The polynomials that span spaces whose reduced echelon bases are known modulo primes.
 
-        `spaces_on` returns None where the map is special. The search ends when the `budget` is spent.
-        Without other `variables` they are those of the map; `eps_enters` is as for formulas in these unless given.
+        `model` are the spaces on the first map, `spaces_on(map)` those on others in the same order; None where the map
+        is special. Without other `variables` they are those of the map. eps enters as in formulas in these unless
+        something else is said: where it is a number or "not" in the formulas, the spaces are for that number; "by
+        weight", they are for eps = 1, and x becomes eps x in them: so it is for homogeneous f. The results are
+        polynomials in (variables, symbols, eps), primitive: integer coefficients without a common factor, that of a
+        polynomial in the symbols included.
         """
-        return closed_forms(
-            model,
-            lambda prime, values: spaces_on(self.map_for(prime, values)),
-            variables or self.map.variables,
-            self.symbols,
-            eps_enters or self.eps_enters,
-            root=self.root,
-            seed=self.seed,
-            budget=budget,
-        )
+        variables, symbols, root = variables or self.map.variables, self.symbols, self.root
+        eps_enters = eps_enters or self.eps_enters
+        supports = [set(space.places) for space in model]
+        # Echelon forms end in a 1 at the largest monomial; the places of other entries than this and zeros are unknown.
+        pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
+        places = [
+            [(i, k) for i, vector in enumerate(space.basis) for k, c in enumerate(vector) if c and k != ends[i]]
+            for space, ends in zip(model, pivots, strict=True)
+        ]
+
+        def box(prime: int, values: tuple[int, ...]) -> tuple[int, ...] | None:
+            try:
+                found = spaces_on(self.map_for(prime, values))
+            except (NoPoint, BadPrime):
+                return None
+            pairs = [] if found is None else list(zip(found, supports, pivots, strict=True))
+            if not pairs or any(
+                not set(one.places) <= mine or len(one.basis) != len(ends) for one, mine, ends in pairs
+            ):
+                return None  # of another shape
+            return tuple(one.basis[i][k] for (one, _, _), cells in zip(pairs, places, strict=True) for i, k in cells)
+
+        names = (*symbols, "eps") if eps_enters == "symbol" else tuple(symbols)
+        functions: list[RationalFunction] = []
+        if any(places):
+            answer = reconstruct_at(root, box, names, seed=self.seed, budget=budget)
+            if answer.functions is None:
+                return ClosedForms(None, answer.reason)
+            functions += answer.functions
+        context, n = ring((*variables, *symbols, "eps")), len(variables)
+        gens, bases = context.gens()[n:], []
+        for space, ends, cells in zip(model, pivots, places, strict=True):
+            basis, monomials = list[fmpq_mpoly](), exponents_up_to(space.dim, space.degree)
+            for row, pivot in enumerate(ends):
+                mine = [k for i, k in cells if i == row]
+                numerators, denominator = over_one_denominator([functions.pop(0) for _ in mine], context, gens)
+                P = context.constant(0)
+                for k, factor in (*zip(mine, numerators, strict=True), (pivot, denominator)):
+                    P = P + factor * context.from_dict({(*monomials[k], *([0] * len(gens))): 1})
+                P = primitive_part(P)[1]
+                if root is not None:
+                    P = primitive_over(root, P, n)
+                if eps_enters == "by weight":  # P(eps x), divided by a power of eps
+                    degrees = {monomial: sum(map(int, monomial[:n])) for monomial in P.monoms()}
+                    least = min(degrees.values())
+                    P = context.from_dict({(*m[:-1], degrees[m] - least): c for m, c in P.terms()})
+                basis.append(P)
+            bases.append(basis)
+        return ClosedForms(bases)
+
+
+def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
+    """As `reconstruct` does, the first of the names standing for the root where there is one.
+
+    The box is asked at all roots modulo primes at which the polynomial splits; the functions are polynomials of a
+    degree below that of the field in the first name. `options` are those of `reconstruct`.
+    """
+    if root is None:
+        return reconstruct(black_box, names, **options)
+    m = root.degree
+    assert m <= MAX_DEGREE  # or primes are too rare; who makes a laboratory is told so
+
+    def split(rng: random.Random) -> int:
+        while True:
+            prime = random_prime(rng)
+            with suppress(BadPrime):
+                if len(root.residues(GF(prime))) == m:
+                    return prime
+
+    def box(prime: int, point: Point) -> list[int] | None:
+        roots, rows = root.residues(GF(prime)), []
+        for t in roots:
+            values = black_box(prime, (t, *point))
+            if values is None:
+                return None
+            rows.append(values)
+        through = [interpolated(roots, column, prime) for column in zip(*rows, strict=True)]
+        return [int(P[j]) for P in through for j in range(m)]
+
+    answer = reconstruct(box, names[1:], draw=split, **options)
+    if answer.functions is None:
+        return answer
+    t, *gens = ring(names).gens()
+    functions = []
+    for k in range(0, len(answer.functions), m):
+        numerators, denominator = over_one_denominator(answer.functions[k : k + m], t.context(), gens)
+        functions.append(RationalFunction(sum((P * t**j for j, P in enumerate(numerators)), 0 * t), denominator))
+    return replace(answer, functions=tuple(functions))
+
+
+def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
+    """A polynomial in n variables, the root and eps, not 0, without factors that contain no variable.
+
+    It has integer coefficients without a common factor; of its multiples by numbers of the field with a rational
+    coefficient it is the shortest.
+
+    >>> from kahanmaps.algebra.roots import parse_root
+    >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
+    >>> primitive_over(parse_root("root of t^2 - 2"), (a*x + 6*y) * (1 - a*eps), 2)
+    3*y*a + x
+    """
+    K = root.number_field
+    parts: dict[tuple[int, ...], list[EtaleElement]] = {}
+    for monomial, coefficient in root.remainder(polynomial, n).terms():
+        *exponents, j, e = (int(k) for k in monomial)
+        row = parts.setdefault(tuple(exponents), [])
+        row += [K.zero] * (e + 1 - len(row))
+        row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
+    content: list[EtaleElement] = []
+    for row in parts.values():
+        content, rest = row, content
+        while rest:
+            content, rest = rest, _divided(content, rest)[1]
+    entries = {
+        (*exponents, e): c
+        for exponents, row in parts.items()
+        for e, c in enumerate(_divided(row, content)[0])
+        if c != 0
+    }
+    found = []
+    for unit in {str(c): c for c in entries.values()}.values():
+        terms = {
+            (*m[:-1], j, m[-1]): number
+            for m, c in entries.items()
+            for j, number in enumerate((c / unit).coefficients)
+            if number != 0
+        }
+        found.append(primitive_part(polynomial.context().from_dict(terms))[1])
+    return min(found, key=lambda P: (len(P), len(str(P)), str(P)))
+
+
+def _divided(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[EtaleElement], list[EtaleElement]]:
+    """Quotient and remainder of polynomials over a field, coefficients from that of degree 0 on; the last is not 0."""
+    quotient, rest = [Q[-1] * 0] * max(0, len(P) - len(Q) + 1), list(P)
+    while len(rest) >= len(Q):
+        shift, factor = len(rest) - len(Q), rest[-1] / Q[-1]
+        quotient[shift] = factor
+        rest = [c - factor * Q[k - shift] if k >= shift else c for k, c in enumerate(rest[:-1])]
+        while rest and rest[-1] == 0:
+            rest.pop()
+    return quotient, rest

@@ -131,13 +131,18 @@ def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
+def places_of(dim: int, degree: int) -> dict[Exponent, int]:
+    """The number of each monomial among `exponents_up_to` the degree."""
+    return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
+
+
+@cache
 def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
     """For each monomial (variable, exponent, place of the monomial with one factor less), of all its variables."""
-    support = exponents_up_to(dim, degree)
-    places = {exponent: k for k, exponent in enumerate(support)}
+    places = places_of(dim, degree)
     return [
         [(k, e, places[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
-        for exponent in support
+        for exponent in places
     ]
 
 
@@ -202,8 +207,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 
     The first ones suffice for a factor of a lower degree: the others are 0.
     """
-    exponents = exponents_up_to(dim, degree)
-    places = {exponent: k for k, exponent in enumerate(exponents)}
+    exponents, places = exponents_up_to(dim, degree), places_of(dim, degree)
     row = [0] * len(exponents)
     count(len(exponents) / 10 + 1.5 * sum(map(bool, P)) * sum(map(bool, Q)))
     for a, p in zip(exponents, P, strict=False):

@@ -29,7 +29,7 @@ from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding
-    from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
+    from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation
 
 _LIMITS = checks.DisplayLimits(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
 _PARSED = 4_000  # characters of a relation that is read once more, to be set as a formula

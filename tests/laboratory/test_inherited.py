@@ -11,8 +11,8 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.inherited import inherited_integrals
 from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import inherited_integrals
 from kahanmaps.maps.kahan import KahanMap
 
 

@@ -17,8 +17,8 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import Lift, Lifted, lifts_with_spaces
 from kahanmaps.laboratory.preserve.iterates import RatioOfIterates, integrals_in_iterates, verdict_on_ratio
-from kahanmaps.laboratory.preserve.lifted import Lift, Lifted, lifts_with_spaces
 
 GAUDIN = """
 variables = ["x1", "x2", "x3", "y1", "y2", "y3"]

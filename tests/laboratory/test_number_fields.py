@@ -9,7 +9,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.roots import parse_root
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.preserve.closed_forms import primitive_over, reconstruct_at
+from kahanmaps.laboratory.laboratory import primitive_over, reconstruct_at
 
 TOP = "x' = a*y*z; y' = -x*z; z' = x*y"
 CUBIC = "root of t^3 - t - 1"

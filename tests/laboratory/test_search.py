@@ -1,5 +1,7 @@
 """A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only."""
 
+from types import SimpleNamespace
+
 import pytest
 from flint import nmod
 
@@ -10,7 +12,6 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
-from kahanmaps.laboratory.preserve.closed_forms import closed_forms
 from kahanmaps.laboratory.preserve.darboux import cofactors
 from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among, search_cofactors
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
@@ -111,6 +112,12 @@ def test_the_space_that_shares_numbers_is_taken_of_those_that_look_alike():
         DarbouxSpace(1, 1, [[1, int(nmod(above, p) / 7)]]) for above, p in ((3, 101), (4, 101), (4, 10**9 + 7))
     ]
     assert module._most_alike([other, same], [wanted], 101, 10**9 + 7) == [same]
+
+
+def closed_forms(model, spaces_at, variables, symbols, eps_enters, budget):
+    """What a laboratory makes of spaces that are given by the prime and the values, and not found on maps."""
+    laboratory = SimpleNamespace(map_for=lambda *place: place, symbols=symbols, root=None, seed=0)
+    return Laboratory.formulas(laboratory, model, lambda place: spaces_at(*place), budget, variables, eps_enters)
 
 
 def test_coefficients_are_interpolated():

@@ -14,7 +14,7 @@ from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, read_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation, sparse_relations
+from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation, sparse_relations
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 FURTHER = Path(__file__).parent / "further_systems"

@@ -16,7 +16,7 @@ from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witnes
 from kahanmaps.display.latex import GREEK_NAMES, formula
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
+from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation
 from kahanmaps.paper.verify import VerifyOptions
 from kahanmaps.reports.page import font_face, mathml, page_template
 from kahanmaps.reports.pictures import Pictures

@@ -18,12 +18,12 @@ from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities, with_factors
+from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation, sparse_relations
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit.limits import FlowAndMap, flow_and_map, with_limit
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.poisson.pencil import Pencil, pencil_of
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson, with_brackets
-from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.laboratory.singular.singularities import (
     WRITTEN_DIMENSION,
     SingularityRun,

@@ -1,10 +1,11 @@
 """Integrals of a map in closed form, found without being told anything but the map.
 
-How many there are at least is found first: by theorems (inherited.py) and by the codimension of orbits, which is
-measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime (search.py);
-their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left as symbols;
-they are interpolated (closed_forms.py), and what comes out is put to the proof as an identity (identities.py). What the
-theorems give and was not found is added. What is missing then is sought with iterates of x as letters (iterates.py).
+How many there are at least is found first: by theorems (hamiltonian_structure.py) and by the codimension of orbits,
+which is measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime
+(search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left
+as symbols; they are interpolated (laboratory.py), and what comes out is put to the proof as an identity
+(identities.py). What the theorems give and was not found is added. What is missing then is sought with iterates of x as
+letters (iterates.py).
 """
 
 from __future__ import annotations
@@ -31,7 +32,6 @@ from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LARGEST_SPAN
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
-from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.iterates import (
     IntegralInIterates,
     gradient_of,
@@ -39,6 +39,7 @@ from kahanmaps.laboratory.preserve.iterates import (
     verdict_on_ratio,
 )
 from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
@@ -133,7 +134,7 @@ class IntegralSearch(Search):
 
     `integrals` are functionally independent, also together with those that depend on time, `in_time`, or those whose
     formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits show (measured);
-    `by_theorems` is how many independent integrals the Kahan map has by the theorems of inherited.py, and `theorems`
+    `by_theorems` is how many independent integrals the Kahan map has by theorems (hamiltonian_structure.py), `theorems`
     says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is.
     `period_at_values` is the number of points of orbits that close where the symbols have the values of the file.
     """

@@ -1,9 +1,9 @@
 """Integrals whose formulas contain iterates x~, x~~, ... as letters: coefficients of relations along orbits.
 
 Functions F_0, F_1, ... of (x, x^(k)), bilinear, whose values along every orbit span a line or a plane are found modulo
-a prime (lifted.py) and interpolated. On a line the ratios of the F are integrals, on a plane those of 2 x 2 minors. Put
-to the proof is that such a ratio has the same value a step later, stated with x in the middle of the piece of orbit:
-then I(x, x~) = I(x_, x) contains one step forward and one backward, and can be multiplied out.
+a prime (darboux_spaces.py) and interpolated. On a line the ratios of the F are integrals, on a plane those of 2 x 2
+minors. Put to the proof is that such a ratio has the same value a step later, stated with x in the middle of the piece
+of orbit: then I(x, x~) = I(x_, x) contains one step forward and one backward, and can be multiplied out.
 
 Affine integrals come first: on their levels, where x has fewer coordinates, relations of a low degree show what on the
 whole space has coefficients of higher degrees. The values c of the levels are symbols of the search, and v.x takes
@@ -37,8 +37,8 @@ from kahanmaps.invariants.phase_functions import orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LIFTED_DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
 from kahanmaps.laboratory.preserve.identities import judged
-from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of, pattern
 from kahanmaps.maps.implicit import BirationalMap
@@ -248,7 +248,7 @@ def _lettered(P: fmpq_mpoly, lift: Lift, map_: BirationalMap) -> fmpq_mpoly:
     n, context = map_.dim, ring(_letters(map_, lift.shift))
     one, gens = context.constant(1), context.gens()
     X, Y = (one, *gens[:n]), (one, *gens[n * min(lift.shift, 1) :][:n])
-    places = dict(zip(exponents_up_to(n, DEGREE), pairs_of(n), strict=True))
+    places = dict(zip(exponents_up_to(n, LIFTED_DEGREE), pairs_of(n), strict=True))
     total = context.constant(0)
     for monomial, coefficient in P.terms():
         exponents = tuple(map(int, monomial))

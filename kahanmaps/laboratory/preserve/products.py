@@ -42,9 +42,8 @@ from kahanmaps.algebra.printing import format_product
 from kahanmaps.algebra.work import Budget, count, counted_cache
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
-from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.limit.flow import coefficient_rows
 from kahanmaps.maps.implicit import BirationalMap, StepOver

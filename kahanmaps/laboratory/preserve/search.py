@@ -33,9 +33,8 @@ from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.preserve.closed_forms import reconstruct_at
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -48,11 +47,12 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     SMALL_SPAN,
     DarbouxSpace,
+    Lift,
     darboux_spaces,
     gradient_rank,
+    lifted_spaces,
 )
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.preserve.lifted import Lift, lifted_spaces
 from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.maps.kahan import KahanMapOver

@@ -31,7 +31,7 @@ from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.invariants.measures import jacobian_determinant_sides
-from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values
+from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
@@ -241,7 +241,8 @@ def cofactor_space(
     places = range(len(exponents_up_to(sample.map.dim, degree))) if model is None else model.places
     here, there = _values(sample, product, degree, places)
     rows = [list(map(sub, after, before)) for before, after in zip(here, there, strict=True)]
-    return _space(sample, degree, places, null_space(rows, len(places), sample.map.prime))
+    vectors = null_space(rows, len(places), sample.map.prime)
+    return DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, sample.map.prime, places)
 
 
 def cofactor_spaces(
@@ -287,7 +288,8 @@ def cofactor_spaces(
             c = int(-factor[0] / factor[1])
             shifted = [[entry - c * (i == j) for j, entry in enumerate(row)] for i, row in enumerate(integers(action))]
             weights = null_space(list(zip(*shifted, strict=True)), len(basis), prime)
-            found.append((c, _space(sample, degree, places, combine(weights, basis, prime))))
+            vectors = combine(weights, basis, prime)
+            found.append((c, DarbouxSpace.spanned_by(sample.map.dim, degree, vectors, prime, places)))
     return found
 
 
@@ -302,13 +304,6 @@ def _values(
         here.append([before[k] for k in places])
         there.append([after[k] for k in places])
     return here, there
-
-
-def _space(sample: Sample, degree: int, places: Sequence[int], vectors: Sequence[Sequence[int]]) -> DarbouxSpace:
-    """The space that vectors on some monomials span."""
-    dim, entries = sample.map.dim, [dict(zip(places, vector, strict=True)) for vector in vectors]
-    whole = [[vector.get(k, 0) for k in range(len(exponents_up_to(dim, degree)))] for vector in entries]
-    return DarbouxSpace.spanned_by(dim, degree, whole, sample.map.prime)
 
 
 def points_needed(dim: int, degree: int, *models: DarbouxSpace) -> int:
@@ -384,7 +379,7 @@ def search_cofactors(
         if budget.is_spent:
             return replace(found, cut=cut)
         orbit = relations_on_orbit(map_, degree)
-        relations, places = orbit.vectors, {e: k for k, e in enumerate(exponents_up_to(dim, degree))}
+        relations, places = orbit.vectors, places_of(dim, degree)
         if relations:
             sums = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
             rows = dict(zip(pivots(sums), sums, strict=True))

@@ -9,7 +9,6 @@ P(x~) Q(x) - P(x) Q(x~) are, becomes the same of P' and Q'.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from itertools import islice, zip_longest
 from math import lcm
 from operator import mul
@@ -24,21 +23,15 @@ from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
     Values,
-    exponents_up_to,
     monomial_tables,
     monomial_values,
+    places_of,
 )
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.systems.polynomial import PolynomialField
 
 Terms = list[tuple[int, int]]
-
-
-@cache
-def _places(dim: int, degree: int) -> dict[tuple[int, ...], int]:
-    """The number of each monomial among those up to a degree."""
-    return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
 
 
 def euler_map(field: PolynomialField) -> ImplicitMap:
@@ -82,7 +75,7 @@ class ModularFlow(ModularMap):
             total = field.convert(coefficient)
             for value, exponent in zip(self.values, monomial[n:], strict=True):
                 total = total * field.convert(value) ** int(exponent)
-            found.append((int(total), _places(n, self.degree)[tuple(map(int, monomial[:n]))]))
+            found.append((int(total), places_of(n, self.degree)[tuple(map(int, monomial[:n]))]))
         return found
 
     def step(self, x: Point) -> Point:

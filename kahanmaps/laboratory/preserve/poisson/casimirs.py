@@ -174,12 +174,7 @@ def _forms(
         for _ in range(_SPARE + len(powers)):
             found = columns(*_moved(map_, tensor, integrals), p)
             rows += [[entry % p for entry in row] for row in zip(*found, strict=True)]
-        vectors = []
-        for relation in null_space(rows, len(powers), p):
-            vectors.append([0] * len(every))
-            for place, entry in zip(places, relation, strict=True):
-                vectors[-1][place] = entry
-        return DarbouxSpace.spanned_by(count, degree, vectors, p)
+        return DarbouxSpace.spanned_by(count, degree, null_space(rows, len(powers), p), p, places)
 
     model = space(laboratory.maps[0])
     if not model.basis:

@@ -43,6 +43,7 @@ from kahanmaps.laboratory.modular_points import (
     NoPoint,
     Point,
     exponents_up_to,
+    places_of,
     product_of,
     slopes,
 )
@@ -349,8 +350,7 @@ def _tensors(
     # Left out is what products of an integral and a tensor span together with the elements before.
     map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
-    places = {exponent: k for k, exponent in enumerate(exponents_up_to(2 * n, degree))}
-    rows: list[list[int]] = []
+    places, rows = places_of(2 * n, degree), list[list[int]]()
     for integral in integrals.basis:
         if any(integral[1:]):
             wide = [0] * len(places)
@@ -396,8 +396,7 @@ def tensor_space(
     Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
-    every, pairs = exponents_up_to(2 * n, degree + 2), list(combinations(range(n), 2))
-    number = {exponent: k for k, exponent in enumerate(every)}
+    number, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
     unknowns = []  # for each monomial x^a d_i d_j its number among all monomials, that of d_i d_j and of x^a
     for p, pair in enumerate(pairs):
         directions = tuple(int(k in pair) for k in range(n))
@@ -424,12 +423,8 @@ def tensor_space(
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
             rows.append([minors[p] * here[m] - there[m] if p == row else minors[p] * here[m] for _, p, m in unknowns])
-    vectors = []
-    for solution in null_space(rows, len(unknowns), prime):
-        vectors.append([0] * len(every))
-        for (place, _, _), value in zip(unknowns, solution, strict=True):
-            vectors[-1][place] = value
-    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime)
+    vectors = null_space(rows, len(unknowns), prime)
+    return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [place for place, _, _ in unknowns])
 
 
 def _at(tensor: GivenTensor, map_: ModularMap, x: Sequence[int]) -> Any:
