@@ -13,7 +13,7 @@ from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import judge
-from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
+from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
@@ -157,6 +157,22 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         settings.progress(f"associated system {k + 1} of {len(associates)}")
         verified[associate.label] = theorems.associated_hypotheses(member, associate)
     orbit = run_orbit(associates[0].system, settings, (member.A, member.H), is_integrable=True)
+
+    def judged(
+        claim: str,
+        systems: tuple[QuadraticSystem, QuadraticSystem],
+        names: tuple[str, str],
+        proof: Evidence | None,
+        tried: bool = True,
+        formula: str = "Phi_{0} o Phi_{1} = Phi_{1} o Phi_{0}",
+        **told: Any,
+    ) -> Finding:
+        formula = formula.format(*names)
+        if not tried and proof is not None:
+            return Finding(claim, Certainty.PROVED, proof, formula=formula, **told)
+        identity = commutativity(*systems, settings.eps, names)
+        return judge(claim, identity, settings, proof, orbit if tried else None, formula=formula, **told)
+
     findings = []
     pairs = list(combinations(associates, 2))
     tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
@@ -166,28 +182,21 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         proof = theorems.evidence(
             "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
         )
-        claim = f"the Kahan maps of f_{first.label} and f_{second.label} commute"
         names = (f"f_{first.label}", f"f_{second.label}")
-        formula = f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}"
-        if k >= tried and proof is not None:
-            findings.append(Finding(claim, Certainty.PROVED, proof, formula=formula, source=SOURCE))
-            continue
-        identity = commutativity(first.system, second.system, settings.eps, names)
-        walked = orbit if k < tried else None
-        findings.append(judge(claim, identity, settings, proof, walked, formula=formula, source=SOURCE))
+        claim = f"the Kahan maps of {names[0]} and {names[1]} commute"
+        findings.append(judged(claim, (first.system, second.system), names, proof, k < tried, source=SOURCE))
     if len(pairs) > tried:
         notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
         # Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse.
         only, inverse = associates[0].system, associates[0].system.scaled(-1)
         findings.append(
-            judge(
+            judged(
                 "the Kahan maps of f_0 and -f_0, its only rational associated system, commute "
                 "(they are inverse to each other)",
-                commutativity(only, inverse, settings.eps, ("f_0", "-f_0")),
-                settings,
+                (only, inverse),
+                ("f_0", "-f_0"),
                 theorems.commuting_by_splitting(only, inverse),
-                orbit,
                 formula="Phi_f(., eps) o Phi_f(., -eps) = id",
                 source="petrera-suris-2016, eq. (eq: reversible)",
             )
@@ -202,7 +211,13 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         )
         verdict = Certainty.UNDECIDED if proof is None else Certainty.PROVED
         findings.append(Finding(claim, verdict, proof or reason, source=SOURCE))
-    control = _control(member, settings, orbit)
+    # The control: Phi_{H_0} with Phi_{H_1}; for m = 1, where there is no H_1, the map with itself at twice the step.
+    f, *others = (CubicHamiltonian(H, standard_structure(member.dim)).system for H in member.chain[:2])
+    g, claim, names = f.scaled(2), "control: the Kahan maps of f at eps and at 2 eps commute", ("f(eps)", "f(2 eps)")
+    if member.m > 1:
+        claim = "control: the Kahan maps of J grad H_0 and J grad H_1, grad H_1 = A grad H_0, commute"
+        g, names = others[0], ("H_0", "H_1")
+    control = judged(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True)
     if not control.is_as_expected:
         notes.append(
             "the control was not refuted: these maps commute as well, so this member cannot show that the check "
@@ -210,28 +225,3 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         )
     context = settings.context([file], orbit=orbit.to_json(), m=member.m, factors=[str(f) for f in member.factors])
     return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit))
-
-
-def _control(member: FamilyMember, settings: Settings, orbit: OrbitRun) -> Finding:
-    """Phi_{H_0} with Phi_{H_1}; for m = 1, where there is no H_1, the map with itself at twice the step."""
-    J = standard_structure(member.dim)
-    f = CubicHamiltonian(member.chain[0], J).system
-    if member.m > 1:
-        g = CubicHamiltonian(member.chain[1], J).system
-        claim, names = (
-            "control: the Kahan maps of J grad H_0 and J grad H_1, grad H_1 = A grad H_0, commute",
-            ("H_0", "H_1"),
-        )
-    else:
-        g = f.scaled(2)
-        claim, names = "control: the Kahan maps of f at eps and at 2 eps commute", ("f(eps)", "f(2 eps)")
-    return judge(
-        claim,
-        commutativity(f, g, settings.eps, names),
-        settings,
-        theorems.commuting_by_splitting(f, g),
-        orbit,
-        formula=f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}",
-        source="petrera-suris-2016, Introduction: in general these maps do not commute",
-        control=True,
-    )

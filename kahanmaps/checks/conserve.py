@@ -21,16 +21,18 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
-from kahanmaps.invariants.integrals import (
+from kahanmaps.invariants.normalize import measured_integrals
+from kahanmaps.invariants.phase_functions import (
+    ClaimedFunction,
     ClaimedIntegral,
     CommutantIntegral,
     ImageFunction,
     ModifiedHamiltonian,
     PaperIntegral,
+    PhaseFunction,
     is_constant,
+    orbit_about,
 )
-from kahanmaps.invariants.normalize import measured_integrals
-from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, orbit_about
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -42,13 +44,17 @@ _TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one integral takes many seco
 
 def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunction, eps: fmpq | None) -> Identity:
     """I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
-    map_ = as_map(system)
-
-    if isinstance(integral, ClaimedFunction) and integral.iterates:
-        return _conservation_in_iterates(map_, integral, eps)
+    map_, labels = as_map(system), ("I(x~)", "I(x)")
     last: list[Any] = []  # along an orbit I(x~) at one point is I(x) at the next
+    in_iterates = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
+    if in_iterates is not None:  # stated for x in the middle of the piece of orbit
+        labels = ("I on the orbit of x, a step later", "I on the orbit of x")
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        if in_iterates is not None:
+            points = orbit_about(map_.at(eps_value, field), point, in_iterates.iterates + 1)
+            before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
+            return None if after is None or before is None else ([after], [before])
         image = map_.at(eps_value, field).step(point)
         known = last and last[0] is field and last[1] == eps_value and last[2] == point
         before = last[3] if known else integral.value(field, eps_value, point)
@@ -57,19 +63,6 @@ def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunctio
         return None if after is None or before is None else ([after], [before])
 
     subject = (map_.subject, integral.subject)
-    return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", has_eps=map_.has_eps, root=map_.root, subject=subject)
-
-
-def _conservation_in_iterates(map_: BirationalMap, integral: ClaimedFunction, eps: fmpq | None) -> Identity:
-    """I(x, x~, ...) has the same value a step later, stated for x in the middle of the piece of orbit."""
-
-    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        points = orbit_about(map_.at(eps_value, field), point, integral.iterates + 1)
-        before, after = (integral.on(field, eps_value, points[k:]) for k in (0, 1))
-        return None if after is None or before is None else ([after], [before])
-
-    subject = (map_.subject, integral.subject)
-    labels = ("I on the orbit of x, a step later", "I on the orbit of x")
     return Identity(map_.dim, sides, eps, *labels, has_eps=map_.has_eps, root=map_.root, subject=subject)
 
 
@@ -194,35 +187,20 @@ def check_integrals(
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
         claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
+        told: dict[str, Any] = {"formula": integral.formula, "source": source}
         if _is_constant(integral, settings):
             at = "" if settings.eps is None else f" at eps = {settings.eps}"
             reason = Evidence(
                 "constant", f"it is a constant{at}: every map conserves constants, so this is no integral"
             )
             is_claimed = isinstance(integral, ClaimedIntegral)  # others do not count
-            formula = integral.formula
-            findings.append(
-                Finding(claim, Certainty.UNDECIDED, reason, formula=formula, source=source, applies=is_claimed)
-            )
-            continue
-        if proof is not None and k >= tried and file.dim > 16:
-            findings.append(
-                Finding(
-                    f"{integral.name} is conserved", Certainty.PROVED, proof, formula=integral.formula, source=source
-                )
-            )
-            continue
-        findings.append(
-            judge(
-                claim,
-                conservation(file.map, integral, settings.eps),
-                settings,
-                proof,
-                orbit if k < tried or proof is None else None,
-                formula=integral.formula,
-                source=source,
-            )
-        )
+            finding = Finding(claim, Certainty.UNDECIDED, reason, **told, applies=is_claimed)
+        elif proof is not None and k >= tried and file.dim > 16:
+            finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **told)
+        else:
+            identity, walked = conservation(file.map, integral, settings.eps), k < tried or proof is None
+            finding = judge(claim, identity, settings, proof, orbit if walked else None, **told)
+        findings.append(finding)
     notes = []
     proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]
     if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved):

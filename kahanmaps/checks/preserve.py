@@ -15,8 +15,12 @@ from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_tensor, run_orbit, settings_and_claim
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, jacobian_determinant_sides
-from kahanmaps.invariants.phase_functions import PhaseFunction
+from kahanmaps.invariants.phase_functions import (
+    ClaimedDensity,
+    DeterminantDensity,
+    PhaseFunction,
+    jacobian_determinant_sides,
+)
 from kahanmaps.invariants.poisson import (
     GivenTensor,
     HamiltonianTensor,

@@ -1,21 +1,42 @@
-"""Functions of a point and of eps that a Kahan map may conserve or have for a density."""
+"""Functions of a point and of eps that a map may conserve or have for a density; claimed ones, and those of theorems.
+
+For f = J grad H with a cubic H and any constant skew J the Kahan map Phi_f conserves
+
+    H + (2 eps/3) grad H^T (I - eps f')^{-1} f  =  H + grad H . (x~ - x)/3  =  H + O(eps^2)    ("modified H"),
+
+and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~. It has the invariant
+measure dx/phi, phi(x~) = phi(x) det dPhi(x), with the density phi = det(I - eps f'(x)).
+Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH), (eq: CMOQ measure).
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import reduce
+from operator import mul
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
-from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, names_of, primitive_part, substitute
+from kahanmaps.algebra.matrices import det
+from kahanmaps.algebra.polynomials import (
+    RationalFunction,
+    coefficients_in,
+    evaluate,
+    names_of,
+    primitive_part,
+    substitute,
+)
 from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.algebra.roots import Root
 from kahanmaps.documents.iterates import iterates_in
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.kahan import Kahan
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 _LONGEST_CONDITION = 200  # characters
 
@@ -143,3 +164,227 @@ def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
         return ""
     texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in found))
     return f"{', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0"
+
+
+class ImageFunction(PhaseFunction):
+    """A function of x and of its image x~ under the Kahan map of J grad H."""
+
+    def __init__(self, hamiltonian: CubicHamiltonian) -> None:
+        self.hamiltonian = hamiltonian
+        self.map = Kahan(hamiltonian.system)
+
+
+def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: MapOver, point: Sequence[Any]) -> Any:
+    """H + grad H . (x~ - x)/3 at a point, for any map."""
+    field, image = phi.field, phi.step(point)
+    with field.working():
+        total = field.zero
+        for x, after, slope in zip(point, image, gradient, strict=True):
+            total = total + evaluate(slope, field, point) * (after - x)
+        return evaluate(H, field, point) + total * field.convert(fmpq(1, 3))
+
+
+class ModifiedHamiltonian(ImageFunction):
+    """H + grad H . (x~ - x)/3, which tends to H as eps -> 0; x~ is the image under the Kahan map of J grad H."""
+
+    def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
+        super().__init__(hamiltonian)
+        self.name = f"modified {letter}"
+        self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f, f = J grad {letter}"
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("modified", self.hamiltonian.H, self.hamiltonian.J)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        return modified(self.hamiltonian.H, self.hamiltonian.gradient, self.map.at(eps, field), point)
+
+
+class PaperIntegral(ImageFunction):
+    """The paper's H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2), for homogeneous H and J = [[0, I], [-I, 0]]."""
+
+    def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H", index: str = "") -> None:
+        if not (hamiltonian.is_homogeneous and hamiltonian.is_standard):
+            raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
+        super().__init__(hamiltonian)
+        self.name = f"{letter}~{index}"
+        # x^, as in the paper: the map need not be the one whose integral this is, but another of its class.
+        self.formula = (
+            f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
+            f"x^ the image of x under the Kahan map of J grad {letter}{index}"
+        )
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("paper", self.hamiltonian.H)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        phi = self.map.at(eps, field)
+        image = phi.step(point)
+        m = len(image) // 2
+        with phi.field.working():
+            total = phi.field.zero
+            for i in range(m):
+                total = total + point[i] * image[m + i] - point[m + i] * image[i]
+            return total / phi.eps
+
+
+class CommutantIntegral(ImageFunction):
+    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x): rational whatever the roots of chi are.
+
+    With C = I this is H~; for k < m these span the same space as the K~_s of all associated systems, over the
+    splitting field of chi. Proof in docs/mathematics.md.
+    """
+
+    def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
+        super().__init__(hamiltonian)
+        self.matrix = (A**power).transpose()
+        self.name = f"{letter}~_{power}"
+        self.formula = f"{self.name} = eps^(-1) x^T J {'A^T' if power == 1 else f'(A^T)^{power}'} x~"
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("commutant", self.hamiltonian.H, self.hamiltonian.J, self.matrix)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        phi = self.map.at(eps, field)
+        image = phi.step(point)
+        with field.working():
+            column = field.convert_matrix(self.hamiltonian.J * self.matrix) * field.column(image)
+            return (field.column(point).transpose() * column)[0, 0] / phi.eps
+
+
+class ClaimedIntegral(ClaimedFunction):
+    """A rational function of the variables and eps that somebody claims is conserved at `eps`, or (None) at every eps.
+
+    `condition` says for which eps it has values, `is_constant` whether it is a constant there.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        function: RationalFunction,
+        eps: fmpq | None = None,
+        root: Root | None = None,
+        map_: BirationalMap | None = None,
+    ) -> None:
+        super().__init__(name, function, root, map_)
+        dim = len(function.names) - 1 - (root is not None)
+        self.condition = integral_condition(function, dim, eps, root)
+        above, below = at_eps(function, eps, root, dim)
+        self.is_constant = not below.is_zero() and is_constant(above, below, dim, root)
+
+
+def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
+    """For which symbols and eps I = P/Q has values.
+
+    Args:
+        integral: a function of `dim` variables, then of symbols and eps.
+        dim: the dimension.
+        eps: an exact number, or None for every eps.
+        root: what the only symbol stands for, where it is algebraic.
+
+    Returns:
+        This in words; empty where I has values at all of them, or at none.
+
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
+    >>> for text in ("x/((10*eps - 1)*y)", "x/y"):
+    ...     print([integral_condition(parse_rational_function(text, ["x", "y", "eps"]), 2, None)])
+    ['where 10*eps - 1 is not 0']
+    ['']
+    """
+    _, below = at_eps(integral, eps, root, dim)
+    return "" if below.is_zero() else where(dim, below)
+
+
+def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
+    """Whether the quotient of two polynomials does not depend on the first `dim` variables; `below` is not 0."""
+    monomial, coefficients = below.monoms()[0][:dim], list[fmpq_mpoly]()
+    for part in (above, below):  # of that monomial in the first variables: polynomials in the others, in the same ring
+        terms = {(*(0,) * dim, *m[dim:]): value for m, value in part.terms() if m[:dim] == monomial}
+        coefficients.append(part.context().from_dict(terms))
+    difference = above * coefficients[1] - below * coefficients[0]
+    return bool((difference if root is None else root.remainder(difference, dim)).is_zero())
+
+
+class DeterminantDensity(PhaseFunction):
+    """phi = det(I - eps f'(x))."""
+
+    name = "phi"
+    formula = "phi = det(I - eps f'(x))"
+    # No condition: it is 1 at eps = 0, and where it is 0 at an eps, the map has no value and nothing is claimed.
+
+    def __init__(self, system: QuadraticSystem) -> None:
+        self.map = Kahan(system)
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return (self.formula, self.map.system.rhs)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        return self.map.at(eps, field).determinant(point)
+
+
+class ClaimedDensity(ClaimedFunction):
+    """A rational function of the variables and eps that somebody claims is a density at `eps`, or (None) at every eps.
+
+    `condition` says for which eps that means something, as `density_condition`. Raises InputError as it does.
+    """
+
+    def __init__(self, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None) -> None:
+        super().__init__("phi", function, root)
+        self.condition = density_condition(function, len(function.names) - 1 - (root is not None), eps, root)
+        self.formula = f"phi = {self.formula}"
+
+
+def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
+    """The hypothesis that phi is a function other than 0, of which every law for dx/phi holds for no reason.
+
+    Args:
+        phi: a function of `dim` variables, then of symbols and eps.
+        dim: the dimension.
+        eps: an exact number, or None for every eps.
+        root: what the only symbol stands for, where it is algebraic.
+
+    Returns:
+        For which symbols and eps neither phi nor its denominator is identically 0, in words; empty where it is so
+        for all of them.
+
+    Raises:
+        InputError: where phi is identically 0 or 0/0, for that eps and root if they are given.
+
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
+    >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "x/(a*y)", "a*x + y"):
+    ...     phi = parse_rational_function(text, ["x", "y", "a", "b", "eps"])
+    ...     print([density_condition(phi, 2, None)])
+    ['where a, b are not all 0']
+    ['where 10*eps - 1 is not 0']
+    ['where a is not 0']
+    ['']
+    """
+    above, below = at_eps(phi, eps, root, dim)
+    if above.is_zero():
+        text = format_rational_function(phi)
+        what = "0/0" if below.is_zero() else "identically 0"
+        at = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
+        which = f", which is {what} at {at}" if text != "0" else ""
+        raise InputError(
+            f"found the density {quoted(text) if which else text}{which}, expected a function that is not zero: "
+            "the measure is dx/phi"
+        )
+    return where(dim, above) if below.is_zero() else where(dim, above, below)
+
+
+def jacobian_determinant_sides(kahan: MapOver, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
+    """Numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x)).
+
+    Of a map with several factors the products of theirs.
+    """
+    factors, points = zip(*kahan.stages(x), strict=True)
+    above = [
+        det(one.numerator_matrix(here, there))
+        for one, here, there in zip(factors, points, (*points[1:], image), strict=True)
+    ]
+    below = [one.determinant(here) for one, here in zip(factors, points, strict=True)]
+    with kahan.field.working():
+        return reduce(mul, above), reduce(mul, below)

@@ -157,13 +157,8 @@ class GivenTensor(PoissonTensor):
     @property
     def brackets(self) -> dict[tuple[str, str], RationalFunction]:
         """The brackets {x_i, x_j} = P_ij for i < j that are not 0."""
-        names = self.rows[0][0].names
-        return {
-            (names[i], names[j]): self.rows[i][j]
-            for i in range(self.dim)
-            for j in range(i + 1, self.dim)
-            if not self.rows[i][j].numerator.is_zero()
-        }
+        names = self.rows[0][0].names if self.rows else ()
+        return {(names[i], names[j]): entry for (i, j), entry in self._above.items()}
 
     @property
     def formula(self) -> str:  # type: ignore[override]

@@ -14,7 +14,7 @@ from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
-from kahanmaps.invariants.measures import jacobian_determinant_sides
+from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import KahanMapOver, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem

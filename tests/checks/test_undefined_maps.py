@@ -21,7 +21,7 @@ from kahanmaps import (
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.theorems import commutant_integral
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.invariants.integrals import CommutantIntegral
+from kahanmaps.invariants.phase_functions import CommutantIntegral
 
 SADDLE = SystemFile.from_hamiltonian(
     CubicHamiltonian(parse_polynomial("q*p", ["q", "p"]), standard_structure(2)), "saddle"

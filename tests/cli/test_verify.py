@@ -79,7 +79,7 @@ def test_in_a_pipe_every_statement_stands_on_a_line_with_its_verdict(once):
 
 def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
     # H~ with twice its value is not the function that (61) says.
-    from kahanmaps.invariants.integrals import PaperIntegral
+    from kahanmaps.invariants.phase_functions import PaperIntegral
 
     original = PaperIntegral.value
     monkeypatch.setattr(PaperIntegral, "value", lambda self, K, eps, x: original(self, K, eps, x) * K.convert(2))

@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.draw import draw_with_chi
-from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.systems.hamiltonian import standard_structure
 
 nonzero = rationals(6).filter(lambda eps: eps != 0)

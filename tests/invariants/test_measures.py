@@ -14,8 +14,7 @@ from helpers import fraction, rationals, systems_with_points
 from hypothesis import assume, given
 
 from kahanmaps.errors import SingularStep
-from kahanmaps.invariants.measures import jacobian_determinant_sides
-from kahanmaps.invariants.phase_functions import where
+from kahanmaps.invariants.phase_functions import jacobian_determinant_sides, where
 from kahanmaps.maps.kahan import KahanMap
 
 nonzero = rationals(6).filter(lambda eps: eps != 0)

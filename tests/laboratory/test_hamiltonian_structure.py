@@ -15,8 +15,7 @@ from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.documents.files import read_system
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.integrals import ModifiedHamiltonian
-from kahanmaps.invariants.measures import DeterminantDensity
+from kahanmaps.invariants.phase_functions import DeterminantDensity, ModifiedHamiltonian
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     ConstantStructures,
     _invertible,

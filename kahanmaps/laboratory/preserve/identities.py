@@ -19,8 +19,7 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.judge import MAX_DIMENSION, settle
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
-from kahanmaps.invariants.integrals import integral_condition
-from kahanmaps.invariants.measures import density_condition, jacobian_determinant_sides
+from kahanmaps.invariants.phase_functions import density_condition, integral_condition, jacobian_determinant_sides
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.normal_form.splitting import Splitting

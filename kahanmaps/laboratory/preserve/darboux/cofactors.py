@@ -30,7 +30,7 @@ from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_facto
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
-from kahanmaps.invariants.measures import jacobian_determinant_sides
+from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit

@@ -37,7 +37,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError, counted
-from kahanmaps.invariants.integrals import modified
+from kahanmaps.invariants.phase_functions import modified
 from kahanmaps.laboratory.modular_points import ModularMap, Point
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.maps.kahan import Kahan, KahanMapOver, SystemLike
