@@ -2,6 +2,10 @@
 
 Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is known modulo a prime where g splits from its values at all
 roots of g there, by interpolation; the c_j are functions over Q, and are found as those are.
+
+Formulas are put to the proof as identities in x, eps and the symbols, stated without quotients, for I = P/Q that
+P(x~) Q(x) = P(x) Q(x~): that is the smaller form to expand. In coordinates in which the planes of a normal form
+separate, identities that are too long to expand are short.
 """
 
 from __future__ import annotations
@@ -12,23 +16,37 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpq_poly
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.etale import EtaleElement
-from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.fields import GF, QQ, Field, rational
+from kahanmaps.algebra.functions import DEFAULT_BUDGET
 from kahanmaps.algebra.interpolation import BlackBox, Reconstruction, reconstruct
-from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring, substitute
+from kahanmaps.algebra.polynomials import (
+    RationalFunction,
+    evaluate,
+    linear_combinations,
+    over_one_denominator,
+    primitive_part,
+    ring,
+    substitute,
+)
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import Budget, count
 from kahanmaps.checks.claims import Certainty, Evidence
+from kahanmaps.checks.decide import Identity, Sides, decide
+from kahanmaps.checks.judge import MAX_DIMENSION, settle
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, exponents_up_to, interpolated
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
+from kahanmaps.invariants.phase_functions import density_condition, integral_condition, jacobian_determinant_sides
+from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint, Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
@@ -37,12 +55,12 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     jacobian_factors,
 )
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.identities import Separated, separated, verdict_on
-from kahanmaps.laboratory.preserve.limit.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.implicit import ImplicitMap
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
+from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -50,6 +68,7 @@ _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
 MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or more of them
+_BUDGET = DEFAULT_BUDGET  # as `check-integrals` has it: what is proved there is proved here
 _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where invariant hyperplanes over Q are looked for
 Spaces = Sequence[DarbouxSpace]
 
@@ -226,7 +245,7 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Whether the map, or the flow, keeps I or dx/phi, as identities.verdict_on has it; of a flow by expansion.
+        """Whether the map, or the flow, keeps I or dx/phi, as the function `verdict_on` has it; of a flow by expansion.
 
         What is no shorter than what was too long to expand is not expanded.
         """
@@ -411,3 +430,163 @@ def _divided(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list
         while rest and rest[-1] == 0:
             rest.pop()
     return quotient, rest
+
+
+def euler_map(field: PolynomialField) -> ImplicitMap:
+    """x -> x + eps f(x), the map that stands for a field where its variables and symbols are asked for."""
+    context = ring((*field.variables, *field.symbols, "eps"))
+    *old, eps = context.gens()
+    moved = (x + eps * f.compose(*old, ctx=context) for x, f in zip(old, field.rhs, strict=False))
+    return explicit_map(field.variables, [RationalFunction(P, context.constant(1)) for P in moved])
+
+
+def is_kept_by_flow(
+    system: PolynomialField,
+    function: RationalFunction,
+    *,
+    is_density: bool = False,
+    factor: RationalFunction | None = None,
+) -> bool:
+    """Whether f . grad I = 0; of a density phi whether f . grad phi = phi div f, which says that dx/phi is invariant.
+
+    With a factor c, a function of the symbols, whether f . grad I = c I: exp(-c t) I is an integral depending on time.
+    Multiplied out, for every value of the symbols; the function is in (variables, symbols, eps). Exact.
+
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+    >>> [is_kept_by_flow(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]
+    [True, False]
+    """
+    P, Q = function.numerator, function.denominator
+    context = P.context()
+    count(10 + len(P) * len(Q) * sum(map(len, system.rhs)) / 10)
+    change = system.derivative(P) * Q - P * system.derivative(Q)
+    if is_density:
+        change -= P * Q * system.divergence.compose(*context.gens()[: system.dim + len(system.symbols)], ctx=context)
+    if factor is not None:
+        change = change * factor.denominator - P * Q * factor.numerator
+    return bool(change.is_zero())
+
+
+def verdict_on(
+    given: QuadraticSystem | BirationalMap,
+    function: RationalFunction,
+    eps: fmpq | None,
+    seed: int = 0,
+    *,
+    is_density: bool,
+    factor: RationalFunction | None = None,
+    expands: bool = True,
+) -> tuple[Certainty, Evidence]:
+    """Whether I(x~) = I(x); of a density phi whether phi(x~) = det dPhi(x) phi(x), which says that dx/phi is invariant.
+
+    Both are for every value of the symbols of the map and, if `eps` is None, every eps.
+
+    Args:
+        given: the map, some of its parameters symbols; a system stands for its Kahan map.
+        function: I or phi, an exact function of (variables, symbols, eps); an algebraic number is one of the symbols.
+        eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
+        seed: of the random points.
+        is_density: whether the function is a phi.
+        factor: c, a function of the same names, for I(x~) = c I(x) or c phi; None for 1.
+        expands: whether to try a proof where random points support it.
+
+    Returns:
+        The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
+        undecided where the two sides have no values, as for a map that is singular everywhere; of a density also where
+        the map is not invertible.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.algebra.parsing import parse_rational_function
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+    >>> for text in ("x^2 + y^2", "x^2 - y^2"):
+    ...     function = parse_rational_function(text, ["x", "y", "eps"])
+    ...     print(verdict_on(rotation, function, None, is_density=False)[0])
+    proved
+    refuted
+    >>> system = QuadraticSystem.from_text(["x"], ["x^2"])
+    >>> str(verdict_on(system, parse_rational_function("x^2", ["x", "eps"]), None, is_density=True)[0])
+    'proved'
+    """
+    map_ = as_map(given)
+    n, root = map_.dim, map_.root
+
+    def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
+        """P(x~) Q(x) and P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
+        point, symbols = place[:n], place[n:]
+        over = map_.at(step, field, symbols)
+        image = over.step(point)
+        values = symbols if root is None else (root.over(field),)
+        here, there = (*point, *values, step), (*image, *values, step)
+        P, Q = (evaluate(part, field, here) for part in (function.numerator, function.denominator))
+        P_there, Q_there = (evaluate(part, field, there) for part in (function.numerator, function.denominator))
+        # Q may vanish at the eps in force, and where a map is not invertible on its image: then P/Q has no value there.
+        if field.is_zero(Q) or field.is_zero(Q_there):
+            return None
+        left, right = P_there * Q, P * Q_there
+        if factor is not None:
+            left = left * evaluate(factor.denominator, field, here)
+            right = right * evaluate(factor.numerator, field, here)
+        if is_density:
+            numerator, denominator = jacobian_determinant_sides(over, point, image)
+            if field.is_zero(numerator):
+                return None  # the map is not invertible here, and 0 = 0 says nothing
+            left, right = left * denominator, right * numerator
+        return [left], [right]
+
+    condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
+    step = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
+    values = " and ".join([*step, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
+    scope = f"for {values}{told}" if values else told.removeprefix(", ").strip()
+    subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
+    identity = Identity(
+        n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject
+    )
+    return judged(identity, seed, expands=expands and n <= MAX_DIMENSION)
+
+
+def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Certainty, Evidence]:
+    """The verdict on an identity, by random points and, if `expands`, by expansion."""
+    decision = decide(identity, seed)
+    found = settle(identity, decision, seed, _BUDGET) if expands else decision
+    return found.verdict, found.evidence
+
+
+@dataclass(frozen=True)
+class Separated:
+    """The `system` that another one is in z, where x = T z. A Kahan map is the same in all linear coordinates."""
+
+    system: QuadraticSystem
+    T: fmpq_mat
+
+    def function(self, given: RationalFunction) -> RationalFunction:
+        """A function of (x, ...) as one of (z, ...)."""
+
+        def there(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+            context, n = polynomial.context(), self.system.dim
+            x = linear_combinations(self.T, context.gens()[:n])
+            return polynomial.compose(*x, *context.gens()[n:], ctx=context)
+
+        return RationalFunction(there(given.numerator), there(given.denominator))
+
+
+def separated(system: QuadraticSystem) -> Separated | None:
+    """The system where its planes over Q separate; None for one without such planes, and where it is not shorter.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> system = load("paper_m2").system
+    >>> [len(f) for f in system.rhs], [len(f) for f in separated(system).system.rhs]
+    ([8, 8, 9, 9], [2, 3, 3, 2])
+    """
+    known = system_normal_form(system)
+    if not isinstance(known, SystemNormalForm):
+        return None
+    splitting = Splitting(known.form, QQ, 1, known.T)
+    matrices = [splitting.matrix(plane) for plane in range(len(splitting.planes))]
+    T = fmpq_mat([list(chain(*rows)) for rows in zip(*matrices, strict=True)])
+    there = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
+    return Separated(there, T) if sum(map(len, there.rhs)) < sum(map(len, system.rhs)) else None

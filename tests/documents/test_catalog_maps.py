@@ -20,9 +20,8 @@ from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
 from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.singular.singularities import singularities, symbolic_denominator
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -18,10 +18,9 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.inline import System
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import SingularStep
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
 from kahanmaps.laboratory.preserve import densities as module
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.maps.kahan import KahanMap
 
 density_verdict = partial(verdict_on, is_density=True)

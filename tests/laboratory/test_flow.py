@@ -6,9 +6,8 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import Lift, Lifted
-from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 
 PRIME = 2**61 - 1
 

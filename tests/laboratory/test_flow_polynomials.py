@@ -11,11 +11,11 @@ from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
+from kahanmaps.laboratory.laboratory import is_kept_by_flow
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
-from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials, gradings
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField

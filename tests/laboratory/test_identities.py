@@ -13,9 +13,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.laboratory import verdict_on
 from kahanmaps.laboratory.preserve import identities
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -13,9 +13,8 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.products import (
     candidates,

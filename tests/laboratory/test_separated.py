@@ -15,9 +15,8 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import laboratory
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, separated
 from kahanmaps.laboratory.preserve import identities
-from kahanmaps.laboratory.preserve.identities import separated
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 PAPER = load("paper_m3").system

@@ -4,7 +4,7 @@ How many there are at least is found first: by theorems (hamiltonian_structure.p
 which is measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime
 (search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left
 as symbols; they are interpolated (laboratory.py), and what comes out is put to the proof as an identity
-(identities.py). What the theorems give and was not found is added. What is missing then is sought with iterates of x as
+(laboratory.py). What the theorems give and was not found is added. What is missing then is sought with iterates of x as
 letters (iterates.py).
 """
 
@@ -27,7 +27,7 @@ from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LARGEST_SPAN
@@ -38,7 +38,6 @@ from kahanmaps.laboratory.preserve.iterates import (
     integrals_in_iterates,
     verdict_on_ratio,
 )
-from kahanmaps.laboratory.preserve.limit.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period

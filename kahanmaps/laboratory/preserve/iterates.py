@@ -34,11 +34,10 @@ from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.normalize import normalized
 from kahanmaps.invariants.phase_functions import orbit_about
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, judged
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LIFTED_DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
-from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of, pattern
 from kahanmaps.maps.implicit import BirationalMap

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import accumulate, repeat
-from math import prod
+from math import lcm, prod
 from operator import mul
 from typing import Any
 
@@ -45,7 +45,6 @@ from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
-from kahanmaps.laboratory.preserve.limit.flow import coefficient_rows
 from kahanmaps.maps.implicit import BirationalMap, StepOver
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
@@ -279,6 +278,20 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     count(10 + size**2 * (size + width) / 50)
     wide = fmpz_mat([[*row, *(int(i == k) for i in range(size))] for k, row in enumerate(rows)]).hnf()
     return [[int(e) for e in row[width:]] for row in wide.tolist() if not any(row[:width])]
+
+
+def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
+    """The coefficients of polynomials, a polynomial a row, times one number that makes them integers.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> coefficient_rows([x + 1, y / 2 - x])
+    [[2, 0, 2], [0, 1, -2]]
+    """
+    denominator = lcm(*(int(c.q) for P in polynomials for c in P.coeffs()))
+    terms = [{tuple(map(int, m)): int(c * denominator) for m, c in P.terms()} for P in polynomials]
+    support = sorted({m for row in terms for m in row})
+    return [[row.get(m, 0) for m in support] for row in terms]
 
 
 def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:

@@ -34,7 +34,7 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -53,7 +53,6 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     lifted_spaces,
 )
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.maps.kahan import KahanMapOver
 

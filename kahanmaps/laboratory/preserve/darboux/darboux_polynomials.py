@@ -15,7 +15,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import echelon
-from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
@@ -23,7 +23,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, judged
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, product_of
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -35,7 +35,6 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     products,
 )
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.products import constants_of
 from kahanmaps.laboratory.preserve.results import Search
@@ -134,11 +133,8 @@ def darboux_polynomials(
     degree = integer(degree, "degree")
     file, eps = as_file(system), resolve_eps(eps, time_step)
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
-    budget, cofactors, spaces = (
-        budget_for("Darboux polynomials", effort),
-        laboratory.cofactors(),
-        list[DarbouxPolynomials](),
-    )
+    budget, cofactors = budget_for("Darboux polynomials", effort), laboratory.cofactors()
+    spaces = list[DarbouxPolynomials]()
     reason = laboratory.defect  # all multiples of what vanishes on the image have the cofactor 0
     if flow:
         assert laboratory.field is not None
@@ -236,45 +232,34 @@ def _written(
     [c] = constants_of(laboratory, number)
     if c is None:
         return f"no closed form for the number in front of the cofactor {text}"
-    outcomes = [_judged(laboratory, cofactors, product, c, P) for P in polynomials]
+    factor, map_, n = c, laboratory.map, laboratory.map.dim
+
+    def keeps(P: fmpq_mpoly) -> Certainty:
+        """Whether P(x~) = c P(x) prod C^k, the denominators multiplied out."""
+
+        def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides:
+            point, values = place[:n], place[n:]
+            over = map_.at(eps, field, values)
+            image = over.step(point)
+            left, right = evaluate(P, field, (*image, *values, eps)), evaluate(P, field, (*place, eps))
+            left = left * evaluate(factor.denominator, field, (*place, eps))
+            right = right * evaluate(factor.numerator, field, (*place, eps))
+            for one, power in zip(cofactors, product.powers, strict=True):
+                numerator, denominator = one.over(over, point, image, values) if power else (field.one, field.one)
+                for _ in range(power):
+                    left, right = left * denominator, right * numerator
+            return [left], [right]
+
+        powers = [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)]
+        subject = (map_.symbols, map_.subject, P, factor, powers)
+        identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)
+        return judged(identity, laboratory.seed)[0]
+
+    outcomes = [keeps(P) for P in polynomials]
     if not all(outcome.holds for outcome in outcomes):
         return f"a formula for the cofactor {text} did not pass as an identity"
     verdict = Certainty.PROVED if all(one is Certainty.PROVED for one in outcomes) else Certainty.SUPPORTED
-    factor = format_rational_function(c)
-    if factor != "1":
-        text = f"{factor if c.is_polynomial and len(c.numerator) == 1 else f'({factor})'}*{text}".removesuffix("*1")
+    told = format_rational_function(c)
+    if told != "1":
+        text = f"{told if c.is_polynomial and len(c.numerator) == 1 else f'({told})'}*{text}".removesuffix("*1")
     return DarbouxPolynomials(text, polynomials, verdict)
-
-
-def _judged(
-    laboratory: Laboratory,
-    cofactors: Sequence[Cofactor],
-    product: CofactorProduct,
-    c: RationalFunction,
-    P: fmpq_mpoly,
-) -> Certainty:
-    """Whether P(x~) = c P(x) prod C^k, the denominators multiplied out."""
-    map_, n = laboratory.map, laboratory.map.dim
-
-    def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides:
-        point, values = place[:n], place[n:]
-        over = map_.at(eps, field, values)
-        image = over.step(point)
-        left, right = evaluate(P, field, (*image, *values, eps)), evaluate(P, field, (*place, eps))
-        left = left * evaluate(c.denominator, field, (*place, eps))
-        right = right * evaluate(c.numerator, field, (*place, eps))
-        for one, power in zip(cofactors, product.powers, strict=True):
-            numerator, denominator = one.over(over, point, image, values) if power else (field.one, field.one)
-            for _ in range(power):
-                left, right = left * denominator, right * numerator
-        return [left], [right]
-
-    subject = (
-        map_.symbols,
-        map_.subject,
-        P,
-        c,
-        [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)],
-    )
-    identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)
-    return judged(identity, laboratory.seed)[0]

@@ -38,9 +38,8 @@ from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluat
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
 from kahanmaps.algebra.work import Budget, count
 from kahanmaps.errors import BadPrime, counted
-from kahanmaps.laboratory.modular_points import Point, Values, exponents_up_to, interpolated
+from kahanmaps.laboratory.modular_points import ModularFlow, Point, Values, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.limit.flow import ModularFlow
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -158,20 +157,19 @@ def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tup
     ]
 
 
+@dataclass
 class _Search:
     """The search for polynomials of a degree with given monomials; those of lower degrees are among `found`."""
 
-    def __init__(
-        self,
-        field: PolynomialField,
-        degree: int,
-        support: Sequence[int],
-        rng: random.Random,
-        found: dict[str, fmpq_mpoly],
-    ) -> None:
-        self.field, self.degree, self.support, self.rng, self.found = field, degree, support, rng, found
-        exponents = exponents_up_to(field.dim, degree)
-        self.monomials = [exponents[k] for k in support]
+    field: PolynomialField
+    degree: int
+    support: Sequence[int]
+    rng: random.Random
+    found: dict[str, fmpq_mpoly]
+
+    def __post_init__(self) -> None:
+        exponents = exponents_up_to(self.field.dim, self.degree)
+        self.monomials = [exponents[k] for k in self.support]
 
     def run(self, primes: list[int], budget: Budget) -> str:
         """Adds the polynomials to those found; why there may be others, "" where there are none.

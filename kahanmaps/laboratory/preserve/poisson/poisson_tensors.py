@@ -36,7 +36,7 @@ from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps
 from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.defaults import budget_for, tensor_degree
-from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory, judged
 from kahanmaps.laboratory.modular_points import (
     Independent,
     ModularMap,
@@ -49,7 +49,6 @@ from kahanmaps.laboratory.modular_points import (
 )
 from kahanmaps.laboratory.preserve.darboux.cofactors import CofactorProduct, Sample, cofactor_space, points_needed
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.identities import judged
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.casimirs import casimir_candidates
 from kahanmaps.laboratory.preserve.products import candidates, products_of
