@@ -35,6 +35,7 @@ from kahanmaps.algebra.polynomials import (
     ring,
     substitute,
 )
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget, count
@@ -50,7 +51,6 @@ from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
-    cofactor_of_affine,
     determinant_factors,
     jacobian_factors,
 )
@@ -219,13 +219,12 @@ class Laboratory:
     def affine_cofactors(self) -> list[Cofactor]:
         """Those of affine Darboux functions of the system, which is there."""
         assert self.system is not None
-        context = self.system.rhs[0].context()
-        gens = context.gens()[: self.system.dim]
+        context, whole, n = self.system.rhs[0].context(), ring(self.map.names), self.system.dim
         return [
-            cofactor_of_affine(one.function, self.system)
+            Cofactor(format_polynomial(one.function), 1, one.function.compose(*whole.gens()[:n], ctx=whole))
             for one in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
             # l is to divide l' with the symbols free, not only at the values that the file gives them, or at that one
-            if darboux_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
+            if darboux_cofactor(self.system, one.function.compose(*context.gens()[:n], ctx=context)) is not None
         ]
 
     def flow_polynomials(self, budget: Budget) -> FlowPolynomials:

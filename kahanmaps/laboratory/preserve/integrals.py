@@ -3,9 +3,8 @@
 How many there are at least is found first: by theorems (hamiltonian_structure.py) and by the codimension of orbits,
 which is measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime
 (search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left
-as symbols; they are interpolated (laboratory.py), and what comes out is put to the proof as an identity
-(laboratory.py). What the theorems give and was not found is added. What is missing then is sought with iterates of x as
-letters (iterates.py).
+as symbols; they are interpolated, and what comes out is put to the proof as an identity (laboratory.py). What the
+theorems give and was not found is added. What is missing then is sought with iterates of x as letters (iterates.py).
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flint import fmpq, fmpz
+from flint import fmpq
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.polynomials import RationalFunction, degree, ring
+from kahanmaps.algebra.polynomials import RationalFunction, degree, ring, substitute
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty, Evidence
@@ -227,10 +226,8 @@ class IntegralSearch(Search):
         Empty where there are none; for a given eps a comment says that they hold there only.
         """
         every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
-        if not every:
-            return ""
-        lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in every)]
-        return "\n".join([*self.toml_comments, *lines]) + "\n"
+        lines = [f'{one.name} = "{one.text}"' for one in every]
+        return "\n".join([*self.toml_comments, "[integrals]", *lines, ""]) if lines else ""
 
 
 def find_integrals(
@@ -413,11 +410,11 @@ def _formulas(
     progress("interpolating closed forms")
     bases, reason = bases_of(laboratory, base.prime, found, budget)
     origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
-    at_zero: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
     formulas = list[Formula]()
     for (Q, *more), origin in zip(bases, origins, strict=False):
         for P in more:  # of P/Q and Q/P the one whose denominator becomes a number for eps = 0, if only one does
-            is_inverse = P.subs(at_zero).is_constant() and not Q.subs(at_zero).is_constant()
+            P_is_number, Q_is_number = (substitute(F, {"eps": fmpq(0)}).is_constant() for F in (P, Q))
+            is_inverse = P_is_number and not Q_is_number
             formulas.append((RationalFunction(Q, P) if is_inverse else RationalFunction(P, Q), origin, ""))
     return base, found, formulas, reason
 

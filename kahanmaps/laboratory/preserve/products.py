@@ -196,20 +196,15 @@ class _Line:
         field = GF(p)
         rest = [field.convert(c) for c in (*self.map.values, self.map.eps)]
         top = degree_in(g, n)
-        powers = [[nmod_poly([1], p)] for _ in place]
-        for row, c in zip(powers, place, strict=True):
-            row += accumulate(repeat(c, top), mul)
+        powers = [list(accumulate(repeat(c, top), mul, initial=nmod_poly([1], p))) for c in place]
         total = nmod_poly([0], p)
         count(50 + 15 * len(g))
         for monomial, coefficient in g.terms():
-            value = field.convert(coefficient)
-            for c, e in zip(rest, monomial[n:], strict=True):
-                value = value * c ** int(e)
-            exponents = [int(e) for e in monomial[:n]]
-            term = nmod_poly([int(value)], p)
-            for row, e in zip(powers, [*exponents, top - sum(exponents)], strict=True):
-                term = term * row[e] if e else term
-            total = total + term
+            exponents = [int(e) for e in monomial]
+            factors = (c**e for c, e in zip(rest, exponents[n:], strict=True))
+            value = nmod_poly([int(prod(factors, start=field.convert(coefficient)))], p)
+            used = zip(powers, [*exponents[:n], top - sum(exponents[:n])], strict=True)
+            total = total + reduce(mul, (row[e] for row, e in used if e), value)
         return total
 
 

@@ -21,12 +21,12 @@ from math import prod
 from operator import sub
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz, nmod, nmod_mpoly, nmod_mpoly_ctx
+from flint import fmpq, fmpq_mpoly, nmod, nmod_mpoly, nmod_mpoly_ctx
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
-from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_factors, ring
+from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_factors, substitute
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
@@ -38,7 +38,7 @@ from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.singular.jets import modulo
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
-from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
 _SPARE = 8
 _DETERMINANT_BUDGET = 20_000_000
@@ -77,8 +77,7 @@ class Cofactor:
         """The same at a point modulo a prime."""
         if self.polynomial is None:
             return map_.determinant(x, image)
-        field = map_.map.field
-        given = ([field.convert(c) for c in entries] for entries in (x, image, map_.values))
+        given = ([map_.map.field.convert(c) for c in entries] for entries in (x, image, map_.values))
         numerator, denominator = self.over(map_.map, *given)
         return int(numerator), int(denominator)
 
@@ -138,22 +137,14 @@ def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
     if D is None:
         return (Cofactor("det dPhi", n, None),)
     found = []
-    origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
     for factor, _ in irreducible_factors(D):
         weight = degree_in(factor, n)
         if weight == 0:
             continue  # a number that depends on eps
         # D is 1 at eps = 0, so that every factor is a number there: divide by it, and cofactors become 1 at eps = 0.
-        constant = factor.subs(origin)
+        constant = substitute(factor, {"eps": fmpq(0)})
         found.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
     return tuple(sorted(found, key=lambda one: (one.weight, one.name)))
-
-
-def cofactor_of_affine(function: fmpq_mpoly, system: QuadraticSystem) -> Cofactor:
-    """The cofactor of an affine Darboux function, given in the variables of the system."""
-    context = ring((*system.variables, *system.symbols, "eps"))
-    images = context.gens()[: system.dim]
-    return Cofactor(format_polynomial(function), 1, function.compose(*images, ctx=context))
 
 
 @dataclass(frozen=True)
