@@ -75,8 +75,9 @@ def test_polynomials_with_a_given_cofactor():
 def test_the_search_ends_when_enough_is_known():
     laboratory = Laboratory(system("x y", "x", "y"))
     map_, known = laboratory.maps[0], laboratory.cofactors()
-    [(product, _, [space])] = search_cofactors(map_, known, [], [], 1, 3, Budget()).spaces
-    assert (product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
+    found = search_cofactors(map_, known, [], [], 1, 3, Budget())
+    [step], [[space]] = found.steps, found.spaces
+    assert (step.product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
     assert search_cofactors(map_, known, [], [space], 1, 3, Budget()).spaces == []
     assert search_cofactors(map_, known, [], [], 1, 3, Budget(0)).spaces == []
     assert search_cofactors(map_, known, [], [], 0, 3, Budget()).spaces == []

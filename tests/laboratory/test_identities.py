@@ -13,8 +13,8 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory import laboratory as module
 from kahanmaps.laboratory.laboratory import verdict_on
-from kahanmaps.laboratory.preserve import identities
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -33,7 +33,7 @@ def function(text: str):
 def blind(monkeypatch):
     """Random points that let everything pass."""
     passed = Decision(Certainty.SUPPORTED, Evidence("random points over GF(p)", "held"))
-    monkeypatch.setattr(identities, "decide", lambda identity, seed: passed)
+    monkeypatch.setattr(module, "decide", lambda identity, seed: passed)
 
 
 @pytest.mark.parametrize("is_density", [False, True])
@@ -80,7 +80,7 @@ def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
 
 
 def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_bound(monkeypatch):
-    monkeypatch.setattr(identities, "_BUDGET", 10)
+    monkeypatch.setattr(module, "_BUDGET", 10)
     system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
     I = parse_rational_function("(x^2 + y^2)/(a^2 - 1)", ["x", "y", "a", "eps"])
     verdict, evidence = integral_verdict(system, I, None)

@@ -80,13 +80,13 @@ def test_too_much_work_ends_the_search_with_the_degree_before(monkeypatch):
     known = laboratory.cofactors()
     over = denominators_among(candidates(laboratory, known, Budget()), 4)
     every = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget())
-    assert (every.degree, len(every.spaces)) == (5, 2)
+    assert (every.cofactor_degree, len(every.spaces)) == (5, 2)
     monkeypatch.setattr(cofactors, "_MAX_WORK", 5_000)
     some = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget())
-    assert (some.degree, some.spaces) == (3, [])
+    assert (some.cofactor_degree, some.spaces) == (3, [])
     assert (every.cut, some.cut) == ("", "")
     late = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget(700))
-    assert (late.degree, late.spaces) == (2, [])  # no relation before degree 3, and nothing to try
+    assert (late.cofactor_degree, late.spaces) == (2, [])  # no relation before degree 3, and nothing to try
     assert late.cut == (
         "polynomials of degree 3 and more with known cofactors were not all tried: the budget was spent (--effort)"
     )

@@ -15,8 +15,8 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import laboratory
+from kahanmaps.laboratory import laboratory as module
 from kahanmaps.laboratory.laboratory import Laboratory, separated
-from kahanmaps.laboratory.preserve import identities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 PAPER = load("paper_m3").system
@@ -61,7 +61,7 @@ def test_what_is_not_preserved_is_refuted_there_too(monkeypatch):
     assert lab.verdict_on(wrong)[0] is Certainty.REFUTED
     # Even where random points let everything pass.
     passed = Decision(Certainty.SUPPORTED, Evidence("random points over GF(p)", "held"))
-    monkeypatch.setattr(identities, "decide", lambda identity, seed: passed)
+    monkeypatch.setattr(module, "decide", lambda identity, seed: passed)
     assert lab.verdict_on(wrong)[0] is Certainty.REFUTED
     assert lab.verdict_on(I.function)[0] is Certainty.PROVED
 

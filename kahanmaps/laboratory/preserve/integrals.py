@@ -28,7 +28,7 @@ from kahanmaps.invariants.normalize import normalized
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point
-from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, denominators_among
+from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor, SpaceSearch, denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LARGEST_SPAN
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.iterates import (
@@ -42,7 +42,6 @@ from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
-    SpaceSearch,
     bases_of,
     may_be_conjugate,
     repeat,

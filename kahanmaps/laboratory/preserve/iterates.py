@@ -37,9 +37,10 @@ from kahanmaps.invariants.phase_functions import orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory, judged
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
+from kahanmaps.laboratory.preserve.darboux.cofactors import SearchStep, SpaceSearch
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LIFTED_DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
-from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of, pattern
+from kahanmaps.laboratory.preserve.search import bases_of
 from kahanmaps.maps.implicit import BirationalMap
 
 
@@ -213,7 +214,7 @@ def integrals_in_iterates(
         for one, spaces in lifts_with_spaces(base, [lift]):
             progress(one.text)
             found = SpaceSearch()
-            found.add(SearchStep("iterates", 2, None, one.text, one), sorted(spaces, key=pattern))
+            found.add(SearchStep("iterates", 2, None, one.text, one), sorted(spaces, key=lambda space: space.pattern))
             bases, _ = bases_of(inside, base.prime, found, budget)
             for basis in bases:
                 functions = [_lettered(P, one, inside.map) for P in basis]

@@ -16,7 +16,7 @@ are conjugate over an extension and have no formula over Q.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product as cartesian
 from itertools import takewhile
@@ -37,8 +37,9 @@ from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
-    CofactorProduct,
     Sample,
+    SearchStep,
+    SpaceSearch,
     cofactor_space,
     cofactor_spaces,
     points_needed,
@@ -47,7 +48,7 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     SMALL_SPAN,
     DarbouxSpace,
-    Lift,
+    Pattern,
     darboux_spaces,
     gradient_rank,
     lifted_spaces,
@@ -59,7 +60,6 @@ from kahanmaps.maps.kahan import KahanMapOver
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MOST_TERMS = 1000
-Pattern = tuple[tuple[bool, ...], ...]
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
 
 _SAMPLES = (150, 600, 3000)  # a simple coefficient is looked for before many values are taken for one
@@ -68,11 +68,6 @@ NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
 AFFINE = "v.x with v.f(x) = 0"
 _CHANCE = 20  # bits by which a fraction is simpler than one of a random residue
-
-
-def pattern(space: DarbouxSpace) -> Pattern:
-    """Where the basis of a space has entries other than zero."""
-    return tuple(tuple(bool(entry) for entry in vector) for vector in space.basis)
 
 
 @dataclass(frozen=True)
@@ -93,54 +88,6 @@ class Branches:
             return None
         found = [by_value.get(int(value)) for value in values]
         return None if None in found else [space for space in found if space is not None]
-
-
-@dataclass(frozen=True)
-class SearchStep:
-    """One step of a search; `product` is None except for cofactors. `text` says how for people."""
-
-    kind: str  # "affine", "relations", "cofactor" or "iterates"
-    degree: int
-    product: CofactorProduct | None
-    text: str
-    lift: Lift | None = None  # of "iterates"
-    up_to_numbers: bool = False  # whether the cofactors of spaces are the product times numbers
-
-
-@dataclass(frozen=True)
-class SpaceSearch:
-    """What a search found on one map: a list of spaces for each step.
-
-    The products of the steps are of the `cofactors`, which were tried up to a degree; `searched` are the degrees of
-    relations along orbits whose span was searched. `cut` says which cofactors were not tried for lack of budget.
-    """
-
-    steps: list[SearchStep] = field(default_factory=list)
-    spaces: list[list[DarbouxSpace]] = field(default_factory=list)
-    cofactors: Sequence[Cofactor] = ()
-    cofactor_degree: int = 0
-    searched: list[int] = field(default_factory=list)
-    cut: str = ""
-
-    @property
-    def all_spaces(self) -> list[DarbouxSpace]:
-        """The spaces of all steps."""
-        return [space for spaces in self.spaces for space in spaces]
-
-    @property
-    def tried(self) -> str:
-        """Among which functions integrals were sought."""
-        parts = []
-        if self.cofactor_degree:
-            parts.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")
-        if self.searched:
-            parts.append(f"relations of degree {', '.join(map(str, self.searched))} along orbits")
-        return f"among {' and '.join(parts)}" if parts else "that was found"
-
-    def add(self, step: SearchStep, spaces: list[DarbouxSpace]) -> None:
-        """One more step."""
-        self.steps.append(step)
-        self.spaces.append(spaces)
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
@@ -180,13 +127,9 @@ def search(
     while comb(dim + top, top) > _MOST_TERMS:
         top -= 1
     progress(f"polynomials of degree up to {top} with {comb(dim + top, top)} terms and known cofactors")
-    known = found.all_spaces
-    result = search_cofactors(map_, cofactors, denominators, known, wanted, top, budget)
-    found = replace(found, cofactors=result.cofactors, cofactor_degree=result.degree, cut=result.cut)
-    for product, scaled, spaces in result.spaces:
-        text = f"{product.origin(found.cofactors)}{', up to a number' * scaled}"
-        step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=scaled)
-        found.add(step, sorted(spaces, key=pattern))
+    more = search_cofactors(map_, cofactors, denominators, found.all_spaces, wanted, top, budget)
+    steps, spaces = [*found.steps, *more.steps], [*found.spaces, *more.spaces]
+    found = replace(more, steps=steps, spaces=spaces, searched=found.searched)
     if not is_of_field:
         take_relations(map_, profile, found, SMALL_SPAN, budget, progress)
     return found
@@ -221,7 +164,7 @@ def take_relations(
             found.searched.append(degree)
         if spaces and gradient_rank(map_, [*known, *spaces]) > independent:
             step = SearchStep("relations", degree, None, f"relations of degree {degree} along orbits")
-            found.add(step, sorted(spaces, key=pattern))
+            found.add(step, sorted(spaces, key=lambda space: space.pattern))
     return ""
 
 
@@ -264,7 +207,7 @@ def classes(group: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:
     """The spaces by the places of their zeros."""
     found: dict[Pattern, list[DarbouxSpace]] = {}
     for space in group:
-        found.setdefault(pattern(space), []).append(space)
+        found.setdefault(space.pattern, []).append(space)
     return found
 
 
@@ -301,7 +244,7 @@ def _in_order(
         if len(alike) < len(wanted):
             return None
         waiting[kind] = alike
-    return [waiting[pattern(space)].pop(0) for space in model]
+    return [waiting[space.pattern].pop(0) for space in model]
 
 
 def _most_alike(

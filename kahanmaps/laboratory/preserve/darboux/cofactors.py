@@ -32,7 +32,7 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank, gradients_of_ratios
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, Lift, gradient_rank, gradients_of_ratios
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.singular.jets import modulo
@@ -322,17 +322,51 @@ def denominators_among(polynomials: Sequence[fmpq_mpoly], dim: int) -> list[Cofa
 
 
 @dataclass(frozen=True)
-class CofactorSearch:
-    """Spaces with a common cofactor by their cofactor, a product of `cofactors`; all degrees up to `degree`.
+class SearchStep:
+    """One step of a search; `product` is None except for cofactors. `text` says how for people."""
 
-    Beside the product stands whether the cofactors of its spaces are that product times numbers. `cut` says what was
-    not tried for lack of budget.
+    kind: str  # "affine", "relations", "cofactor" or "iterates"
+    degree: int
+    product: CofactorProduct | None
+    text: str
+    lift: Lift | None = None  # of "iterates"
+    up_to_numbers: bool = False  # whether the cofactors of spaces are the product times numbers
+
+
+@dataclass(frozen=True)
+class SpaceSearch:
+    """What a search found on one map: a list of spaces for each step.
+
+    The products of the steps are of the `cofactors`, which were tried up to a degree; `searched` are the degrees of
+    relations along orbits whose span was searched. `cut` says which cofactors were not tried for lack of budget.
     """
 
-    cofactors: list[Cofactor]
-    spaces: list[tuple[CofactorProduct, bool, list[DarbouxSpace]]]
-    degree: int
+    steps: list[SearchStep] = field(default_factory=list)
+    spaces: list[list[DarbouxSpace]] = field(default_factory=list)
+    cofactors: Sequence[Cofactor] = ()
+    cofactor_degree: int = 0
+    searched: list[int] = field(default_factory=list)
     cut: str = ""
+
+    @property
+    def all_spaces(self) -> list[DarbouxSpace]:
+        """The spaces of all steps."""
+        return [space for spaces in self.spaces for space in spaces]
+
+    @property
+    def tried(self) -> str:
+        """Among which functions integrals were sought."""
+        parts = []
+        if self.cofactor_degree:
+            parts.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")
+        if self.searched:
+            parts.append(f"relations of degree {', '.join(map(str, self.searched))} along orbits")
+        return f"among {' and '.join(parts)}" if parts else "that was found"
+
+    def add(self, step: SearchStep, spaces: list[DarbouxSpace]) -> None:
+        """One more step."""
+        self.steps.append(step)
+        self.spaces.append(spaces)
 
 
 def search_cofactors(
@@ -343,7 +377,7 @@ def search_cofactors(
     wanted: int,
     max_degree: int,
     budget: Budget,
-) -> CofactorSearch:
+) -> SpaceSearch:
     """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are known.
 
     A space is new if the integrals of `known` and of those found before do not account for its own. The cofactors are
@@ -355,7 +389,7 @@ def search_cofactors(
     the few products that can be denominators from all others.
     """
     prime, dim, every, work = map_.prime, map_.dim, [*cofactors, *denominators], 0
-    found = CofactorSearch(every, [], 0)
+    found = SpaceSearch(cofactors=every)
     spaces = list(known)
     independent = gradient_rank(map_, spaces)
     context, field = nmod_mpoly_ctx.get([f"x{k}" for k in range(dim)], modulus=prime), GF(prime)
@@ -410,8 +444,8 @@ def search_cofactors(
             if more > independent:
                 independent = more
                 spaces.append(space)
-                found.spaces.append((product, False, [space]))
-        found = replace(found, degree=degree)
+                found.add(SearchStep("cofactor", degree, product, product.origin(every)), [space])
+        found = replace(found, cofactor_degree=degree)
     # Factors of determinants are cofactors up to numbers. The number 1 is a third of the work, and often enough.
     if all(one.kind == "reversed" for one in cofactors):
         return found
@@ -433,7 +467,9 @@ def search_cofactors(
         if more > independent:
             independent = more
             spaces += some
-            found.spaces.append((product, True, some))
+            text = f"{product.origin(every)}, up to a number"
+            step = SearchStep("cofactor", degree, product, text, up_to_numbers=True)
+            found.add(step, sorted(some, key=lambda space: space.pattern))
     return found
 
 

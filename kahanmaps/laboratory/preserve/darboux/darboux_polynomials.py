@@ -30,6 +30,8 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     Cofactor,
     CofactorProduct,
     Sample,
+    SearchStep,
+    SpaceSearch,
     cofactor_spaces,
     points_needed,
     products,
@@ -38,7 +40,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.products import constants_of
 from kahanmaps.laboratory.preserve.results import Search
-from kahanmaps.laboratory.preserve.search import SearchStep, SpaceSearch, bases_of
+from kahanmaps.laboratory.preserve.search import bases_of
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 

@@ -56,6 +56,7 @@ SMALL_SPAN, LARGEST_SPAN = 30, 60
 LIFTED_DEGREE = 2  # of monomials that stand for functions of a point and an iterate
 
 Vectors = list[list[int]]
+Pattern = tuple[tuple[bool, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,11 @@ class DarbouxSpace:
     def places(self) -> list[int]:
         """The numbers of these monomials."""
         return [k for k, entries in enumerate(zip(*self.basis, strict=True)) if any(entries)]
+
+    @property
+    def pattern(self) -> Pattern:
+        """Where the basis has entries other than zero."""
+        return tuple(tuple(bool(entry) for entry in vector) for vector in self.basis)
 
     def multiples(self, degree: int, prime: int) -> Vectors:
         """A basis of the products with all monomials, up to a degree."""
