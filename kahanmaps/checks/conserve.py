@@ -21,7 +21,6 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
-from kahanmaps.invariants.normalize import measured_integrals
 from kahanmaps.invariants.phase_functions import (
     ClaimedFunction,
     ClaimedIntegral,
@@ -31,6 +30,7 @@ from kahanmaps.invariants.phase_functions import (
     PaperIntegral,
     PhaseFunction,
     is_constant,
+    measured_integrals,
     orbit_about,
 )
 from kahanmaps.maps.implicit import BirationalMap

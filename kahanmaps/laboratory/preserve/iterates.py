@@ -32,8 +32,7 @@ from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.invariants.normalize import normalized
-from kahanmaps.invariants.phase_functions import orbit_about
+from kahanmaps.invariants.phase_functions import normalized, orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory, judged
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
