@@ -28,7 +28,7 @@ from flint import fmpq
 from kahanmaps.algebra import work
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
 from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
-from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.roots import Root
 from kahanmaps.checks.claims import Certainty, Evidence, Witness
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep, counted
@@ -130,11 +130,18 @@ class Identity:
                 while self.eps is None and eps == 0:
                     eps = field.random(rng)
                 sides = None if eps == 0 else self.at(field, point, eps)  # 0: the prime divides eps
-            if sides is None:
-                yield Trial()
-            else:
-                held = _equal(field, sides)
-                yield Trial(field.prime, None if held else _refuted(self, seed, field, point, eps, sides))
+            if sides is None or _equal(field, sides):
+                yield Trial(None if sides is None else field.prime)
+                continue
+            decision = fails_over_Q(self, seed)
+            if decision is None:  # the modular witness is as good
+                summary = (
+                    f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
+                    f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
+                )
+                proof = Evidence("point over GF(p)", summary, {"prime": str(field.prime)})
+                decision = Decision(Certainty.REFUTED, proof, witness_of(self, field, point, eps, sides))
+            yield Trial(field.prime, decision)
 
     def data(self, undefined: int) -> dict[str, Any]:
         """What evidence from random points says beside the bounds."""
@@ -264,21 +271,6 @@ def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, .
         below = 1 if k < count // 2 else 1 + k % 7
         points.append(tuple(fmpq(rng.randint(-height, height), rng.randint(1, below)) for _ in range(dim)))
     return points
-
-
-def _refuted(
-    identity: Identity, seed: int, field: PrimeField, point: tuple[Any, ...], eps: Any, sides: Sides
-) -> Decision:
-    """A rational witness for an identity that failed over GF(p); failing that, the modular one, which is as good."""
-    found = fails_over_Q(identity, seed)
-    if found is not None:
-        return found
-    witness = witness_of(identity, field, point, eps, sides)
-    summary = (
-        f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
-        f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
-    )
-    return Decision(Certainty.REFUTED, Evidence("point over GF(p)", summary, {"prime": str(field.prime)}), witness)
 
 
 def fails_over_Q(identity: Identity, seed: int) -> Decision | None:

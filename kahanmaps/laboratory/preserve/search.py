@@ -196,10 +196,19 @@ def repeat(
             group = lifted_spaces(map_, step.lift)
         else:
             group = darboux_spaces(map_, step.degree, again.all_spaces) or []
-        ordered = _in_order(group, model, map_, reference, branches.get(number, {}))
-        if ordered is None:
-            return None
-        again.add(step, ordered)
+        # In the order of the model, by the places of their zeros and, where these agree, by branches. There may be more
+        # of them than in the model, see `may_be_conjugate`.
+        by_pattern, of_step, waiting = classes(group), branches.get(number, {}), dict[Pattern, list[DarbouxSpace]]()
+        for kind, wanted in classes(model).items():
+            alike = by_pattern.get(kind, [])
+            if kind in of_step:
+                alike = of_step[kind].in_order(alike, map_) or []
+            elif len(alike) > len(wanted):
+                alike = _most_alike(alike, wanted, map_.prime, reference)
+            if len(alike) < len(wanted):
+                return None
+            waiting[kind] = alike
+        again.add(step, [waiting[space.pattern].pop(0) for space in model])
     return again
 
 
@@ -217,34 +226,6 @@ def may_be_conjugate(found: SpaceSearch) -> bool:
     These exist only modulo primes where the extension splits, and have no formula over Q.
     """
     return any(len(classes(group)) < len(group) for group in found.spaces)
-
-
-def _in_order(
-    group: list[DarbouxSpace],
-    model: list[DarbouxSpace],
-    map_: ModularMap,
-    reference: int,
-    branches: Mapping[Pattern, Branches],
-) -> list[DarbouxSpace] | None:
-    """The spaces in the order of the model, by the places of their zeros and, where these agree, by `branches`.
-
-    There may be more of them than in the model, see `may_be_conjugate`; None where there are fewer.
-    """
-    by_pattern = classes(group)
-    waiting: dict[Pattern, list[DarbouxSpace]] = {}
-    for kind, wanted in classes(model).items():
-        alike = by_pattern.get(kind, [])
-        if kind in branches:
-            known = branches[kind].in_order(alike, map_)
-            if known is None:
-                return None
-            alike = known
-        elif len(alike) > len(wanted):
-            alike = _most_alike(alike, wanted, map_.prime, reference)
-        if len(alike) < len(wanted):
-            return None
-        waiting[kind] = alike
-    return [waiting[space.pattern].pop(0) for space in model]
 
 
 def _most_alike(
