@@ -217,7 +217,8 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
     if member.m > 1:
         claim = "control: the Kahan maps of J grad H_0 and J grad H_1, grad H_1 = A grad H_0, commute"
         g, names = others[0], ("H_0", "H_1")
-    control = judged(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True)
+    source = "petrera-suris-2016, Introduction: in general these maps do not commute"
+    control = judged(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True, source=source)
     if not control.is_as_expected:
         notes.append(
             "the control was not refuted: these maps commute as well, so this member cannot show that the check "
