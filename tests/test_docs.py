@@ -3,7 +3,6 @@
 What is made of the code is looked at as the Markdown that Sphinx is given; one slow test builds the pages.
 """
 
-import posixpath
 import re
 import subprocess
 import sys
@@ -23,8 +22,6 @@ from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
 
 import kahanmaps  # noqa: E402
 from kahanmaps.documents.catalog import names  # noqa: E402
-from kahanmaps.sources import SOURCES  # noqa: E402
-from kahanmaps_cli.main import COMMANDS  # noqa: E402
 
 NO_PAGES = {"_build", "_ext"}  # folders of docs, see conf.py
 
@@ -44,18 +41,6 @@ def pages() -> dict[str, str]:
         if path.is_relative_to(DOCS) and name not in left_out:
             name = name.removesuffix(".md")
             found[name] = expanded(name, path.read_text(encoding="utf-8"))
-    return found
-
-
-def entries(name: str, text: str, all_names: set[str]) -> set[str]:
-    """The pages that the tables of contents of a page name."""
-    found = set()
-    for body in re.findall(r"```\{toctree\}\n(.*?)```", text, re.DOTALL):
-        for line in body.splitlines():
-            if line and not line.startswith(":"):
-                entry = posixpath.normpath(posixpath.join(posixpath.dirname(name), line))
-                pattern = re.compile(re.escape(entry).replace(r"\*", "[^/]*"))
-                found |= {other for other in all_names if pattern.fullmatch(other)}
     return found
 
 
@@ -89,25 +74,11 @@ def built_from() -> dict[str, str]:
     return pages()
 
 
-def test_every_page_is_in_a_table_of_contents(built_from):
-    reached = {"index"}.union(*(entries(name, text, set(built_from)) for name, text in built_from.items()))
-    assert set(built_from) - reached == set()
-
-
-def test_every_command_has_its_entry(built_from):
-    missing = [name for name in COMMANDS if f"(command-{name})=" not in built_from["reference/commands"]]
-    assert missing == []
-
-
 def test_every_exported_name_has_its_entry(built_from):
     api = "\n".join(text for name, text in built_from.items() if name.startswith("reference/api/"))
     public = [name for name in kahanmaps.__all__ if not name.startswith("__")]
     assert [name for name in public if not re.search(rf":: kahanmaps\.{name}$", api, re.MULTILINE)] == []
     assert [name for name in public if f"(#kahanmaps.{name})" not in built_from["reference/api/index"]] == []
-
-
-def test_every_source_is_in_the_bibliography(built_from):
-    assert [key for key in SOURCES if f"(source-{key})=" not in built_from["reference/bibliography"]] == []
 
 
 def test_every_system_of_the_catalogue_has_its_section_with_its_sources(built_from):

@@ -1,6 +1,5 @@
 """Messages of errors: bounded in length, pickled whole, and with the name of the file that was being read."""
 
-import errno
 import pickle
 
 import pytest
@@ -13,7 +12,6 @@ from kahanmaps.errors import (
     SystemFileError,
     UnknownName,
     bounded,
-    is_out_of_memory,
     quoted,
     reading,
 )
@@ -45,21 +43,6 @@ def test_an_unexpected_error_carries_the_name_of_what_was_read():
         with pytest.raises(type(error)) as known, reading("a.toml"):
             raise error
         assert not hasattr(known.value, "__notes__")
-
-
-@pytest.mark.parametrize(
-    ("error", "is_memory"),
-    [
-        (MemoryError(), True),
-        (OSError(errno.ENOMEM, "Cannot allocate memory"), True),
-        (ImportError("libopenblas.so: failed to map segment from shared object"), True),
-        (ImportError("libopenblas.so: cannot open shared object file"), False),
-        (OSError(errno.ENOENT, "No such file or directory"), False),
-        (ValueError("cannot allocate memory"), False),
-    ],
-)
-def test_a_library_that_finds_no_memory_is_told_from_one_that_is_broken(error, is_memory):
-    assert is_out_of_memory(error) is is_memory
 
 
 @pytest.mark.parametrize(

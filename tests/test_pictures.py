@@ -1,6 +1,5 @@
 """The pictures of the documentation: each carries its command, and stands in some page below that command."""
 
-import re
 import shlex
 import sys
 from pathlib import Path
@@ -14,21 +13,6 @@ sys.path.insert(0, str(DOCS / "_ext"))
 from redraw import command_of  # noqa: E402
 
 PICTURES = sorted(path for path in (DOCS / "pictures").iterdir() if path.suffix in (".png", ".svg"))
-PAGES = [path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md")]
-
-
-@pytest.mark.parametrize("picture", PICTURES, ids=lambda path: path.name)
-def test_a_picture_stands_below_the_command_that_makes_it(picture):
-    words = shlex.split(command_of(picture))
-    assert words[:2] == ["kahanmaps", "plot"]
-    assert words[words.index("-o") + 1] == picture.name
-    assert any(shows(page, words, picture.name) for page in PAGES)
-
-
-def shows(page: str, words: list[str], name: str) -> bool:
-    """Whether a page has the command of these words, and later the picture of that name."""
-    commands = re.findall(r"^    (kahanmaps plot .*)$", page.partition(f"pictures/{name})")[0], re.MULTILINE)
-    return f"pictures/{name})" in page and words in map(shlex.split, commands)
 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])

@@ -179,15 +179,6 @@ def test_claims_are_text_or_expressions_by_name_or_without():
         assert str(km.check_poisson(PREY, tensor).verdict) == verdict
 
 
-def test_a_map_at_one_eps_has_orbits():
-    phi = km.map(FISH, "1/5")
-    assert km.orbit(phi, [1, 2], steps=3).points == km.orbit(FISH, [1, 2], "1/5", 3).points
-    assert km.orbit(phi @ phi, [1, 2], steps=2)[1].x == phi(*phi(1, 2))
-    assert km.orbit(phi, [1, 2], steps=2, backward=True)[2].x == (phi**-2)([1, 2])
-    over = km.KahanMap(km.System(FISH).system, "1/5", km.GF(101))
-    assert km.orbit(over, [1, 2], steps=3).rows() == km.orbit(FISH, [1, 2], "1/5", 3, arithmetic=km.GF(101)).rows()
-
-
 def test_orbits_go_over_every_field_that_has_numbers_to_print():
     K = km.load("euler_top", a1="root of t^2 - 2").map.root.number_field
     start = [K.generator, 2]
@@ -296,11 +287,6 @@ REFUSED = [
 def test_what_does_not_work_says_what_does(expression, words):
     with pytest.raises(InputError, match=words):
         eval(expression, {**globals(), "phi": km.map(FISH, "1/5")})
-
-
-def test_a_name_that_is_none_is_refused_with_the_one_that_may_be_meant():
-    with pytest.raises(AttributeError, match="did you mean find_integrals"):
-        km.find_integral  # noqa: B018
 
 
 @pytest.mark.parametrize("given", [0.5, np.float64(0.5)])

@@ -90,32 +90,10 @@ def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
     assert elsewhere["first0"] != at_large_eps["first0"]
 
 
-def test_at_one_eps_its_slider_stays(tmp_path):
-    html = report_html(km.analyze(km.load("euler_top"), eps="1/7"), explore=True)
-    dom, asked, console = dumped(tmp_path, html)
-    assert (asked, console) == ([], [])
-    assert re.search('id="explore-eps-value"[^>]*>0.142857<', dom)
-    assert re.search('<input [^>]*id="explore-eps"[^>]* disabled=', dom)
-    assert not re.search('<input [^>]*id="explore-x1"[^>]* disabled=', dom)
-
-
 @pytest.mark.slow
 def test_a_page_that_fetches_or_complains_is_seen(tmp_path):
     assert dumped(tmp_path, FETCHING)[1] == ["http://localhost:9/x.png"]
     assert "undefined_name" in dumped(tmp_path, COMPLAINING)[2][0]
-
-
-@pytest.mark.slow
-def test_what_is_printed_has_the_verdict_and_what_is_folded_on_the_screen(tmp_path, html):
-    if shutil.which("pdftotext") is None:
-        pytest.skip("needs pdftotext")
-    page, pdf = tmp_path / "page.html", tmp_path / "page.pdf"
-    page.write_text(html)
-    browse(page, f"--print-to-pdf={pdf}", "--no-pdf-header-footer")
-    text = subprocess.run(["pdftotext", pdf, "-"], capture_output=True, check=True).stdout.decode()
-    assert "Verdict" in text
-    assert "in the sense of complexity" in text
-    assert "[system]" in text, "the system file, folded on the screen"
 
 
 @pytest.mark.slow

@@ -24,29 +24,6 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return db
 
 
-def sizes() -> dict[str, int]:
-    return {experiment.name: experiment.size for experiment in km.read_spec(STUDY / "study.toml").experiments}
-
-
-def test_there_are_five_hundred_members_for_each_m():
-    assert sizes()["heights"] == 3 * 500
-    assert sizes()["space"] == sizes()["commute"] == 2 * 3 * 500
-
-
-def test_the_committed_results_are_those_of_all_tasks():
-    results = (STUDY / "results.md").read_text()
-    for heading, name in (
-        ("The space of cubics", "space"),
-        ("Commutativity", "commute"),
-        ("Heights", "heights"),
-        ("Heights and eps, m = 3", "heights-eps"),
-        ("Heights of associated maps, m = 3", "heights-associated"),
-    ):
-        table = results.partition(f"## {heading}\n")[2].strip().partition("\n\n")[0].splitlines()
-        column = [cell.strip() for cell in table[0].split("|")].index("tasks")
-        assert sum(int(line.split("|")[column]) for line in table[2:]) == sizes()[name]
-
-
 @pytest.mark.slow
 def test_what_was_learned_comes_out_of_the_first_members_too(small: Path):
     done = subprocess.run([sys.executable, STUDY / "learned.py", small], capture_output=True, text=True)

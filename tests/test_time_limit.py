@@ -2,20 +2,16 @@
 
 import math
 import signal
-import threading
 import time
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 
-import kahanmaps
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit, time_limit
 from kahanmaps.laboratory.analysis import analyze
 
-LIBRARY = Path(kahanmaps.__file__).parent
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers here")
 
 
@@ -29,11 +25,6 @@ def test_a_busy_loop_is_stopped():
     with pytest.raises(TimeLimit, match=r"the time limit of 0.05 s is over"), time_limit(0.05):
         busy()
     assert time.monotonic() - began < 10
-
-
-def test_it_is_like_an_interrupt_from_the_keyboard():
-    assert issubclass(TimeLimit, KeyboardInterrupt)
-    assert not issubclass(TimeLimit, Exception)  # so that what catches errors does not swallow it
 
 
 def test_what_is_done_in_time_is_not_disturbed_and_all_is_as_before():
@@ -69,22 +60,6 @@ def test_the_outer_limit_goes_on_after_the_inner_one():
 def test_other_times_are_refused(seconds):
     with pytest.raises(InputError, match="expected a positive number"), time_limit(seconds):
         pass
-
-
-def test_other_threads_are_refused():
-    errors = []
-
-    def work():
-        try:
-            with time_limit(1):
-                pass
-        except InputError as error:
-            errors.append(str(error))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert errors == ["found a time limit in another thread or on Windows, expected the main thread: give effort="]
 
 
 def test_what_an_analysis_had_completed_stays_as_it_is():

@@ -15,7 +15,6 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.version import __version__
 
 TOP = "analyze euler_top"
-FOUR = "analyze --vars x,y --rhs y --rhs='-x+x^2'"  # periodic at eps = 1
 STATUSES = {"proved", "supported", "explained", "measured", "undecided", "note"}
 
 
@@ -79,18 +78,6 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     assert (verdict["integrability"], verdict["integrals"], verdict["growth"]) == ("integrable", 2, "quadratic")
     assert (verdict["integrals_exact"], verdict["sense"], verdict["ground"]) == (True, "superintegrable", "proved")
     assert "The integrals and densities are for every a2, all else is for the given values." in verdict["sentence"]
-
-
-def test_the_report_as_markdown(once):
-    out = once("analyze nahm_tetrahedral --markdown").out
-    assert out.startswith(
-        "# nahm_tetrahedral, dimension 2, every eps (the time step is 2 eps)\n\n```\nx' = x^2 - y^2\n"
-    )
-    assert "\ny' = -2*x*y\n```\n\n**Integrable (proved): " in out
-    assert "\n## growth\n\n* *measured*: degrees of the iterates: 2, 4, 8, 13, " in out
-    # formulas are code, or their stars would be taken for emphasis
-    assert "* *measured*: `along orbits x^2*y - 1/3*y^3 + c1*x^2 + c1*y^2 + c2 = 0`\n" in out
-    assert all("`" in line for line in out.splitlines() if line.startswith("* ") and "=" in line)
 
 
 def test_text_json_and_markdown_say_the_same(once):
@@ -199,12 +186,6 @@ def test_seconds_end_a_process_at_any_load():
         assert json.loads(done.stdout)["interrupted"] is True
     assert done.stderr.startswith("stopped after 0.5 s (--seconds)")
     assert len(done.stderr.splitlines()) == 1
-
-
-def test_an_interrupt_before_anything_was_begun_prints_nothing(kahanmaps, monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.analysis.Laboratory", interrupted)
-    outcome = kahanmaps(FOUR)
-    assert (outcome.status, outcome.out) == (130, "")
 
 
 @pytest.mark.usefixtures("one_process")

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from cli_helpers import COMMAND, environment, shell, terminal
+from cli_helpers import COMMAND, environment, shell
 from helpers import quick
 
 import kahanmaps as km
@@ -123,12 +123,6 @@ def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
     assert not Path("study.db").exists()
 
 
-def test_a_dry_run_with_a_database_says_what_is_missing(batch, space):
-    wider = SPACE.replace("0..2", "0..4")
-    assert batch("run", wider, "--dry-run").out.endswith("10 tasks, 4 of them without result\n")
-    assert batch("run", wider, "--dry-run --db study.db --json").json["missing"] == 4
-
-
 def test_all_mistakes_of_a_spec_are_told_and_nothing_is_begun(batch):
     done = batch("run", SPACE.replace("family-space", "familyspace").replace('system = "family"', "sistem = 1"))
     assert done.status == 2
@@ -199,19 +193,6 @@ def test_export_writes_a_table_or_lines_to_a_file_or_out(batch, space):
     assert "seconds" not in records[1]
 
 
-def test_a_summary_groups_and_counts(batch, space):
-    rows = batch("summary --db study.db --by m --value dimension --stable").rows
-    assert rows[:3] == [["m", "tasks", "ok"], ["2", "3", "3"], ["3", "3", "3"]]
-    assert ["3", "dimension", "3", "yes", *["12"] * 5] in rows
-    data = batch("summary --db study.db --by m --json --stable").json
-    assert data["groups"][1]["numbers"]["dimension"] == {
-        "n": 3,
-        "same": True,
-        **dict.fromkeys(("min", "p5", "p25", "median", "p75", "p95", "max"), 12),
-    }
-    assert batch("summary --db study.db --by m --markdown").out.startswith("| m | tasks | ok |\n| --- | ---: | ---: |")
-
-
 def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
     from kahanmaps.experiments.results.records import Outcome as Word
     from kahanmaps.experiments.results.records import Record, Task, TaskLimits
@@ -232,13 +213,6 @@ def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept
     (told,) = batch("merge one.db two.db --json -q").json["merged"]
     assert (told["conflicts"], told["conflicting"]) == (1, [task.key])
     assert batch("merge one.db one.db").status == 2
-
-
-def test_on_a_terminal_there_are_tables(batch, space):
-    for words in (["status"], ["summary", "--by", "m"]):
-        shown = terminal("batch", *words, "--db", "study.db", NO_COLOR="1")
-        assert "━" in shown.out
-        assert max(len(re.sub(r"\x1b\[[0-9;]*m", "", line)) for line in shown.out.splitlines()) <= 80
 
 
 @pytest.fixture
@@ -359,17 +333,6 @@ def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch
     assert re.match("Error: study.db .*(disk|space|too large)", done.err), done.err
     if blocks:
         assert batch("run", SPACE, "-q", "-j", "1").status == 0
-
-
-@pytest.mark.usefixtures("space")
-def test_two_batches_do_not_write_to_one_database(batch):
-    from kahanmaps.experiments.results.store import Store
-
-    with Store.open("study.db"):
-        done = batch("run study.toml")
-        assert done.status == 2
-        assert "another batch is writing to study.db" in done.err
-        assert batch("status --db study.db").status == 0  # looking is allowed
 
 
 def test_bad_files_are_skipped_with_a_list(kahanmaps, tmp_path, monkeypatch):

@@ -23,13 +23,6 @@ def image(kahanmaps, system, point, eps):
 # Doing it again
 
 
-def test_the_seed_draws_the_start(kahanmaps):
-    first, second, third = (
-        kahanmaps(f"check-integrals euler_top --seed {seed} --json").json["orbit"]["start"] for seed in (1, 2, 1)
-    )
-    assert first == third != second
-
-
 def test_a_witness_of_an_integral_is_verified_by_an_orbit(kahanmaps):
     claim = claims(kahanmaps("check-integrals euler_top --integral s=x1-x2/3 --json").json)["s is conserved"]
     witness = claim["witness"]
@@ -84,6 +77,3 @@ def test_integrals_of_the_command_line_are_checked_first_and_those_known_where_t
     signs = {"refuted": "-", "proved": ""}
     told = [signs[one["verdict"]] + one["claim"].removesuffix(" is conserved") for one in report["claims"]]
     assert told == expected.split()
-
-
-# For people

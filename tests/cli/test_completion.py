@@ -64,11 +64,6 @@ def test_commands_are_offered(offered):
     assert offered("kahanmaps check-i") == ["check-integrals"]
 
 
-def test_systems_of_the_catalogue_are_offered(offered, tmp_path):
-    assert offered("kahanmaps analyze ", tmp_path) == list(names())
-    assert offered("kahanmaps check-commute euler_top lore", tmp_path) == ["lorenz"]
-
-
 def test_system_files_and_folders_are_offered_and_no_other_file(offered, folder):
     assert offered("kahanmaps orbit m", folder) == ["mine/", "my-top.toml"]
     assert offered("kahanmaps orbit n", folder) == [name for name in names() if name.startswith("n")]

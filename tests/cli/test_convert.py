@@ -1,14 +1,5 @@
 """kahanmaps convert: a whole file on standard output or in a file, and what was wrong where there is none."""
 
-from kahanmaps.documents.catalog import load
-from kahanmaps.languages.convert import convert
-
-
-def test_the_library_writes_the_same_file(kahanmaps):
-    outcome = kahanmaps("convert euler_top --to maple --what map,inverse")
-    command = "kahanmaps convert euler_top --to maple --what map,inverse"
-    assert outcome.out == convert(load("euler_top"), "maple", ["map", "inverse"], command=command)
-
 
 def test_the_command_in_the_comment_makes_the_same_file_again(kahanmaps):
     line = "convert --vars=I,y --rhs=I*y --rhs='-2/3*I^2' --to pari --what map,jacobian --name two"
@@ -25,12 +16,6 @@ def test_an_inline_system_becomes_a_system_file(kahanmaps, tmp_path):
     assert kahanmaps("orbit", path, start).out == kahanmaps(f"orbit {system} {start}").out
     assert kahanmaps("convert", path, "--to toml").out == path.read_text()
     assert kahanmaps("convert", path, "--to toml -p a=1").out != path.read_text()
-
-
-def test_parts_may_be_repeated_or_separated_by_commas(kahanmaps):
-    one = kahanmaps("convert euler_top --to julia --what map,density").out
-    two = kahanmaps("convert euler_top --to julia --what density --what map").out
-    assert one.split("\n\n")[1:] == two.split("\n\n")[1:]
 
 
 def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path):

@@ -16,8 +16,6 @@ import numpy as np
 import pytest
 from cli_helpers import COMMAND
 
-from kahanmaps_cli.runs import ensemble_starts
-
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
 
 
@@ -70,14 +68,6 @@ def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
         "h/(1 + eps^2 D) at t = 1",
     ]
     assert generic["drift"] == []
-
-
-# The summary
-
-
-def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps):
-    drift = kahanmaps(f"{TOP} --random 3 --steps 10 --backward --integral e=eps --json").json["drift"][0]
-    assert (drift["initial"], drift["largest"]) == (0.1, 0)
 
 
 # The file
@@ -164,27 +154,6 @@ def test_starts_are_not_awaited_from_a_pipe_that_nobody_may_write_to(kahanmaps, 
     outcome = kahanmaps(f"{TOP} --steps 1 --starts", tmp_path / "s")
     assert (outcome.status, outcome.out) == (2, "")
     assert "it is a pipe or a device, expected a file" in outcome.err
-
-
-def test_text_and_numbers_are_bounded(kahanmaps, tmp_path, monkeypatch):
-    path = tmp_path / "s.txt"
-    path.write_text("1,2,3\n" * 10)
-    monkeypatch.setattr(ensemble_starts, "MAX_NUMBERS", 25)
-    assert "s.txt:9: found more than 25 numbers" in kahanmaps(f"{TOP} --steps 1 --starts", path).err
-    monkeypatch.setattr(ensemble_starts, "MAX_TEXT_BYTES", 50)
-    assert "found more than 50 bytes of text" in kahanmaps(f"{TOP} --steps 1 --starts", path).err
-    monkeypatch.setattr(ensemble_starts, "MAX_NPY_BYTES", 20)
-    np.save(tmp_path / "s.npy", np.ones((1, 3)))
-    assert kahanmaps(f"{TOP} --steps 1 --starts", tmp_path / "s.npy").status == 2
-
-
-def test_a_normal_form_in_coordinates_of_its_own_is_for_single_orbits(kahanmaps, tmp_path):
-    path = tmp_path / "scaled.toml"
-    path.write_text('variables = ["x", "y"]\n[hamiltonian]\nH = "x^3/3 + x*y^2"\nJ = [["0", "3"], ["-3", "0"]]\n')
-    command = ("ensemble", path, "--random 3 --steps 5 --eps 1/10 --kernel numpy")
-    assert kahanmaps(*command, "--json").json["method"] == "generic"
-    outcome = kahanmaps(*command, "--method normal-form")
-    assert (outcome.status, "J = [[0, I], [-I, 0]] only" in outcome.err) == (2, True)
 
 
 def test_integrals_may_contain_an_algebraic_parameter(kahanmaps, tmp_path):

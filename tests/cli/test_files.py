@@ -17,11 +17,9 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import pytest
 from cli_helpers import COMMAND
-from command_tree import all_commands
 from helpers import table
 from small_databases import ok, planned
 
@@ -30,10 +28,6 @@ from kahanmaps.plots.growth import curves_of_record, degrees_of_record
 from kahanmaps_cli.main import main
 from kahanmaps_cli.pictures.growth import read_record
 from kahanmaps_cli.runs.ensemble_starts import read_starts
-
-needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
-
-ORBIT = "--start 1,2 --eps 1/10 --steps 1"
 
 # Commands with -o: the ending of their files, and a line for each way to hand them a file, by the option or argument.
 READS = {
@@ -49,7 +43,6 @@ CONTENT = {
     "database": "study.db",
 }
 CASES = [(words, name) for words, (_, lines) in READS.items() for name in lines]
-COMMANDS = {words: command for words, command in all_commands() if not isinstance(command, click.Group)}
 
 
 @pytest.fixture(scope="module")
@@ -208,21 +201,3 @@ def test_an_orbit_ends_early_when_its_reader_leaves(unread):
 def source_of(words: str, name: str) -> str:
     """The file that an option or argument of a command can take."""
     return CONTENT.get(name, "member.toml" if words == "plot invariant-curves" else "system.toml")
-
-
-def line_to(words: str, target: str) -> str:
-    """A line that writes to a file, from the first of the inputs that the command takes."""
-    lines = READS[words][1]
-    name = next(iter(lines), "")
-    line = lines[name].replace("IN", source_of(words, name)) if lines else "family new --m 1"
-    return f"{line} -o {target}"
-
-
-@needs_full_device
-@pytest.mark.slow
-@pytest.mark.parametrize("words", READS)
-def test_a_full_device_gives_3_and_is_named(kahanmaps, given, words):
-    full = Path("full" + READS[words][0])
-    full.symlink_to("/dev/full")
-    outcome = kahanmaps(line_to(words, str(full)))
-    assert (outcome.status, outcome.err.splitlines()[-1]) == (3, f"Error: No space left on device: {full}")

@@ -102,15 +102,6 @@ def test_the_commuting_systems_of_a_member_that_does_not_say_so_can_be_pasted(ka
 # JSON
 
 
-def test_integrals_of_the_flow(kahanmaps):
-    lines = kahanmaps("find-integrals henon_heiles --flow --max-degree 3 -q").out.splitlines()
-    assert lines[0] == "find-integrals: henon_heiles, the flow x' = f(x)"
-    assert lines[1].startswith("F1\tproved\t6*q1^2*q2 - 2*q2^3")
-    record = kahanmaps("find-integrals euler_top --flow --json -q").json
-    assert record["flow"] is True
-    assert [one["combination"] for one in record["beside_map"]["limits"]] == ["I1", "I2"]
-
-
 def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps):
     words = "find-integrals lorenz -p b=20 --flow --darboux 2"
     assert kahanmaps(words).out.splitlines() == [
@@ -144,13 +135,3 @@ def test_a_hirota_kimura_basis_may_contain_images(kahanmaps):
     assert (basis["dimension"], basis["functions"]) == (1, ["q*p~", "p*q~", "q^2", "p^2"])
     none = kahanmaps("find-integrals lorenz --monomials 'x*y~,y*x~,1' --json").json["bases"][0]
     assert none["dimension"] == 0
-
-
-def test_commuting_systems_that_stay_open_give_3(kahanmaps):
-    command = "find-commuting --vars a,b,c,d --rhs a^2 --rhs 0 --rhs 0 --rhs 0 --shape quadratic"
-    outcome = kahanmaps(command)
-    assert outcome.status == 3
-    assert "# undecided: there may be more; the fields g with [f, g] = 0 have dimension 31" in outcome.out
-    assert "undecided: the fields g with [f, g] = 0 have dimension 31" in outcome.err
-    quiet = kahanmaps(command, "-q --json")
-    assert (quiet.status, quiet.err, quiet.json["status"], quiet.json["verdict"]) == (3, "", "undecided", "undecided")

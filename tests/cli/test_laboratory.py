@@ -1,7 +1,7 @@
 """kahanmaps degrees, singularities, cycles, lyapunov, heights: what they print as text and JSON, exit statuses."""
 
 import pytest
-from cli_helpers import terminal, time_is_over
+from cli_helpers import time_is_over
 
 from kahanmaps.algebra.work import Budget, count
 from kahanmaps.documents.catalog import load
@@ -10,7 +10,6 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.laboratory.cycles import _ProjectiveMap, cycle_census
 from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.version import __version__
 
 # degrees
 
@@ -40,33 +39,6 @@ def test_the_degrees_of_the_euler_top(kahanmaps):
     ]
 
 
-def test_generic_eps_is_told_as_such(kahanmaps):
-    found = kahanmaps("degrees weierstrass --terms 3 --json").json
-    assert (found["eps"], found["time_step"]) == ("generic", "generic")
-    assert found["lines"][0]["eps_residue"] != found["lines"][1]["eps_residue"]
-
-
-# singularities
-
-
-def test_two_eps_and_the_symbolic_denominator_by_default(kahanmaps):
-    found = kahanmaps("singularities euler_top --json").json
-    assert (found["command"], found["version"], found["verdict"]) == ("singularities", __version__, "confined")
-    assert len({run["eps"] for run in found["runs"]}) == 2
-    assert len(found["symbolic_denominator"]) == 1
-    for run in found["runs"]:
-        assert run["critical_degree"] == 8
-        for hypersurface in run["hypersurfaces"]:
-            assert len(hypersurface["ranks"]) == 12
-            assert len(set(hypersurface["primes"])) == 2
-    assert found["document"]["system"]
-
-
-def test_long_polynomials_are_shortened_on_a_terminal_only(kahanmaps):
-    assert "chars)" in terminal("singularities", "lorenz", "--eps", "1/7", "--steps", "2").out
-    assert "chars)" not in kahanmaps("singularities lorenz --eps 1/7 --steps 2").out
-
-
 # cycles
 
 
@@ -78,21 +50,6 @@ def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
     counts = f"indeterminate\t{census.indeterminate}\npre-indeterminate\t{census.pre_indeterminate}\n"
     assert f"{counts}preperiodic\t0\nperiodic\t{census.periodic}\n" in outcome.out
     assert f"cycles\t{census.cycles}, longest {census.longest}\n" in outcome.out
-
-
-def test_samples(kahanmaps):
-    found = kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
-    (run,) = found["runs"]
-    assert (run["complete"], run["looked_at"], run["open"]) == (False, 40, 0)
-    assert run["cycles"] is None
-    assert found == kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
-
-
-def test_no_law_refuses_an_integrable_map_that_exchanges_levels(kahanmaps):
-    first = "(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)"
-    outcome = kahanmaps(f"cycles --vars x,y --image '{first}; (x^2-y)/(x^2*y+1)' --prime 47")
-    assert "longest 114" in outcome.out
-    assert "compatible" not in outcome.out
 
 
 @pytest.mark.parametrize("form", ["", "--json"])

@@ -60,27 +60,9 @@ def test_commands_go_through_the_factors(kahanmaps, word, name, line):
         assert record["densities"]
 
 
-def test_singularities_are_told_by_random_points(kahanmaps, word):
-    found = kahanmaps(f"singularities {word('four')} --eps 1/3 --steps 4 --json -q")
-    record = json.loads(found.out)
-    (run,) = record["runs"]
-    assert (run["denominator"], run["map_degree"], run["critical_degree"]) == ("?", 39, None)
-    assert {h["status"] for h in run["hypersurfaces"]} >= {"confined"}
-
-
 @pytest.mark.parametrize("line", ["systems {} --latex", "convert {} --to sympy", "convert {} --to c"])
 def test_formulas_are_refused_in_one_line(kahanmaps, word, line):
     found = kahanmaps(line.format(word("ten letters")))
     assert found.status == 2
     (error,) = found.err.strip().splitlines()
     assert "formulas are too large to be multiplied out" in error
-
-
-def test_what_is_preserved_for_all_values_of_a_shared_symbol(kahanmaps, tmp_path):
-    path = tmp_path / "shared.toml"
-    part = '{{ system = "lyness", power = {}, parameters = {{ a = "a" }} }}'
-    path.write_text(f"parameters.a = 3\n[composition]\nof = [{part.format(1)}, {part.format(2)}]")
-    found = kahanmaps(f"find-integrals {path} --symbolic a --json -q")
-    record = json.loads(found.out)
-    assert (record["symbols"], [one["verdict"] for one in record["integrals"]]) == (["a"], ["proved"])
-    assert "x*a" in record["integrals"][0]["integral"]

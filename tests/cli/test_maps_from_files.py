@@ -12,7 +12,6 @@ from kahanmaps.maps.convention import NO_EPS
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]
-HEAD = 'variables = ["x", "y"]\n'
 
 
 @pytest.mark.parametrize(
@@ -35,13 +34,6 @@ def test_a_map_with_eps_needs_it_and_one_without_does_not(kahanmaps):
         return kahanmaps(f"orbit {EXAMPLES[NAMES.index(name)]} --start 1/2,1/3 --steps 1 {eps} -q").status
 
     assert [status("mcmillan"), status("symplectic-euler"), status("symplectic-euler", "--eps 1/9")] == [0, 2, 0]
-
-
-def test_backward_steps_find_the_inverse(kahanmaps, tmp_path):
-    path = tmp_path / "henon.toml"
-    path.write_text(HEAD + '[map]\nimage = ["y", "x + y^2"]')
-    found = kahanmaps(f"orbit {path} --start 1,2 --steps 1 --backward")
-    assert (found.status, found.out.splitlines()[3]) == (0, "1\t1\t1")
 
 
 # Of maps without eps and with it; what takes long, of the first.
@@ -74,19 +66,6 @@ def test_what_is_found_out_about_any_map(kahanmaps, name, command):
         assert record["convention"] == NO_EPS
     plain = kahanmaps(f"{command} {path} -q").out
     assert bool(re.search(r"\beps\b", plain)) == file.map.has_eps
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "plot heights lyness --steps 12 -o {}",
-        "plot portrait lotka_volterra_symplectic_euler --eps 1/20 --random 3 --steps 30 -o {}",
-    ],
-)
-def test_pictures_of_maps(kahanmaps, tmp_path, command):
-    output = tmp_path / "picture.svg"
-    assert kahanmaps(f"{command.format(output)} -q").status == 0
-    assert output.stat().st_size > 5000
 
 
 @pytest.mark.parametrize(

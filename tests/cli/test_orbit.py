@@ -5,15 +5,11 @@ what happened.
 """
 
 import csv
-import io
 import json
-import re
 import shlex
 import signal
 import subprocess
 import time
-from fractions import Fraction
-from threading import Event
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,7 +17,6 @@ import pytest
 from cli_helpers import COMMAND, shell, terminal
 
 from kahanmaps.version import __version__
-from kahanmaps_cli.screen.progress import Progress
 
 TOP = "orbit euler_top --start 1,1/2,-1/3 --eps 1/10"
 LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
@@ -46,13 +41,6 @@ def test_a_start_and_parameters_may_be_written_as_people_paste_them(kahanmaps):
     for start in ("'[1,-1/2]'", "'1 -1/2'", "'(1, -1/2)'"):
         line = f"orbit 'x_dot = a*x - x*y; y_dot = x*y - b*y' -p a=2,b=1/3 --start {start} {rest}"
         assert kahanmaps(line).out == plain.out
-
-
-def test_a_name_that_was_made_is_said_unless_quiet(kahanmaps):
-    line = "orbit \"x'' = x^2\" --start 1,2 --eps 1/10 --steps 1"
-    note = "x'' is read with a velocity, the variable vx: x' = vx\n"
-    assert kahanmaps(line).err == note
-    assert kahanmaps(f"{line} -q").err == ""
 
 
 def test_a_file_of_xpp_is_a_system(kahanmaps, tmp_path):
@@ -94,16 +82,6 @@ def test_an_orbit_can_be_made_again_from_its_header(kahanmaps, arithmetic):
     words += ["--arithmetic", header["arithmetic"], f"--{header['direction']}", "--format", "jsonl"]
     again = kahanmaps(shlex.join(words))
     assert again.records[1:] == first.records[1:]
-
-
-# Points
-
-
-@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:80"])
-def test_integrals_have_values_where_the_map_does_not_depend_on_eps(kahanmaps, arithmetic):
-    lyness = "orbit --vars x,y --image 'y; (3 + y)/x' --start 1,2 --steps 3 --integral x*y --arithmetic"
-    found = [record["integrals"]["x*y"] for record in kahanmaps(f"{lyness} {arithmetic} --format jsonl").records[1:-1]]
-    assert [float(Fraction(text.strip("[]"))) for text in found[:3]] == [2, 10, 20]
 
 
 # Where the system comes from
@@ -169,37 +147,12 @@ def test_npz_holds_residues_as_integers(npz, kahanmaps, prime):
     assert found.x.tolist() == kahanmaps(f"{command} --format jsonl").points
 
 
-def test_npz_holds_header_and_end(npz, kahanmaps):
-    command = f"{TOP} --steps 3 --integral F1"
-    found = npz(command)
-    records = kahanmaps(f"{command} --format jsonl").records
-    assert found.meta == {
-        "header": {key: value for key, value in records[0].items() if key != "record"},
-        "columns": ["x1", "x2", "x3"],
-        "integrals": ["F1"],
-        "end": {key: value for key, value in records[-1].items() if key != "record"},
-    }
-
-
 def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monkeypatch):
     monkeypatch.setattr("kahanmaps.maps.orbits.writers.MAX_PADDED_BYTES", 1000)
     found = npz(f"{TOP} --steps 20")
     assert (found.status, found.meta["end"]["status"]) == (3, "budget")
     assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))
     assert 1 < len(found.x) < 20
-
-
-# Files
-
-
-def test_what_a_csv_file_is_of_stands_beside_it(kahanmaps, tmp_path):
-    path = tmp_path / "orbit.CSV"
-    kahanmaps(f"{TOP} --steps 2 -o", path)
-    header, *points, end = kahanmaps(f"{TOP} --steps 2 --format jsonl").records
-    told = json.loads((tmp_path / "orbit.CSV.meta.json").read_text())
-    assert {"record": "header", **told["header"]} == header
-    assert {"record": "end", **told["end"]} == end
-    assert len(path.read_text().splitlines()) == 1 + len(points)
 
 
 # Talk
@@ -212,52 +165,7 @@ def test_progress_goes_to_standard_error_only(kahanmaps, slow_clock):
     assert "step 3 of 3" not in outcome.out
 
 
-def test_progress_on_a_terminal_is_one_line_that_goes_away(monkeypatch, slow_clock):
-    screen = io.StringIO()
-    screen.isatty = lambda: True
-    monkeypatch.setattr("sys.stderr", screen)
-    with Progress() as progress:
-        progress("step 9 of 10")
-        progress("step 10 of 10")
-    blank = " " * len("step 10 of 10 (20 s)")
-    assert screen.getvalue() == f"\rstep 9 of 10 (10 s)\rstep 10 of 10 (20 s)\r{blank}\r"
-
-
-class Hasty(Event):
-    """Whose seconds are hundredths."""
-
-    def wait(self, timeout: float | None = None) -> bool:
-        return super().wait(None if timeout is None else timeout / 100)
-
-
-def test_the_clock_on_a_terminal_moves_by_itself_until_the_end(monkeypatch, slow_clock):
-    screen = io.StringIO()
-    screen.isatty = lambda: True
-    monkeypatch.setattr("sys.stderr", screen)
-    monkeypatch.setattr("kahanmaps_cli.screen.progress.Event", Hasty)
-    with Progress() as progress:
-        progress("a long step")
-        while "(30 s)" not in screen.getvalue():
-            time.sleep(0.01)
-        progress.clear()
-        cleared = screen.getvalue()
-        time.sleep(0.05)
-    assert re.findall(r"a long step \((\d+) s\)", cleared)[:3] == ["10", "20", "30"]
-    assert screen.getvalue() == cleared
-
-
 # Terminals
-
-
-@pytest.fixture(scope="module")
-def on_terminal():
-    """An orbit with long numbers, printed on a terminal 100 columns wide."""
-    return terminal(*shlex.split(f"{TOP} --steps 5"), columns=100)
-
-
-def test_long_numbers_are_shortened_on_a_terminal(on_terminal):
-    assert "(72/72 digits)" in on_terminal.out
-    assert max(len(line) for line in on_terminal.out.splitlines()) <= 100
 
 
 def test_npz_is_refused_on_a_terminal():
@@ -290,7 +198,6 @@ def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
 
 
 MEMBER = "orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10"
-IRREDUCIBLE = "orbit paper_m3_irreducible --start 1,2,3,4,5,6 --eps 1/10"
 
 
 def points(run) -> list:
@@ -368,8 +275,3 @@ def test_json_has_the_points_of_jsonl(kahanmaps):
     assert whole.pop("points") == [{k: v for k, v in one.items() if k != "record"} for one in points]
     assert {"record": "end", **whole.pop("end")} == end
     assert {"record": "header", **whole} == header
-
-
-def test_integers_may_have_an_exponent(kahanmaps):
-    assert kahanmaps(f"{LV[:-1]}3e0 -q").out == kahanmaps(f"{LV} -q").out
-    assert kahanmaps(f"{LV[:-1]}1.2e1 -q").out.splitlines()[-1] == "# completed: 12 steps"

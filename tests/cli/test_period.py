@@ -64,8 +64,3 @@ def test_recognised_members_have_periods(kahanmaps):
     hidden = kahanmaps(f"period {command}").json
     assert hidden["structure"].startswith("a recognised member")
     assert hidden["period"] == kahanmaps(f"period {M3} --arithmetic mod:10007 --json").json["period"]
-
-
-def test_a_prime_that_the_coordinates_of_the_normal_form_do_not_have_is_refused(kahanmaps, scaled):
-    outcome = kahanmaps("period", scaled, "--start 1,2 --eps 1 --arithmetic mod:3")
-    assert (outcome.status, "the prime 3 divides" in outcome.err) == (2, True)

@@ -14,14 +14,6 @@ def piped(monkeypatch):
     return lambda text: monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
 
 
-def test_several_systems_are_one_picture(kahanmaps, tmp_path):
-    target = tmp_path / "d.svg"
-    done = kahanmaps("plot degrees euler_top harmonic --size 8.6x7 -o", target)
-    assert done.status == 0
-    assert done.err.startswith(f"{target}: 8.6 x 7.0 cm")
-    assert target.read_bytes().startswith(b"<?xml")
-
-
 def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
     first, second = tmp_path / "a.png", tmp_path / "b.png"
     record = kahanmaps("degrees euler_top --json").out
@@ -43,10 +35,3 @@ def test_a_record_of_a_survey_that_was_not_whole_is_told(kahanmaps, tmp_path):
     (tmp_path / "r.json").write_text(json.dumps({**record, "whole": False}))
     done = kahanmaps("plot heights -o - --format svg --from", tmp_path / "r.json")
     assert (done.status, "stopped early" in done.err) == (3, True)
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_an_algebraic_parameter_is_rounded(kahanmaps):
-    line = "plot drift euler_top --eps 1/20 --steps 9 --start 1,1,1 -o - --format svg -p"
-    done, near = (kahanmaps(line, f"'a1={a}'") for a in ("root of t^2 - 2 near 1.4", "1.4142135623730950488"))
-    assert (done.status, done.err) == (near.status, near.err) == (0, near.err)

@@ -27,15 +27,6 @@ def drawn(monkeypatch):
     return seen
 
 
-def test_a_long_title_is_set_in_lines_and_no_formula(kahanmaps, monkeypatch):
-    titles = []
-    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda figure, *_: titles.append(figure) or b"")
-    kahanmaps(LV + " --size 8 --title", "'" + "costs $5 " * 12 + "'")
-    first, _, third = titles[0].get_suptitle().split("\n")
-    assert first.startswith(r"costs \$5 costs \$5")
-    assert third
-
-
 def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn):
     line = f"{PLOT} lotka_volterra --eps 1/20 --steps 30 --flow -p"
     assert kahanmaps(line, "a=1.4142135623730951").status == kahanmaps(line, "'a=root of t^2 - 2 near 1.4'").status == 0
@@ -68,17 +59,6 @@ def test_starts_come_from_a_file_or_at_random(kahanmaps, drawn, tmp_path):
     kahanmaps(f"{PLOT} harmonic --eps 1/20 --steps 0 --random 5 --box 2 --seed 3")
     assert drawn[0][0].points[0].tolist() == [[1, 2], [1, 3]]
     assert drawn[1][0].points.shape == (1, 5, 2)
-
-
-def test_of_more_than_two_variables_the_axes_are_chosen_and_said(kahanmaps, drawn):
-    outcome = kahanmaps(f"{PLOT} euler_top --eps 1/10 --start 1,1/2,1/3 --steps 50")
-    assert "axes x1, x2" in outcome.err or "axes x1, x3" in outcome.err or "axes x2, x3" in outcome.err
-    assert len(drawn[0][0].labels) == 2
-
-
-def test_a_plane_over_the_step_has_no_arrows(kahanmaps, drawn):
-    assert kahanmaps(LV + " --axes x,y,step").status == kahanmaps(LV).status == 0
-    assert [len(portrait.flow.places) > 0 for portrait, _ in drawn] == [False, True]
 
 
 def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, drawn):

@@ -18,37 +18,12 @@ def test_a_page_on_standard_output_is_all_there_is_and_equations_are_its_title(o
     assert page.headings[0] == (1, "x' = x*y, y' = -x^2")
 
 
-def test_a_file_is_written_and_told(kahanmaps, tmp_path):
-    path = tmp_path / "page.html"
-    outcome = kahanmaps("report harmonic --from checks --no-pictures -o", path)
-    assert (outcome.status, outcome.out) == (0, "")
-    assert outcome.err == f"{path}: {path.stat().st_size} bytes\n"
-    require_sound(path.read_text())
-
-
-def test_a_title_parameters_and_eps_are_taken_over(kahanmaps):
-    page = require_sound(
-        kahanmaps("report lotka_volterra -p a=2 --eps 1/10 --from checks --no-pictures --title 'My map'").out
-    )
-    assert page.headings[0] == (1, "My map")
-    assert "a = 2" in page.text
-    assert "eps = 1/10 (time step 2 eps = 1/5)" in page.text
-
-
 def test_the_paper_for_a_member_drawn_and_given(kahanmaps, pair):
     drawn = kahanmaps("report --from verify --m 1 --section 6 --no-pictures")
     assert drawn.status == 0
     assert "section-6" in require_sound(drawn.out).ids
     given = kahanmaps("report", pair, "--from verify --section 6 --no-pictures")
     assert "pair, every eps" in require_sound(given.out).text
-
-
-def test_the_checks_that_apply(kahanmaps):
-    outcome = kahanmaps("report euler_top --from checks --no-pictures")
-    page = require_sound(outcome.out)
-    assert outcome.status == 0
-    assert {"check-integrals", "check-measure"} <= set(page.ids)
-    assert "check-poisson does not apply" in page.text
 
 
 def test_a_refuted_claim_gives_status_1_and_a_page_all_the_same(kahanmaps, tmp_path):

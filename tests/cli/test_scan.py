@@ -103,24 +103,3 @@ def test_ctrl_c_ends_it_with_what_was_seen(kahanmaps, monkeypatch):
     assert outcome.out.splitlines()[1:3] == ["slow\t2, 3\t1 members modulo 11", "slow\t2, 3\t1 members modulo 13"]
     assert re.match("open\t.* members modulo 17", outcome.out.splitlines()[-1])
     assert outcome.err.startswith("stopped early: interrupted before members modulo 17")
-
-
-def test_the_budget_may_be_spent(kahanmaps):
-    outcome = kahanmaps(f"scan {QUICK} --effort -20")
-    assert outcome.status == 3
-    assert outcome.out.splitlines()[-1].startswith("open\t")
-    assert outcome.err.startswith("stopped early: the budget was spent (--effort) before ")
-
-
-def test_a_picture_needs_two_parameters_and_something_to_draw(kahanmaps, tmp_path, monkeypatch):
-    with monkeypatch.context() as patched:
-        patched.setattr("kahanmaps.laboratory.scan.scan.scan", lambda *_, **__: pytest.fail("it was scanned"))
-        outcome = kahanmaps(f"plot scan {QUICK} -o {tmp_path}/one.svg")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert "expected two parameters: a plane is drawn" in outcome.err
-    for more in ("", "--modulo 53"):
-        command = f"plot scan zhukovski_volterra_2 --over b1,b2 --effort -20 {more} -o {tmp_path}/none.svg"
-        outcome = kahanmaps(command)
-        assert outcome.status == 3
-        assert "there is no picture: nothing to be drawn was found" in outcome.err
-    assert not list(tmp_path.iterdir())

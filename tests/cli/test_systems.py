@@ -6,9 +6,6 @@ from kahanmaps.documents import catalog
 from kahanmaps.documents.files import parse_system
 from kahanmaps.maps.kahan import Kahan
 
-over_names = pytest.mark.parametrize("name", ["euler_top", "paper_m2", "planar_cubic_hamiltonian"])
-
-
 # The list
 
 
@@ -30,17 +27,6 @@ def test_a_map_is_shown_as_text_latex_and_data(kahanmaps, name):
 
 
 # One system
-
-
-@over_names
-def test_a_system_is_shown_with_equations_facts_and_sources(kahanmaps, name):
-    shown = kahanmaps("systems", name)
-    file = catalog.load(name)
-    assert shown.status == 0
-    assert shown.out.startswith(f"{name}: {file.catalog['title']}\n")
-    assert str(file.system) in shown.out
-    assert all(f"* {fact}" in shown.out for fact in file.catalog["facts"])
-    assert shown.out.count("source: ") == len(file.catalog["sources"])
 
 
 @pytest.mark.parametrize("name", ["euler_top", "paper_m2", "lv(5,1)"])

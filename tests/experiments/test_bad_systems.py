@@ -55,12 +55,6 @@ def test_they_are_left_out_where_that_is_asked_for(spec, text, skip_bad):
     assert all("1 mistake" in reason for _, reason in experiment.skipped)
 
 
-def test_without_bad_files_the_tasks_are_those_without_the_option(spec):
-    text = ORBITS.replace('"members/*.toml"', '["members/a.toml", "members/d.toml"]')
-    strict, lenient = (read_spec(spec(text), skip_bad=skip).experiments[0] for skip in (False, True))
-    assert (lenient.definition, lenient.skipped) == (strict.definition, ())
-
-
 def test_a_system_of_the_wrong_kind_for_the_task_is_left_out_too(spec):
     text = SPEC.format(task="family-space", system='["members/a.toml", "paper_m2"]', options="")
     [experiment] = read_spec(spec(text), skip_bad=True).experiments
@@ -80,17 +74,6 @@ def test_a_file_that_says_the_same_as_another_is_named_with_it_or_left_out(spec,
     assert experiment.skipped == (("members/copy/a.toml", told),)
 
 
-def test_at_least_one_system_has_to_be_left(spec):
-    text = ORBITS.replace('"members/*.toml"', '["members/b.toml", "members/c.toml"]')
-    with pytest.raises(SpecError, match="expected one at least"):
-        read_spec(spec(text), skip_bad=True)
-
-
-def test_another_word_is_a_mistake(spec):
-    with pytest.raises(SpecError, match='found \'ignore\', expected "refuse" or "skip"'):
-        read_spec(spec('on_error = "ignore"\n' + ORBITS))
-
-
 def test_the_list_is_in_the_database_and_follows_the_plan(spec, tmp_path):
     path = spec(ORBITS)
     with Store.open(tmp_path / "a.db", create=True) as store:
@@ -103,15 +86,3 @@ def test_the_list_is_in_the_database_and_follows_the_plan(spec, tmp_path):
         with Store.open(tmp_path / "b.db", create=True) as other:
             other.merge(tmp_path / "a.db")
             assert other.status()[0].skipped == status.skipped
-
-
-def test_a_database_of_before_has_no_list(spec, tmp_path):
-    path = tmp_path / "a.db"
-    with Store.open(path, create=True) as store:
-        plan(read_spec(spec(ORBITS), skip_bad=True), store)
-        store._execute("DROP TABLE skipped")
-    with Store.open(path, readonly=True) as store:
-        assert store.status()[0].skipped == []
-    with Store.open(path) as store:  # makes the table
-        plan(read_spec(spec(ORBITS), skip_bad=True), store)
-        assert len(store.status()[0].skipped) == 2

@@ -211,17 +211,6 @@ def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
     ]
 
 
-# Groups
-
-
-# The mean of what the tasks say they took decides; here they say it without taking it.
-@pytest.mark.parametrize(("claim", "largest", "jobs"), [(0.5, 10, 60), (0.0, 200, 450)])
-def test_groups_grow_to_the_seconds_that_were_asked_for_and_to_200_jobs(workers, claim, largest, jobs):
-    records = done(workers, jobs_of(jobs, claim=claim))
-    assert max(record.result["jobs"] for record in records) in range(largest - 1, largest + 1)
-    assert sum(record.result["jobs"] == 1 for record in records) >= 2  # nothing is known of the first ones
-
-
 # Failures of a task
 
 
@@ -304,22 +293,6 @@ def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own
         workers.close()
     assert_exactly_once(records, jobs)
     assert all(record.is_ok for record in records)
-
-
-def test_workers_may_come_later_and_are_waited_for_aloud(own):
-    said = []
-    workers = own.workers(talk=said.append)
-    try:
-        (job,) = jobs_of(1)
-        workers.submit(job)
-        assert workers.wait(1.5) == []
-        assert said == [f"waiting for workers: the scheduler at {own.file} has none"]
-        own.worker(threads=3, nanny=False)
-        assert len(done(workers, [])) == 1
-        until(lambda: workers.wait(0.1) == [] and workers._threads == 3)
-        assert len(said) == 1
-    finally:
-        workers.close()
 
 
 def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own):

@@ -68,22 +68,6 @@ def test_what_is_no_database_of_results_is_refused_and_left_alone(path, make, to
     assert os.listdir(path.parent) == [path.name]
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [("folder/r.db", "there is no folder"), ("a" * 300, "File name too long"), ("a\0b", "cannot be opened")],
-)
-def test_a_place_where_no_file_can_be_made_is_named(path, name, told):
-    with pytest.raises(StoreError, match=told):
-        Store.open(path.parent / name, create=True)
-
-
-def test_an_empty_file_is_used_only_to_create(path):
-    path.touch()
-    with pytest.raises(StoreError, match="is empty"):
-        Store.open(path)
-    planned(path, 1)
-
-
 def test_a_store_that_is_closed_or_opened_to_be_read_refuses_to_write(path):
     planned(path, 1)
     with Store.open(path, readonly=True) as store:

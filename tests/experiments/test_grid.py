@@ -96,16 +96,6 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     assert [fraction(value) for value in found] == expected
 
 
-@pytest.mark.parametrize(
-    "values", [RationalRange.from_text("0..10 step 2"), read_values(STEPS, ["0..6 step 2", "8..10 step 2"])[0]]
-)
-def test_ranges_and_values_have_places_from_both_ends_and_slices(values):
-    assert (values[-1], values[4], values[1:3]) == (10, 8, [2, 4])
-    for index in (6, -7):
-        with pytest.raises(IndexError):
-            values[index]
-
-
 # Values of an option
 
 
@@ -174,12 +164,6 @@ def test_a_grid_is_the_product_of_its_axes_in_order(case):
     assert grid.size == len(expected)
     assert list(grid) == expected
     assert [grid[k] for k in range(grid.size)] == expected
-
-
-@pytest.mark.parametrize("index", [-1, 4])
-def test_there_is_nothing_outside_a_grid(index):
-    with pytest.raises(IndexError):
-        Grid({"a": [1, 2], "b": [3, 4]})[index]
 
 
 def test_a_huge_grid_is_not_enumerated():

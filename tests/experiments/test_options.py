@@ -13,9 +13,7 @@ from flint import fmpq, fmpq_poly
 from helpers import together
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments import registry
-from kahanmaps.experiments.options import FAMILY, VOCABULARY, Option, show
-from kahanmaps.experiments.registry import task_kinds
+from kahanmaps.experiments.options import FAMILY, VOCABULARY
 
 ALL = {**VOCABULARY, **FAMILY}
 
@@ -130,36 +128,3 @@ def test_whatever_is_written_is_read_or_refused_in_a_short_sentence(name, value)
     except InputError as error:
         assert len(str(error)) < 400  # noqa: PT017
         assert "\x1b" not in str(error)  # noqa: PT017
-
-
-# Showing and suggesting
-
-
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [
-        (True, "true"),
-        ("two", "'two'"),
-        ("\x1b[31m", r"'\x1b[31m'"),
-        (date(1979, 5, 27), "1979-05-27"),
-        ("x" * 100, "'" + "x" * 39 + "..." + "x" * 14 + "'"),
-    ],
-)
-def test_a_value_is_shown_as_a_spec_has_it_and_short(value, shown):
-    assert show(value) == shown
-
-
-# The vocabulary
-
-
-@together("option", ALL.values())
-def test_every_option_has_a_name_and_a_help(option: Option):
-    assert ALL[option.name] is option
-    assert option.help.strip()
-    assert len(option.help) <= 80
-
-
-@together("name", VOCABULARY)
-def test_every_option_of_the_vocabulary_is_used_by_a_task_of_the_library(name):
-    ours = [kind for kind in task_kinds().values() if kind.function.__module__ in registry.LIBRARY]
-    assert any(name in kind.options for kind in ours)

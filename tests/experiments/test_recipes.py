@@ -7,7 +7,6 @@ from flint import fmpq, fmpq_poly
 
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.errors import InputError
 from kahanmaps.experiments.options import FAMILY
 from kahanmaps.experiments.results.recipes import document_text, family_recipe, find_file, recipe_of, system_from
 from kahanmaps.experiments.results.records import canonical
@@ -52,19 +51,6 @@ def test_a_random_member_is_the_one_that_the_library_draws(values, member):
 def test_signs_pick_an_associated_system():
     plain, other = drawn(m=2, seed=1).member, drawn(m=2, seed=1, signs="1,-1").member
     assert (other.A, other.H, other.signs) == (plain.A, plain.H, (1, -1))
-
-
-def test_a_recipe_without_a_size_of_the_member_is_told():
-    with pytest.raises(InputError, match="a random member of the family needs m, eigenvalues or chi"):
-        system_from({"family": {"draw": "eigenvalues", "seed": 0}}, {}.__getitem__)
-
-
-def test_a_recipe_of_a_member_is_complete():
-    assert family_recipe({"m": 3, "eps": "1/10", "size": None}) == {
-        "family": {"draw": "eigenvalues", "size": 2, "m": 3, "seed": 0}
-    }
-    assert family_recipe({"m": 3, "draw": "generic"})["family"]["size"] == 1
-    assert family_recipe({"chi": "t^2 - 2"})["family"]["size"] == 1
 
 
 # Files

@@ -20,7 +20,6 @@ LIBRARY = (
     "orbit", "ensemble", "heights", "period", "degrees", "find-integrals", "find-density", "find-poisson",
     "find-symmetry", "find-commuting", "analyze", "singularities", "cycles", "lyapunov",
 )  # fmt: skip
-DOCUMENTATION = Path(__file__).parents[2] / "docs" / "batch.md"
 
 
 @pytest.fixture(autouse=True)
@@ -53,17 +52,6 @@ def f(seed: int = 0):
     '''Do it.'''
     return {"seed": seed}
 """
-
-
-@pytest.mark.parametrize("name", LIBRARY)
-def test_the_library_has_the_tasks_that_are_documented(name):
-    kind = task_kind(name)
-    assert kind.name == name
-    assert kind.summary[-1] in ".?"
-    assert 10 < len(kind.summary) <= 110
-    for key, default in kind.defaults.items():
-        assert default is None or kind.options[key].read(default) == default
-    assert f"`{name}`" in DOCUMENTATION.read_text(encoding="utf-8")
 
 
 def test_a_signature_says_what_a_task_can_be_asked():

@@ -7,9 +7,8 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from itertools import count, islice
+from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from small_databases import exported
@@ -151,38 +150,6 @@ def test_what_is_not_done_within_the_grace_is_given_up():
     batch.interrupt()
     assert not any(batch)
     assert batch.abandoned == 2
-
-
-def test_records_share_a_list_while_writing_takes_long(monkeypatch):
-    looks = count()
-    clock = SimpleNamespace(monotonic=lambda: slept + next(looks) * 1e-4)
-    monkeypatch.setattr("kahanmaps.experiments.running.run.time", clock)
-    batch, sizes, slept = iter(Batch(jobs(10**9), Scripted())), [], 0.0
-    for seconds in (0.02, 0.0, 0.0):
-        sizes.append(len(next(batch)))
-        slept += seconds
-    assert sizes[0] == 1  # nothing has been written yet
-    assert sizes[1] > 100
-    assert sizes[2] < sizes[1]
-
-
-@pytest.mark.usefixtures("_at_once")
-def test_jobs_are_taken_one_by_one_as_they_are_needed():
-    taken = 0
-
-    def endless() -> Iterator[Job]:
-        nonlocal taken
-        for job in jobs(10**9):
-            taken += 1
-            yield job
-
-    executor = Scripted()
-    batch = iter(Batch(endless(), executor))
-    assert len(list(islice(batch, 100))) == 100
-    assert taken < 110
-    assert executor.most == 3  # no more than it takes
-    batch.close()
-    assert executor.closed == 1
 
 
 @pytest.mark.parametrize(("kills", "last"), [(1, 40), pytest.param(50, 12_000, marks=pytest.mark.slow)])

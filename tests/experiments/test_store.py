@@ -75,15 +75,6 @@ def test_the_later_record_counts_but_no_failure_replaces_a_result(store, records
 # Plans
 
 
-def test_planning_counts_what_is_new_and_what_was_known(store):
-    assert store.plan("a", "1", LIMITS, tasks(1, 2, 2), {}) == Planned(total=3, known=0, new_tasks=2, dropped=0)
-    assert store.plan("b", "1", LIMITS, tasks(2, 3, 3, 4), {}) == Planned(total=4, known=1, new_tasks=2, dropped=0)
-    assert [(e.name, e.total, e.tasks, e.limits) for e in store.experiments()] == [
-        ("a", 3, 2, LIMITS),
-        ("b", 4, 3, LIMITS),
-    ]
-
-
 def test_the_same_definition_is_resumed_without_making_a_single_task(store):
     def never():
         raise AssertionError
@@ -168,27 +159,11 @@ def test_each_task_is_handed_out_once_whatever_is_added_meanwhile(store):
         assert (store.count_pending(), store.count_pending(retry_failed=True)) == (0, 7)
 
 
-def test_a_job_has_the_limits_of_the_experiment_that_it_comes_from(store):
-    store.plan("a", "1", TaskLimits(time=1), tasks(1), {})
-    store.plan("b", "1", TaskLimits(memory=7), tasks(1, 2), {})
-    assert [(seed(job.task), job.limits) for job in store.pending()] == [
-        (1, TaskLimits(time=1)),
-        (2, TaskLimits(memory=7)),
-    ]
-
-
-def test_an_unknown_experiment_is_named_with_those_there_are_before_anything_is_read(store):
-    store.plan("a", "1", LIMITS, tasks(1), {})
-    for ask in (store.pending, store.count_pending, store.rows):
-        with pytest.raises(StoreError, match="has no experiment c: it has a"):
-            ask(["a", "c"])
-
-
 numbers = st.integers(0, 12)
 plans = st.lists(st.lists(numbers, max_size=15), min_size=1, max_size=3)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(plans=plans, done=st.dictionaries(numbers, st.booleans()), parts=st.integers(1, 4), data=st.data())
 def test_pending_rows_and_status_agree_with_a_model(plans, done, parts, data):
     names = [f"e{place}" for place in range(len(plans))]
@@ -262,21 +237,6 @@ def contents(path: Path) -> list[object]:
         return [store.experiments(), list(store.rows(missing=True)), store.unplanned()]
 
 
-def test_a_merge_into_an_empty_database_is_a_copy(path):
-    source = path.with_name("source.db")
-    with Store.open(source, create=True) as store:
-        store.plan("a", "1", LIMITS, tasks(1, 2, 2, 3), {digest("d"): "d"})
-        store.plan("b", "2", TaskLimits(), tasks(3, 4), {})
-        store.add([ok(1), failed(3), ok(4)])
-        store.plan("b", "3", TaskLimits(), tasks(3), {})
-    with small_chunks(), Store.open(path, create=True) as store:
-        assert store.merge(source) == Merged(tasks=4, results=3, replaced=0, conflicts=0)
-        assert store.document(digest("d")) == "d"
-        assert store.unplanned() == 1
-        assert store.merge(source) == Merged(0, 0, 0, 0)
-    assert contents(path) == contents(source)
-
-
 MINE_AND_THEIRS = [
     (None, ok(1), ok(1), Merged(0, 1, 0, 0)),
     (ok(1), None, ok(1), Merged(0, 0, 0, 0)),
@@ -310,13 +270,6 @@ def test_attempts_come_along_and_do_not_grow_when_merged_again(path):
             assert [store.find(task(number).key)[0].attempts for number in (1, 2)] == [4, 2]
 
 
-def test_all_conflicts_are_counted_and_the_first_few_named(path):
-    source = planned(path.with_name("source.db"), *range(9), records=[ok(number, "1") for number in range(9)])
-    planned(path, *range(9), records=[ok(number, "2") for number in range(9)])
-    with Store.open(path) as store:
-        assert store.merge(source) == Merged(0, 0, 0, 9, tuple(task(number).key for number in range(5)))
-
-
 def test_an_experiment_defined_in_two_ways_stops_the_merge_and_nothing_is_changed(path):
     source = path.with_name("source.db")
     with Store.open(source, create=True) as store:
@@ -328,16 +281,6 @@ def test_an_experiment_defined_in_two_ways_stops_the_merge_and_nothing_is_change
     with Store.open(path) as store, pytest.raises(StoreError, match="experiment a is defined in one way"):
         store.merge(source)
     assert contents(path) == before
-
-
-def test_a_database_is_not_merged_with_itself_nor_with_anything_else(path, store):
-    with pytest.raises(StoreError, match="is this database itself"):
-        store.merge(path)
-    with pytest.raises(StoreError, match="there is no database"):
-        store.merge(path.with_name("nothing.db"))
-    path.with_name("text").write_text("text" * 1000)
-    with pytest.raises(StoreError, match="text is not an SQLite database"):
-        store.merge(path.with_name("text"))
 
 
 @settings(max_examples=8)

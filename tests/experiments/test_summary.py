@@ -54,12 +54,6 @@ def test_quantiles_are_values_that_occur_at_their_rank(values):
         assert found[name] == next(x for x in ordered if 100 * sum(y <= x for y in ordered) >= percent * len(values))
 
 
-def test_quantiles_of_the_first_integers():
-    # By hand: of 1 to 21 the 5 % value has rank ceil(1.05) = 2, the 25 % value rank ceil(5.25) = 6.
-    found = numbers_of([row({"x": k}) for k in range(21, 0, -1)])["x"]
-    assert [found[name] for name in QUANTILES] == [1, 2, 6, 11, 16, 20, 21]
-
-
 def test_numbers_beyond_the_range_of_doubles_are_counted_at_the_ends():
     found = numbers_of([row({"x": value}) for value in ("1e9999", 7, f"-1{'0' * 400}/3")])["x"]
     assert (found["n"], found["min"], found["median"], found["max"]) == (3, None, 7, None)
@@ -68,18 +62,6 @@ def test_numbers_beyond_the_range_of_doubles_are_counted_at_the_ends():
 @pytest.mark.parametrize("text", ["", "1/0", "1e99999", "0x10", "1_000", "nan", "1" * 2001, "١", None, [1]])
 def test_what_is_no_exact_number_is_not_summed_up(text):
     assert list(numbers_of([row({"x": text, "y": 1})], stable=True)) == ["y"]
-
-
-def test_seconds_and_memory_are_summed_up_unless_stable():
-    rows = [
-        row({"a": 1, "seconds": 7}, seconds=2.5, peak_memory=100),
-        row(outcome=Outcome.FAILED, seconds=0.5),
-        MISSING,
-    ]
-    found = numbers_of(rows)
-    assert list(found) == ["a", "result.seconds", "peak_memory", "seconds"]
-    assert [(found[name]["n"], found[name]["max"]) for name in ("seconds", "peak_memory")] == [(2, 2.5), (1, 100)]
-    assert list(numbers_of(rows, stable=True)) == ["a", "result.seconds"]
 
 
 # Groups
@@ -108,15 +90,6 @@ def test_rows_are_grouped_by_options_parts_of_the_recipe_and_results():
         ("failed", "no"),
         ("ok", None),
     ]
-
-
-def test_a_name_is_an_option_before_a_part_of_the_recipe_before_a_result():
-    one = task(system={"family": {"seed": 2, "m": 3}}, seed=1)
-    rows = [row({"seed": 3, "m": 4, "task": 5}, of=one)]
-    assert keys(rows, "seed") == [one.value("seed")] == [1]
-    assert keys(rows, "m") == [one.value("m")] == [3]
-    names = ("option.seed", "family.seed", "result.seed", "result.m", "result.task")
-    assert keys(rows, *names) == [(1, 2, 3, 4, 5)]
 
 
 @pytest.mark.parametrize(
@@ -162,14 +135,3 @@ def test_the_tables_have_tabs_or_bars_between_their_cells():
         "10\tdone\t1\t1",
     ]
     assert summary_markdown(summary).startswith("| m | tasks | ok | proved | refuted |\n| --- | ---: |")
-
-
-def test_cells_of_markdown_have_no_bars_of_their_own():
-    assert "| a\\|b c | 1 |" in summary_markdown(
-        summarise([row(outcome=Outcome.FAILED, message="a|b\nc")], ["message"])
-    )
-
-
-def test_of_nothing_there_is_a_summary_without_groups():
-    assert summarise([], ["m"]).to_json() == {"by": ["m"], "groups": []}
-    assert list(summarise([], ["m"]).lines()) == ["m"]

@@ -21,12 +21,9 @@ from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.results.records import canonical
-from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
-from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits.iteration import Orbit
@@ -103,37 +100,6 @@ def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(na
     assert result.get("doubtful", []) == [json.loads(json.dumps(f.to_json())) for f in doubtful]
 
 
-def test_an_orbit_that_was_asked_for_and_ended_early_is_told():
-    assert perform("check-integrals", TOP, eps="1/10", steps=30, max_digits=3)["ended_early"]
-    assert perform("check-integrals", TOP, eps="1/10", start="1,2,3", max_digits=3)["ended_early"]
-    assert not perform("check-integrals", TOP, eps="1/10", max_digits=3)["ended_early"]
-
-
-# The family
-
-
-@pytest.mark.parametrize(
-    ("system", "generic", "associated"),
-    [
-        (member(3, draw="generic", seed=7), True, None),
-        (member(2, eigenvalues="1,1"), False, 1),
-        (made(load("paper_m3_irreducible")), True, 1),
-    ],
-)
-def test_the_space_of_a_member_is_that_of_the_library(system, generic, associated):
-    space = cubic_space(system.member.A, system.member.variables)
-    result = perform("family-space", system)
-    assert (result["dimension"], result["expected"], result["rank"], result["unknowns"]) == (
-        space.dimension,
-        space.expected,
-        space.rank,
-        space.unknowns,
-    )
-    assert result["factors"] == [str(factor) for factor in system.member.factors]
-    assert result["generic"] is generic
-    assert result["associated"] == (associated or 2 ** (len(result["factors"]) - 1))
-
-
 # Orbits
 
 
@@ -154,53 +120,9 @@ def test_an_orbit_ends_where_the_library_does(arithmetic):
     assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
 
 
-@pytest.mark.parametrize(
-    "asked",
-    [
-        {"steps": 6},
-        {"steps": 6, "method": "generic"},
-        {"at": "2,6"},
-        {"at": 6, "method": "normal-form"},
-        {"at": 6, "method": "doubling"},
-    ],
-)
-def test_every_method_comes_to_the_same_point(asked):
-    result = perform("orbit", MEMBER, eps="1/10", **asked)
-    assert result["last_sha256"] == sha256(last_of(MEMBER, QQ, 6).encode()).hexdigest()
-    assert result["reached"] == 6
-
-
-def test_an_orbit_of_machine_numbers_is_that_of_the_library():
-    walk = FloatOrbit(LORENZ.system, "1/100", start_of(LORENZ), 5)
-    expected = [x.tolist() for _, x in walk][-1]
-    result = perform("orbit", LORENZ, eps="1/100", steps=5, arithmetic="float")
-    assert [float(entry) for entry in result["last"].split(",")] == expected
-    assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
-
-
-def test_an_exact_orbit_counts_digits():
-    result = perform("orbit", LORENZ, eps="1/10", steps=2, start="1,2,3")
-    walk = Orbit(KahanMap(LORENZ.system, "1/10"), (1, 2, 3), 2)
-    assert result["digits"] == list(walk)[-1].digits
-
-
 def test_an_iterate_beyond_the_budget_leaves_the_start_as_the_last_point():
     result = perform("orbit", MEMBER, eps="1/10", at=10**6, max_digits=100, start="1,2,3,44")
     assert (result["status"], result["reached"], result["last"], result["digits"]) == ("budget", 0, "1,2,3,44", 2)
-
-
-def test_a_singular_start_ends_an_orbit_without_failing_it():
-    # x' = x^2 has the map x/(1 - 2 eps x): no value at x = 5 for eps = 1/10.
-    file = made(parse_system('variables = ["x"]\n[system]\nrhs = ["x^2"]'))
-    result = perform("orbit", file, eps="1/10", start="5")
-    assert (result["status"], result["reached"], result["last"]) == ("singular", 0, "5")
-
-
-def test_a_short_last_point_is_kept_and_a_long_one_known_by_its_hash():
-    short, long = (perform("orbit", LORENZ, eps="1/10", steps=steps) for steps in (1, 8))
-    assert short["last_sha256"] == sha256(short["last"].encode()).hexdigest()
-    assert "last" not in long
-    assert len(canonical(long)) < 1000
 
 
 @pytest.mark.parametrize("name", ["orbit", "period"])

@@ -37,12 +37,6 @@ def darboux(system: QuadraticSystem) -> dict[str, str]:
     return {str(d.function): str(d.cofactor) for d in found.functions}
 
 
-def test_the_volterra_chain() -> None:
-    system = catalogue("volterra_periodic_4")
-    assert affine_integrals(system) == ((1, 1, 1, 1),)
-    assert list(darboux(system)) == list(system.variables)  # x_i' = x_i (...), and no others
-
-
 def test_known_hyperplanes() -> None:
     assert darboux(catalogue("lotka_volterra")) == {"x": "-y + 1", "y": "x - 1"}
     # (x1 + x3)' = x2 (x1 + x3), since the coefficients of x1' and x3' are equal.

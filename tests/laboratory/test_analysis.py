@@ -2,23 +2,18 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
-from flint import fmpq
 from search_helpers import analysis_of, system
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.analyses import statements, table
+from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.analyses.table import ANALYSES
-from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.singular.singularities import Patterns
-from kahanmaps.laboratory.symmetry.commuting import find_commuting
 
 # In dimension 3 singularities come last.
 PARTS = tuple(sorted((part.name for part in ANALYSES), key="singularities".__eq__))
@@ -234,89 +229,6 @@ def test_where_an_iterate_is_constant():
 
 
 # Form
-
-
-LIE = "generic orbits lie on varieties of codimension at least 1, which means at least 1 independent integral; "
-ALONG = "relations along an orbit: none of degree 1, a 2-dimensional space up to degree 2"
-OPEN = "how many integrals there are was not measured: no time"
-DIFFER = "the orbits that were compared do not agree"
-
-
-@pytest.mark.parametrize(
-    ("profile", "reason", "expected"),
-    [
-        ({"codimensions": (0, 1)}, "no closed form", [("measured", LIE + ALONG), ("note", "no closed form")]),
-        (
-            {"codimensions": (0, 0), "agree": False},
-            "",
-            [("measured", f"orbits show no integral; {ALONG}"), ("note", DIFFER)],
-        ),
-        ({"nullities": (), "codimensions": ()}, "no time", [("undecided", OPEN)]),
-    ],
-)
-def test_what_is_said_of_integrals(profile, reason, expected):
-    measured = {"nullities": (0, 2), "codimensions": (0, 2), "period": None, "agree": True, **profile}
-    given = {"symbols": (), "reason": reason, "by_theorems": 0, "theorems": "Prop. 1", "primes": (), "seed": 0}
-    orbits = Profile(3, complete=True, **measured)
-    found = IntegralSearch(file=None, eps=None, integrals=(), profile=orbits, **given)
-    lines = statements.of_integrals(SimpleNamespace(integrals=found, relations=(), normal_form=None, pencil=None))
-    assert [(str(line.status), line.text) for line in lines] == expected
-
-
-@pytest.mark.parametrize(
-    ("runs", "expected"),
-    [
-        ([("1", "a", 3, []), ("2", "b", 4, [])], [("undecided", "the eps 1, 2 disagree: a, b")]),
-        (
-            [("1", "a", 9, [4, None]), ("2", "a", 3, [6])],
-            [("measured", "a within 3 (eps = 1, 2)"), ("measured", "the last confinement comes after 6 steps")],
-        ),
-        ([("1/3", "undecided", None, [None])], [("undecided", "undecided within None (eps = 1/3)")]),
-    ],
-)
-def test_what_is_said_of_singularities(runs, expected):
-    found = []
-    for eps, verdict, followed, ends in runs:
-        known = {"verdict": verdict, "followed": followed, "unit": "step", "text": f"{verdict} within {followed}"}
-        hypersurfaces = [SimpleNamespace(confined_at=at) for at in ends]
-        found.append(SimpleNamespace(eps=fmpq(*map(int, eps.split("/"))), hypersurfaces=hypersurfaces, **known))
-    lines = statements.of_singularities(SimpleNamespace(singularities=found, file=load("euler_top")))
-    assert [(str(line.status), line.text) for line in lines] == expected
-
-
-@pytest.mark.parametrize(("most", "first"), [(2, True), (1, False)])
-def test_singularities_come_before_degrees_and_help_them_up_to_a_dimension(most, first, monkeypatch):
-    given, told, real = [], [], table.degree_growth
-
-    def recorded(*arguments, **options):
-        given.append(options["patterns"])
-        return real(*arguments, **options)
-
-    monkeypatch.setattr(table, "degree_growth", recorded)
-    monkeypatch.setattr(table, "WRITTEN_DIMENSION", most)
-    parts = [replace(part, slow_above=most) if part.name == "singularities" else part for part in ANALYSES]
-    analyze(load("zander_111"), parts=parts, progress=lambda text: told.append(text.partition(":")[0]))
-    parts = [part for part in dict.fromkeys(told) if part in PARTS]
-    assert parts.index("singularities") == (5 if first else len(PARTS) - 1)
-    assert [patterns is not None for patterns in given] == [first]
-
-
-def test_linear_families_of_commuting_systems_are_written_out(monkeypatch):
-    found = Analysis(System("S' = -2*S*I; I' = 2*S*I - I; R' = I"), None, 1.0, 0, ())
-    found.commuting = find_commuting(found.file.system)
-    moved = (
-        "t1*(0, 0, S + I + R) + t2*(0, 0, S^2 + 2*S*I + I^2 + 2*S*R + 2*I*R + R^2) + t3*(0, 0, 1), for all t1, t2, t3"
-    )
-
-    def told():
-        return [line.text for line in dict(found.sections)["commuting systems"]]
-
-    assert told() == [
-        f"commutes with the Kahan maps of all g = {moved}",
-        f"commutes with the Kahan maps of g and -g, g = (2*S*I, -2*S*I + I, S + R) + {moved}",
-    ]
-    monkeypatch.setattr(statements, "_LONG", 10)
-    assert told() == ["commutes with a linear family of 3 parameters, which find-commuting writes out"] * 2
 
 
 @pytest.mark.parametrize(

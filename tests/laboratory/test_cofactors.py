@@ -6,10 +6,7 @@ from search_helpers import system
 
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.files import parse_system
-from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.darboux import cofactors as module
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
     Cofactor,
@@ -19,13 +16,10 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_factors,
     determinant_polynomial,
     points_needed,
-    products,
     search_cofactors,
 )
-from kahanmaps.maps.kahan import Kahan
 
 SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4]
-ONE = CofactorProduct((), 0)
 
 
 @pytest.mark.parametrize("name", SMALL_ONES[::4])
@@ -46,23 +40,6 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
     assert all(not any(monomial[: map_.dim]) for monomial in rest.monoms())
 
 
-def test_a_determinant_too_large_to_expand_is_one_cofactor(monkeypatch):
-    monkeypatch.setattr(module, "_DETERMINANT_BUDGET", 5)
-    system_ = with_symbols(load("euler_top"))
-    assert determinant_polynomial(Kahan(system_)) is None
-    [one] = determinant_factors(Kahan(system_))
-    assert (one.weight, one.polynomial) == (3, None)
-
-
-def test_products_come_by_weight():
-    x, q = Cofactor("x", 1, None), Cofactor("q", 2, None)
-    found = products([x, q], 3)
-    assert [one.powers for one in found] == [(0, 0), (1, 0), (2, 0), (0, 1), (3, 0), (1, 1)]
-    assert [one.weight for one in found] == [0, 1, 2, 2, 3, 3]
-    assert [one.text([x, q]) for one in found][::2] == ["1", "C[x]^2", "C[x]^3"]
-    assert products([], 4) == [ONE]
-
-
 def test_polynomials_with_a_given_cofactor():
     map_ = Laboratory(load("lotka_volterra")).maps[0]
     sample = Sample.of(map_, [DETERMINANT], points_needed(2, 3))
@@ -81,10 +58,3 @@ def test_the_search_ends_when_enough_is_known():
     assert search_cofactors(map_, known, [], [space], 1, 3, Budget()).spaces == []
     assert search_cofactors(map_, known, [], [], 1, 3, Budget(0)).spaces == []
     assert search_cofactors(map_, known, [], [], 0, 3, Budget()).spaces == []
-
-
-@pytest.mark.parametrize(("digits", "is_written"), [(800, True), (2400, False)])
-def test_a_determinant_is_not_expanded_where_coefficients_are_long(digits, is_written):
-    text = f'variables = ["x"]\n[system]\nrhs = ["x^2*{10**digits + 1}/{7**digits}"]'
-    system_ = with_symbols(parse_system(text))
-    assert (determinant_polynomial(Kahan(system_)) is not None) == is_written

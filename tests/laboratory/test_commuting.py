@@ -17,7 +17,6 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
-from kahanmaps.laboratory.symmetry import commuting
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, judge_family, judge_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
@@ -213,13 +212,3 @@ def test_too_large_is_undecided_with_a_reason():
     assert (found.dimension, found.complete) == (31, False)
     found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
     assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)
-
-
-def test_a_shape_that_was_given_up_is_told(monkeypatch):
-    f = load("lotka_volterra", {}).system
-    assert (commuting_systems(f).shape, commuting_systems(f).note) == ("quadratic", "")
-    monkeypatch.setattr(commuting, "QUICK_UNITS", 1)
-    found = commuting_systems(f)
-    assert found.shape == "linear"
-    assert found.note.startswith("the fields g of degree at most 2 with rational coefficients were tried first")
-    assert found.note in str(found)

@@ -35,11 +35,6 @@ def test_orders_along_a_curve_are_those_of_each_component():
     assert [one.order for one in found(X1 - X2, 1000033, [(1, 1), (1, 1), (5,), (1,)])] == [None]  # it lies there
 
 
-def test_forms_at_the_image_have_the_degree_of_the_map_as_a_factor():
-    curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
-    assert sum(one.degree * one.exponents[0] for one in found(X1 + 2 * X2 + 3 * X3, 1000033, curve, at_image=True)) == 3
-
-
 def test_roots_are_points_of_the_component():
     p = 1000033
     curve = [(1, 2), (3, 4), (5, 6), (7, 8)]

@@ -11,7 +11,6 @@ from kahanmaps.algebra.modular_matrices import combine, rank
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
-from kahanmaps.laboratory.preserve.darboux import darboux_spaces as module
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
     darboux_spaces,
@@ -56,19 +55,6 @@ def test_spaces_of_known_maps(name, degree, sizes):
     assert gradient_rank(map_, found) <= load(name).catalog["codimension"]
 
 
-def test_multiples_of_what_is_known_are_not_found_again():
-    map_ = first_map(load("euler_top"))
-    known = darboux_spaces(map_, 2)
-    again = darboux_spaces(map_, 3, known)
-    assert again == []
-    assert gradient_rank(map_, known) == 2
-
-
-def test_integrals_that_depend_on_each_other_count_once():
-    space = DarbouxSpace(3, 1, [[1, 0, 0, 0], [0, 1, 0, 0], [5, 7, 0, 0]])  # 1, z, 5 + 7 z
-    assert gradient_rank(first_map(load("euler_top")), [space]) == 1
-
-
 def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
     rng = random.Random(1)
     for size in (2, 3):
@@ -76,15 +62,6 @@ def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
         weights = [[1, 5, 7][:size], [0, 1, 9][:size], [0, 0, 1]][:size]
         one = DarbouxSpace.spanned_by(2, 2, vectors, SMALL)
         assert one == DarbouxSpace.spanned_by(2, 2, combine(weights, vectors, SMALL), SMALL)
-
-
-def test_of_a_pencil_the_sparsest_come_first():
-    # x^2 + y^2 and 1 + x^2 + y^2
-    x2, y2 = exponents_up_to(2, 2).index((2, 0)), exponents_up_to(2, 2).index((0, 2))
-    squares = [int(k in (x2, y2)) for k in range(6)]
-    space = DarbouxSpace.spanned_by(2, 2, [squares, [1, *squares[1:]]], SMALL)
-    assert space.basis == [[1, 0, 0, 0, 0, 0], squares]
-    assert set(space.support) == {(0, 0), (2, 0), (0, 2)}
 
 
 @given(st.randoms(use_true_random=False))
@@ -104,8 +81,3 @@ def test_no_members_of_a_pencil_are_sparser(rng):
     found = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
     assert found == by_size[:2]
     assert rank([*basis, P, Q], p) == rank(basis, p) == 2
-
-
-def test_too_many_dimensions_are_not_searched(monkeypatch):
-    monkeypatch.setattr(module, "_antisymmetric", lambda *_: pytest.fail("the relations span too many dimensions"))
-    assert darboux_spaces(first_map(load("lagrange_top")), 4, []) is None

@@ -24,11 +24,6 @@ DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "p
 OPEN = Patterns((), None, False, "not looked at")
 
 
-def zander() -> QuadraticSystem:
-    """gamma = (1, 2, 0) for the lines x, y, x + 2 y: (x + 2 y)/y times J grad (x y^2)."""
-    return QuadraticSystem.from_text(["x", "y"], ["2*x*(x + 2*y)", "-y*(x + 2*y)"])
-
-
 @pytest.mark.parametrize("name", quick(names(), DAILY))
 def test_the_degrees_of_the_catalogue(name):
     known = load(name).catalog["degrees"]
@@ -44,20 +39,6 @@ def test_polynomials_with_gcds_give_the_same_for_random_systems(seed):
     rhs = ["+".join(f"({rng.randint(-2, 2)})*{m}" for m in monomials) for _ in names]
     system = QuadraticSystem.from_text(names, rhs)
     assert list(degree_growth(system, max_terms=3).degrees[1:]) == polynomial_degrees(system, 3, seed)
-
-
-def test_without_a_recurrence_there_is_an_estimate_that_says_so():
-    found = replace(degree_growth(load("henon_heiles").system, max_terms=6), patterns=None)
-    assert (found.recurrence, found.growth, found.dynamical_degree) == (None, Growth.UNKNOWN, None)
-    assert found.looks_exponential
-    assert found.growth_text == (
-        "exponential growth by a factor of about 2.31183 (estimated: the last quotients are 2.29412 to 2.38462; "
-        "no recurrence in 7 terms)"
-    )
-    shorter = replace(found, degrees=found.degrees[:6])
-    assert not shorter.looks_exponential
-    assert shorter.growth_text.startswith("no recurrence found in 6 terms; d_n^(1/n) is 2.47569 for n = 5")
-    assert shorter.growth_text.endswith("an estimate only")
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from fractions import Fraction
 from functools import cache, partial
 from itertools import islice
-from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -11,7 +10,6 @@ from helpers import DIMENSION, quick
 from search_helpers import random_system, system, value_of
 
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
@@ -76,15 +74,6 @@ def test_of_hamiltonian_systems_the_determinant_is_taken():
     assert find_densities(load("nahm_tetrahedral"), max_degree=1).densities == ()
 
 
-def test_quotients():
-    # x, y, z are multiplied by m, 1/m, 1/m: det dPhi = 1/m, so that 1/x is a density as y and z are
-    file = system("x y z", "x", "-y", "-z")
-    assert {one.text for one in find_densities(file).densities} == {"y", "z"}
-    for text, verdict in (("1/x", Certainty.PROVED), ("y", Certainty.PROVED), ("x", Certainty.REFUTED)):
-        function = parse_rational_function(text, ["x", "y", "z", "eps"])
-        assert density_verdict(with_symbols(file), function, None)[0] is verdict
-
-
 def test_maps_that_are_not_invertible_have_no_density():
     # all images are the origin: phi(x~) det(I - eps f') = phi det(I + eps f'(x~)) says 0 = 0 for phi = x
     file = system("x y", "-x", "-y")
@@ -93,32 +82,6 @@ def test_maps_that_are_not_invertible_have_no_density():
     function = parse_rational_function("x", ["x", "y", "eps"])
     assert density_verdict(with_symbols(file), function, fmpq(1))[0] is Certainty.UNDECIDED
     assert "no value anywhere" in find_densities(system("x y", "x", "3*y"), eps=1).reason
-
-
-@pytest.mark.parametrize(
-    ("file", "texts"),
-    [
-        (system("x y", "0", "0"), ["1"]),
-        (system("x", "1"), ["1"]),
-        (system("x", "1 + x^2"), ["x^2 + 1"]),
-        (system("x y", "x", "2*y"), ["x*y"]),
-        (system("x y z", "y", "-x", "1"), ["1"]),
-    ],
-)
-def test_simple_systems(file, texts):
-    assert [one.text for one in find_densities(file).densities] == texts
-
-
-@pytest.mark.parametrize(("units", "degree"), [(0, 0), (50_000, 10)])
-def test_too_small_a_budget_is_told(units, degree):
-    found = find_densities(load("lorenz"), effort=Budget(units), integrals=())
-    reason = f"polynomials of degree {degree} and more were not tried: the budget was spent (--effort)"
-    assert (found.densities, found.reason) == ((), reason)
-
-
-def test_sizes_are_limited(monkeypatch):
-    monkeypatch.setattr(module, "_MAX_UNKNOWNS", 30)
-    assert find_densities(load("lorenz"), max_degree=8).degree == 3  # 35 monomials of degree 4
 
 
 def test_the_check_by_definition_tells_a_wrong_density():
@@ -152,22 +115,3 @@ def test_random_systems_have_none():
     found = find_densities(random_system(2, 0), max_degree=5)
     assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
     assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
-
-
-@pytest.mark.parametrize(
-    ("least", "degrees"), [(0, [0]), (3, [0, 1, 2, 4, 3]), (12, [0, 1, 2, 4, 6, 9, 12, 10, 11, 12]), (13, None)]
-)
-def test_the_least_degree_is_found_though_degrees_are_leapt_over(least, degrees, monkeypatch):
-    tried = []
-
-    def space(map_, degree, model=None):
-        tried.extend([degree] if model is None else [])
-        return SimpleNamespace(basis=[1] * (degree >= least))
-
-    laboratory = Laboratory(load("lorenz"))
-    monkeypatch.setattr(module, "_space", space)
-    monkeypatch.setattr(laboratory, "formulas", lambda *_: SimpleNamespace(bases=None, reason="too long"))
-    found, degree, reason = module._search(laboratory, None, None, Budget(), lambda _: None)
-    assert (found, tried) == ([], degrees or [0, 1, 2, 4, 6, 9, 12])
-    none = "there is a density of degree {} modulo primes, but no closed form: too long".format
-    assert (degree, reason) == ((12, "") if degrees is None else (least, none(least)))

@@ -7,8 +7,8 @@ from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import written
-from kahanmaps.laboratory.singular.outcomes import BUDGET_SPENT, POINTS_DIFFER, Hypersurface, _agreed
-from kahanmaps.laboratory.singular.singularities import patterns, singularities
+from kahanmaps.laboratory.singular.outcomes import Hypersurface
+from kahanmaps.laboratory.singular.singularities import singularities
 from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.projective import homogeneous_map
@@ -79,11 +79,3 @@ def test_the_published_rates_of_a_planar_family(k, rate):
     found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
     assert found.explained is not None
     assert found.dynamical_degree.text.endswith(rate)
-
-
-def test_orders_that_are_cut_by_the_budget_do_not_differ():
-    one, other = Hypersurface(contracted_at=1), Hypersurface(contracted_at=2)
-    assert [_agreed(one, other, is_over)[1] for is_over in (True, False)] == [BUDGET_SPENT, POINTS_DIFFER]
-    assert _agreed(one, one, True) == (one, "")
-    late = patterns(by_formulas("x,y", "y; -x + 1/y^3"), None, effort=-20)
-    assert late.running == "the budget was spent before all singularities were followed (--effort)"

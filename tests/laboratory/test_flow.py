@@ -4,10 +4,9 @@ import pytest
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
-from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import Lift, Lifted
+from kahanmaps.laboratory.modular_points import ModularFlow
 
 PRIME = 2**61 - 1
 
@@ -35,12 +34,3 @@ def test_the_series_of_a_solution_solve_the_equation():
     assert [-(k + 1) * y[k + 1] % PRIME for k in range(7)] == x[:7]
     assert xy == [sum(x[i] * y[k - i] for i in range(k + 1)) % PRIME for k in range(8)]
     assert (x[0], y[0]) == (a, b)
-
-
-@pytest.mark.parametrize(
-    ("file", "eps", "words"),
-    [(load("lyness"), None, "found an explicit map"), (load("harmonic"), "1/10", "found eps = 1/10")],
-)
-def test_only_vector_fields_have_a_flow(file, eps, words):
-    with pytest.raises(InputError, match=words):
-        Laboratory(file, (), eps, flow=True)

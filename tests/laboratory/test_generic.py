@@ -53,8 +53,3 @@ def test_at_another_eps_nothing_is_named():
 def test_of_a_composition_of_powers_those_of_its_maps_are_named():
     map_ = parse_system('[composition]\nof = [{ system = "euler_top", power = 2, inverse = true }]').map
     assert {h.generic for h in degree_growth(map_, max_terms=1).patterns.contracted} == conics("--", "++")
-
-
-def test_of_a_composition_multiplied_out_they_are_told_at_one_eps():
-    map_ = parse_system('[composition]\nof = [{ system = "weierstrass", power = 2 }]').map
-    assert all("at eps" in told or "infinity" in told for told in degree_growth(map_, max_terms=1).patterns.sentences)

@@ -9,7 +9,6 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
@@ -17,8 +16,7 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import Independent
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import Lift, Lifted, lifts_with_spaces
-from kahanmaps.laboratory.preserve.iterates import RatioOfIterates, integrals_in_iterates, verdict_on_ratio
+from kahanmaps.laboratory.preserve.iterates import integrals_in_iterates, verdict_on_ratio
 
 GAUDIN = """
 variables = ["x1", "x2", "x3", "y1", "y2", "y3"]
@@ -72,21 +70,6 @@ def test_all_four_integrals_of_tops_and_spin_systems_have_formulas(file, numbers
         assert others == [first, first]
 
 
-def test_functions_get_letters_that_no_variable_begins_with():
-    names = ["F", "G", "K", "U", "V", "W"]
-    functions = ring([*names, *(f"{name}~" for name in names)]).gens()
-    minors = RatioOfIterates(Lift(1, -1, 2), functions, (0, 11), (0, 1))
-    assert minors.text.startswith("(FF11*FF0~ - FF0*FF11~)/(FF1*FF0~ - FF0*FF1~), ")  # as `sides` are
-    assert minors.text.endswith("FF0 = F, FF1 = G, FF11 = W~")
-    assert minors.latex.endswith(r"FF_0 = F,\quad FF_1 = G,\quad FF_{11} = \tilde{W}")
-
-
-def test_formulas_hold_for_every_value_of_a_symbol():
-    laboratory, _, _, [ratio, *_] = searched(load("clebsch_first_flow"), wanted=1, symbols=["w1"])
-    assert "w1" in ratio.text
-    assert verdict_on_ratio(laboratory, ratio)[0] is Certainty.PROVED
-
-
 # kirchhoff_generic has no relations at all; those of the others belong to the one integral that they have.
 @pytest.mark.parametrize(
     ("name", "numbers"),
@@ -112,15 +95,3 @@ def test_ratios_of_functions_of_rank_two_are_no_integrals_but_those_of_minors_ar
     assert minors.lift.rank == 2
     single = replace(minors, lift=minors.lift._replace(rank=1), numerator=(0,), denominator=(1,))
     assert verdict_on_ratio(laboratory, single)[0] is Certainty.REFUTED
-
-
-def test_an_orbit_that_closes_has_as_many_rows_as_points():
-    map_ = Laboratory(load("harmonic", {"w": 1}), eps="1").maps[0]  # a rotation by a right angle
-    rows, _, period = Lifted(map_, Lift(1, 1)).along_orbit(2, 10)
-    assert (len(rows), period) == (4, 4)
-
-
-def test_lifts_of_rank_one_come_before_those_of_rank_two():
-    map_ = Laboratory(load("so4_euler_manakov")).maps[0]
-    lifts = [tuple(lift) for lift, _ in lifts_with_spaces(map_)]
-    assert lifts == [(0, 1, 1), (1, 1, 1), (1, -1, 1), (2, -1, 1), (3, -1, 2), (4, -1, 2)]

@@ -129,14 +129,6 @@ def test_degrees_that_the_singularities_do_not_explain_are_no_result():
     assert "do not explain the degree of iterate 8" in other.unconfirmed
 
 
-def test_a_map_that_confines_nothing_is_said_to_do_so_within_the_steps_that_were_tried():
-    found = degree_growth(load("lotka_volterra").system, enclosed=False)
-    assert found.growth_text == ("exponential growth, dynamical degree 2 (explained: no confinement within 400 steps)")
-    few = degree_growth(load("lotka_volterra").system, steps=30, max_terms=5, enclosed=False)
-    assert few.basis == "explained: no confinement within 30 steps"
-    assert degree_growth(load("euler_top").system, max_terms=5).basis == "explained"
-
-
 # The patterns themselves
 
 
@@ -148,14 +140,6 @@ def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
     assert run.text == "some confined, others not within 1000 steps"
     assert singularities(resonant(k), "1/7", steps=k - 1).text == f"not confined within {k - 1} steps"
     assert len(next(h for h in run.hypersurfaces if h.status == CONFINED).steps) == k + 2
-
-
-@pytest.mark.parametrize("name", ["euler_top", "weierstrass", "volterra_periodic_4"])
-def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
-    system = load(name).system
-    written = patterns(system, None)
-    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.WRITTEN_DIMENSION", 1)
-    assert patterns(system, None) == written
 
 
 @pytest.mark.parametrize("name", ["mcmillan", "todd"])

@@ -10,13 +10,13 @@ from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import format_rational_function
-from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.limit.limits import flow_and_map, with_limit
+from kahanmaps.laboratory.laboratory import is_kept_by_flow
+from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 
 THREE_LINES = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["3*x*(x+2*y) + 6*x*y", "-(y*(x+2*y) + 3*x*y)"]')
 
@@ -119,24 +119,11 @@ def test_leading_terms_that_depend_on_each_other_are_combined(second):
     assert (len(found.limits), found.others, found.without_limit) == (2, (), 0)
 
 
-def test_leading_terms_that_stay_dependent_are_left_out():
-    """The second is a function of the first: no combination tends to anything else."""
-    search = with_integrals(integrals_of("volterra_periodic_3"), SUM, f"{SUM}^2")
-    found = flow_and_map(search)
-    assert (len(found.limits), len(found.others), found.without_limit, found.lost) == (1, 1, 1, 0)
-
-
 def test_a_function_that_is_no_integral_has_no_limit_among_those_of_the_flow():
     search = with_integrals(integrals_of("harmonic"), "x + eps*y")
     found = flow_and_map(search)
     assert found.limits == ()
     assert found.without_limit == 1
-
-
-def test_symbols_stay_in_the_limits():
-    [one, two] = beside("euler_top", "a1", "a2", "a3").limits
-    assert format_rational_function(one.leading) == "x2^2*a1 - x1^2*a2"
-    assert format_rational_function(two.leading) == "x3^2*a1 - x1^2*a3"
 
 
 def test_the_density_of_the_map_tends_to_one_of_the_flow():
@@ -145,39 +132,6 @@ def test_the_density_of_the_map_tends_to_one_of_the_flow():
         assert flow_and_map(search, densities).density.text == phi
         assert find_densities(load(name), flow=True).densities[0].text == phi
     assert flow_and_map(integrals_of("lorenz")).density is None
-
-
-def densities_of(found, *texts):
-    """A search that has found these densities of the map, on nobody's word."""
-    names = [*found.map_search.file.variables, "eps"]
-    model = find_densities(found.map_search.file)
-    [one, *_] = model.densities
-    return replace(model, densities=tuple(replace(one, function=parse_rational_function(t, names)) for t in texts))
-
-
-def test_the_limit_of_a_density_takes_the_place_of_a_density_of_the_flow():
-    found = beside("euler_top")
-    kept = "(x1^2 - x3^2 + 2)"  # any function of integrals of the flow
-    assert (found.density.text, found.density_search.densities[0].text) == ("1", "1")
-    # The first limit that the flow keeps: x1 is not kept.
-    given = densities_of(found, "x1 + eps", f"{kept}*(3 + eps*x1)", "7 + eps")
-    changed = with_limit(found, given)
-    assert (changed.density.text, changed.density_search) == ("x1^2 - x3^2 + 2", None)
-    assert str(changed.density.verdict) == "proved"
-    assert flow_and_map(found.map_search, given).density.text == changed.density.text
-    for without in (densities_of(found, "x1 + eps"), None):
-        assert with_limit(found, without) == found
-
-
-def test_factors_of_densities_are_darboux_polynomials_of_the_flow():
-    found = flow_and_map(integrals_of("riccati"))  # x' = x^2 + x - 1
-    assert found.density.text == "x^2 + x - 1"
-    assert [str(P) for P in found.polynomials] == ["x^2 + x - 1"]
-    bare = replace(found, polynomials=())
-    same = densities_of(found, "x^2 + x - 1 + eps*x")
-    assert [str(P) for P in with_limit(bare, same).polynomials] == ["x^2 + x - 1"]
-    other = replace(found, polynomials=tuple(P**2 for P in found.polynomials))
-    assert with_limit(other, same).polynomials == (*other.polynomials, *found.polynomials)
 
 
 def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():
@@ -235,15 +189,3 @@ def test_leading_terms_are_those_along_solutions(formula, leading):
     found = flow_and_map(replace(search, integrals=(made,)))
     assert [format_rational_function(one.leading) for one in found.limits] == ([] if leading is None else [leading])
     assert (found.without_limit, len(found.others)) == ((0, 0) if leading else (1, 1))
-
-
-def test_a_field_of_degree_four_has_a_flow():
-    text = 'variables = ["x"]\n[system]\nrhs = ["x^4 - 1"]\ndiscretization = "polarised"\ndegree = 4'
-    laboratory = Laboratory(parse_system(text), flow=True)
-    assert [str(P) for P in laboratory.flow_polynomials(Budget()).functions] == ["x + 1", "x - 1", "x^2 + 1"]
-    assert laboratory.maps[0].step((2,)) == (17,)
-
-
-@pytest.mark.parametrize(("name", "eps"), [("lyness", None), ("harmonic", "1/10")])
-def test_without_a_flow_there_is_no_line(name, eps):
-    assert flow_and_map(find_integrals(load(name), eps=eps)) is None

@@ -63,12 +63,6 @@ def test_the_echelon_form_depends_on_the_span_alone(rows, rng):
     assert len(echelon(mixed, SMALL)) <= rank(rows, SMALL)
 
 
-def test_nothing_gives_nothing():
-    assert null_space([], 2, SMALL) == [[1, 0], [0, 1]]
-    assert echelon([], SMALL) == combine([], [[1]], SMALL) == combine([[1]], [], SMALL) == []
-    assert rank([], SMALL) == rank([[]], SMALL) == 0
-
-
 def test_an_orbit_that_closes_has_each_of_its_points_once():
     # a quarter of a turn
     found = orbit_from((1, 2), modular(system("x y", "y", "-x"), eps=1), 20)
@@ -83,9 +77,3 @@ def test_a_map_without_values_is_told():
         with pytest.raises(NoPoint, match="no value at random points"):
             look()
     assert singular.step((1, 1)) is None
-
-
-def test_orbits_that_meet_the_singular_set_are_given_up():
-    # x -> x/(1 - 2 x) modulo 11: every orbit comes to a pole
-    with pytest.raises(NoPoint, match="meet the singular set"):
-        orbit_from((1,), modular(system("x", "x^2"), eps=1, prime=11), 30)

@@ -5,11 +5,10 @@ import pytest
 import kahanmaps as km
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.interpolation import reconstruct
-from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.roots import parse_root
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.laboratory import primitive_over, reconstruct_at
+from kahanmaps.laboratory.laboratory import reconstruct_at
 
 TOP = "x' = a*y*z; y' = -x*z; z' = x*y"
 CUBIC = "root of t^3 - t - 1"
@@ -60,15 +59,6 @@ def test_coefficients_are_reconstructed_from_all_roots():
     assert reconstruct_at(None, lambda p, point: [3], ()).functions == reconstruct(lambda p, point: [3], ()).functions
 
 
-def test_factors_without_variables_are_taken_out_over_the_field():
-    x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
-    root = parse_root("root of t^2 - 2")
-    for P in (x + a * y, x**2 * (1 - 2 * eps) + 3, x * y + eps * a):
-        for factor in (1 + a * eps, a + 1, (1 - eps**2) * (3 + a * eps)):
-            assert primitive_over(root, P * factor, 2) == primitive_over(root, P, 2)
-    assert primitive_over(root, x + a * y, 2) != primitive_over(root, x - a * y, 2)
-
-
 def test_commuting_systems_over_a_number_field_are_found_and_commute():
     def found(equations: str, a: str, **options) -> km.CommutingSystems:
         return km.find_commuting(km.System(equations, a=a), **options)
@@ -98,15 +88,3 @@ def test_analyze_says_once_what_is_not_done_over_a_number_field():
     assert found.skipped[0].startswith("over the number field QQ[t]/(t^2 - 2): Hamiltonian structure, the commuting")
     assert "only 0, f and -f commute" in dict(found.sections)["commuting systems"][0].text
     assert found.to_json()["parameters"] == {}
-
-
-def test_what_is_not_sought_over_a_number_field_is_refused():
-    file = km.System(TOP, a="root of t^2 - 2")
-    with pytest.raises(InputError, match="it is the flow that is asked for"):
-        km.find_integrals(file, flow=True)
-    with pytest.raises(InputError, match="found a parameter that is a root of"):
-        km.darboux_polynomials(file, 2)
-    with pytest.raises(InputError, match="a degree of at most 6"):
-        km.find_integrals(km.System(TOP, a="root of t^7 - 2"))
-    with pytest.raises(InputError, match="expected no other symbols"):
-        km.find_density(km.System("x' = a*y; y' = b*x^2", a="root of t^2 - 2", b=1), symbols=["b"])

@@ -14,7 +14,6 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson import poisson_tensors
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
@@ -178,36 +177,3 @@ def test_maps_without_structure_have_none(file, degree):
     found = find_poisson(file, degree)
     assert (found.tensors, found.degree, found.toml_section()) == ((), degree, "")
     assert found.reason.startswith(f"no tensor of degree at most {degree} is preserved (measured modulo a prime)")
-
-
-@pytest.mark.parametrize(
-    ("unknowns", "degree", "words"),
-    [(50, 2, "were not tried"), (29, 1, "were tried for brackets c_ij x_i x_j only")],  # 30 of degree 2, 60 of degree 3
-)
-def test_degrees_with_too_many_unknowns_are_left_out_and_told(unknowns, degree, words, monkeypatch):
-    monkeypatch.setattr(poisson_tensors, "_MAX_UNKNOWNS", unknowns)
-    found = find_poisson(load("lorenz"), 4, integrals=())
-    assert found.degree == degree
-    assert f"degrees above {degree} {words}" in found.reason
-
-
-@pytest.mark.parametrize(("denominator", "eps"), [("0", None), ("(10*eps - 1)*x", "1/10"), ("x/(10*eps - 1)", "1/10")])
-def test_a_denominator_that_is_0_at_the_eps_in_force_is_wrong_use(denominator, eps):
-    file = load("lotka_volterra")
-    function = parse_rational_function(denominator, (*file.variables, "eps"))
-    with pytest.raises(InputError, match=r"identically 0 or has no values.*expected a function that is not zero"):
-        find_poisson(file, 0, eps=eps, denominator=function)
-
-
-def test_a_denominator_divides_all_entries():
-    # for Lotka and Volterra {x,y} = x y alone: over x the numerator has degree 3
-    over = parse_rational_function("x*(1 + eps)", ["x", "y", "eps"])
-    assert brackets(find_poisson(load("lotka_volterra"), 2, denominator=over, integrals=())) == []
-    found = find_poisson(load("lotka_volterra"), 3, denominator=over, integrals=())
-    assert [(one.text, one.verdict) for one in found.tensors] == [("{x,y} = x*y/(eps + 1)", PROVED)]
-
-
-def test_a_tensor_for_one_eps_is_told_as_such():
-    found = find_poisson(load("weierstrass"), eps="1/3")
-    assert brackets(found) == ["{x,y} = 4*x - 3"]
-    assert found.toml_section().startswith("# for eps = 1/3 only")

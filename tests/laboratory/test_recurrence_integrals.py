@@ -7,8 +7,6 @@ from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve import integrals, search
-from kahanmaps.laboratory.preserve.darboux import cofactors
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 NAMES = "abcdefg"
@@ -61,19 +59,3 @@ def test_all_integrals_of_recurrences_are_found(case, count, scales, order):
     functions = [parse_rational_function(text, [*file.variables, "eps"]) for text in texts]
     number, _, of_all = ranks([one.function for one in found.integrals], functions, Laboratory(file).maps[0])
     assert number == of_all == count  # the known ones are functions of those found
-
-
-def test_the_reason_names_what_was_tried(monkeypatch):
-    names, last, _ = of_sums(4)
-    file = image_of(names, last, [1, 1, 1, 1], range(4))
-    monkeypatch.setattr(integrals, "candidates", lambda *_: [])
-    monkeypatch.setattr(integrals, "LARGEST_SPAN", 2)
-    monkeypatch.setattr(search, "SMALL_SPAN", 2)
-    monkeypatch.setitem(search._COFACTOR_DEGREE, 4, 5)
-    monkeypatch.setattr(cofactors, "_MAX_WORK", 200_000)
-    found = find_integrals(file)
-    assert [one.text for one in found.integrals] == ["(a*b*c*d - 3)*(a + b + c + d)"]
-    assert found.reason == (
-        "1 of the 2 independent integrals has no closed form P/Q among P and Q of degree up to 5 with known cofactors "
-        "or denominators: coefficients of Hirota-Kimura bases are such integrals"
-    )

@@ -159,20 +159,6 @@ def explicit(*image):
     return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image])
 
 
-@pytest.mark.parametrize(
-    ("image", "series", "beyond"),
-    [
-        (("y", "-x + y^30 + 1"), ((1,), (1, -30)), [(0,)]),  # (0 : 1 : 0) is fixed, with orders 30, 900, ...
-        (("y", "(y^9 + 1)/x"), ((1, 0, 1), (1, -9, 1)), [(0, 4), (), (), (), (0, 4)]),
-    ],
-)
-def test_orders_at_points_that_close_are_not_needed(image, series, beyond):
-    map_ = explicit(*image)
-    found = patterns(map_, None)
-    assert (found.series, [h.orders.beyond for h in found.contracted]) == (series, beyond)
-    assert degree_growth(map_, max_degree=3000, max_terms=8, patterns=found).explained is not None
-
-
 def test_unknown_orders_that_are_needed_explain_nothing():
     costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
     assert needed([costly, attracted]) == [0, 1]

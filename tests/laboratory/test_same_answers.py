@@ -1,10 +1,18 @@
-"""The same question has the same answer: other hash seeds, one or two processes, and a busy machine change no byte."""
+"""The same question has the same answer, and takes the same counted work: other hash seeds, one or two processes, and
+what was asked before change no byte."""
 
 import os
 import subprocess
 import sys
 
 import pytest
+from helpers import quick
+
+from kahanmaps.algebra.work import Budget, count, counted
+from kahanmaps.documents.catalog import load
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.height_survey import height_survey
+from kahanmaps.laboratory.singular.singularities import singularities
 
 SYSTEMS = ("harmonic", "weierstrass", "lotka_volterra", "euler_top", "nahm_tetrahedral", "riccati")
 LARGE = (
@@ -15,42 +23,99 @@ LARGE = (
     "kirchhoff_generic",
     "nahm_icosahedral",
 )
+# Analyses, and searches of their own that are cut by their budgets, or begin at other points than an analysis does.
 PROGRAM = """
 import json, sys
+import kahanmaps as km
+from kahanmaps.algebra.printing import plain
+from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import analysis
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.height_survey import height_survey
+from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
+from kahanmaps.laboratory.scan.scan import scan
+from kahanmaps.laboratory.singular.singularities import singularities
 
 analysis.processors = lambda: 2
 processes, *names = sys.argv[1:]
+lines = km.parse_system('''variables = ["x", "y"]
+parameters.g = 1
+[system]
+rhs = ["x*(x + 2*y)", "-y*((g + 1)*x + g*y)"]''')
+SEARCHES = {
+    "degrees": lambda: degree_growth(load("henon_heiles").map, effort=Budget(50_000)),
+    "singularities": lambda: singularities(load("zander_120").map, "1/7", effort=Budget(20_000)),
+    "heights": lambda: height_survey(load("zander_120").map, steps=12, effort=Budget(10_000)),
+    "integrals": lambda: km.find_integrals("volterra_periodic_4"),
+    "integrals of a flow": lambda: km.find_integrals("weierstrass", flow=True),
+    "integrals of a map": lambda: km.find_integrals("lyness", effort=-8),
+    "integrals with symbols": lambda: km.find_integrals("euler_top", symbols=["a1"], effort=-9),
+    "densities": lambda: km.find_densities("somos_4"),
+    "limits": lambda: flow_and_map(km.find_integrals("lotka_volterra")),
+    "scan": lambda: scan(lines, ["g"], terms=3, primes=[11, 13, 17], jobs=int(processes)),
+    "scan in a hurry": lambda: scan(lines, ["g"], terms=4, primes=[31, 37, 41], jobs=int(processes), effort=-9),
+}
 for name in names:
-    found = analysis.analyze(load(name), processes=int(processes))
-    print(json.dumps(found.to_json()))
-    print(found.work)
+    before = counted()
+    if name in SEARCHES:
+        found = SEARCHES[name]()
+        print(json.dumps(plain(found.to_json())), counted() - before)
+    else:
+        found = analysis.analyze(load(name), processes=int(processes))
+        print(json.dumps(found.to_json()), found.work)
 """
+SEARCHES = ("degrees", "singularities", "heights", "integrals", "integrals of a flow", "integrals of a map")
+SEARCHES += ("integrals with symbols", "densities", "limits", "scan", "scan in a hurry")
 
 
 def answers(names, hash_seed, processes):
-    """What a fresh interpreter prints: JSON, with the units, and the line on the work."""
+    """What a fresh interpreter prints: for each name a line of JSON and the work that was counted."""
     environment = {**os.environ, "PYTHONHASHSEED": str(hash_seed)}
     line = [sys.executable, "-c", PROGRAM, str(processes), *names]
     return subprocess.run(line, env=environment, capture_output=True, check=True).stdout.splitlines()
 
 
 def require_same(names):
+    # In the other order as well: what is left in the caches of modules is not seen by the next one.
     first, second = answers(names, 0, 1), answers(tuple(reversed(names)), 1, 2)
-    assert len(first) == 2 * len(names)
-    # In the other order as well: what an analysis leaves in the caches of modules is not seen by the next one.
-    pairs = [(first[k], second[len(first) - 2 - k]) for k in range(0, len(first), 2)]
-    assert [name for name, (a, b) in zip(names, pairs, strict=True) if a != b] == []
-    lines = [(first[k], second[len(first) - k]) for k in range(1, len(first), 2)]
-    assert all(a == b and a.startswith(b"effort 1, ") for a, b in lines)
+    assert len(first) == len(names)
+    assert [name for name, a, b in zip(names, first, reversed(second), strict=True) if a != b] == []
+    return first
 
 
 def test_the_bytes_are_the_same_with_another_hash_seed_and_two_processes():
-    require_same(SYSTEMS)
+    first = require_same((*SYSTEMS, *SEARCHES))
+    assert all(b"effort 1, " in line for line in first[: len(SYSTEMS)])
+    assert b"budget" in b"".join(first[len(SYSTEMS) :])  # some were cut
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_so_are_those_of_larger_systems():
     require_same(LARGE)
+
+
+def asked(map_):
+    return degree_growth(map_), singularities(map_, "1/7"), height_survey(map_, steps=10)
+
+
+@pytest.mark.parametrize("name", quick(["weierstrass", "lorenz", "paper_m2", "kirchhoff_case"], ["lorenz"]))
+def test_what_was_asked_before_does_not_change_the_work_that_is_counted(name):
+    map_, marks, found = load(name).map, [counted()], []
+    for _ in range(2):
+        found.append([one.to_json() for one in asked(map_)])
+        marks.append(counted())
+    assert found[0] == found[1]
+    assert marks[1] - marks[0] == marks[2] - marks[1] > 0
+
+
+def test_work_that_is_not_the_search_is_not_charged_to_it():
+    """Negative control: what is counted elsewhere before is not spent, but what is counted meanwhile is."""
+    map_ = load("henon_heiles").map
+    budget = Budget(100_000)
+    whole = degree_growth(map_, effort=budget)
+    count(1_000_000)
+    assert degree_growth(map_, effort=Budget(100_000)).degrees == whole.degrees
+    less = degree_growth(map_, effort=Budget(100_000), progress=lambda _: count(20_000))
+    assert len(less.degrees) < len(whole.degrees)

@@ -170,12 +170,6 @@ def test_four_parameters_give_what_has_codimension_2_as_well():
     assert "codimension 2" in found.coverage
 
 
-def test_a_family_without_special_members_says_so():
-    found = scan(parse_system('variables = ["x"]\nparameters.a = 1\n[system]\nrhs = ["x^2 + a^2 + 1"]'), ["a"])
-    assert found.components == ()
-    assert "found\tno condition" in found.text
-
-
 def test_the_budget_may_be_spent_before_anything_is_known():
     found = scan(load("henon_heiles"), ["c"], effort=Budget(1))
     assert (found.ended, found.components, found.height) == ("budget", (), 0)
@@ -193,21 +187,6 @@ def test_a_curve_that_is_missed_is_said_to_be_one():
     found = scan(planar("y", "x^2 + b*x + (a^3 - 2)*y", "a", "b"), ["a", "b"], terms=4)
     assert found.components == ()
     assert "as many as a curve has, so one may have been missed" in found.text
-
-
-def test_what_was_left_out_is_named_stage_by_stage():
-    asked = []
-
-    def stop(sentence):
-        asked.append(sentence)
-        if len(asked) > 10:
-            raise TimeOver
-
-    found = scan(parse_system(THREE_LINES), ["g1", "g2"], primes=(17, 19, 23), terms=3, progress=stop)
-    assert found.ended == "interrupted"
-    assert found.omitted
-    assert f"it was interrupted before {found.omitted[0]}" in found.text
-    assert found.to_json()["omitted"] == list(found.omitted)
 
 
 @pytest.mark.parametrize("stage", ["_confirmed", "_growth", "symmetries", "conditions"])
@@ -228,15 +207,6 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
     assert found.omitted[0].startswith(left_out[stage])
     assert bool(found.components) is (stage != "conditions")
     assert any(one.tried for one in found.components) is (known.index(stage) > 1)
-
-
-def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow():
-    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
-    found = [sweep(map_, 2, 7, None, 3, 99, seed=seed) for seed in ("a", "a", "b")]
-    assert found[0] == found[1]
-    assert found[0].classes == found[2].classes  # lines in special position were replaced
-    assert found[0].accidents > 0  # of which there are some modulo 7
-    assert found[0].generic not in found[0].classes
 
 
 @pytest.mark.parametrize(

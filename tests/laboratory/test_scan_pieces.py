@@ -6,10 +6,7 @@ from itertools import product
 import pytest
 from flint import fmpq
 
-from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.algebra.polynomials import ring
 from kahanmaps.laboratory.scan.lift import lifted_conjugates, lifted_flats, lifted_forms
-from kahanmaps.laboratory.scan.members import point_on
 from kahanmaps.laboratory.scan.pieces import pieces
 
 FIELD_PRIMES = (53, 59, 61, 67, 71, 73, 79, 83, 89, 97, 101, 103)
@@ -85,14 +82,6 @@ def test_points_over_number_fields_have_an_equation_for_each_parameter(condition
     assert [[*map(str, equations)] for equations, _ in found] == [expected]
 
 
-def test_points_that_are_not_conjugate_are_told_apart_also_among_others():
-    rng = random.Random(5)
-    both = [zeros(lambda a: a**2 - 5), zeros(lambda a: a**3 - a - 1)]
-    points = {p: [*{*both[0][p], *both[1][p], (rng.randrange(p),)}] for p in FIELD_PRIMES[:9]}
-    found = lifted_conjugates(points, "a", random.Random(1))
-    assert {str(equations[0]) for equations, _ in found} == {"a^2 - 5", "a^3 - a - 1"}
-
-
 def test_points_over_number_fields_have_to_be_there_modulo_all_primes_but_one():
     found = zeros(lambda a: a**2 - 5)
     there = [p for p in FIELD_PRIMES if found[p]]
@@ -109,13 +98,3 @@ def test_a_product_is_factored_and_has_to_agree_modulo_the_last_prime(spoilt):
         forms[p] = [[-4 % p, 0, 0, 1, 0, 2], both[1]] if spoilt and p == 41 else both
     found = {str(form) for form, _ in lifted_forms(forms, ["a", "b"])}
     assert found == ({"a*b - 2"} if spoilt else expected)
-
-
-@pytest.mark.parametrize("field", [QQ, GF(2**61 - 1)])
-def test_members_on_a_component_are_on_it(field):
-    a, b, c = ring(["a", "b", "c"]).gens()
-    one = ring(["a", "b", "c"]).constant(1)
-    x = point_on([b * c + one, a - 2 * b + one], 3, field, random.Random(1))
-    assert x[1] * x[2] + field.one == field.zero
-    assert x[0] - x[1] - x[1] + field.one == field.zero
-    assert len({point_on([a * b * c + one], 3, field, random.Random(k)) for k in range(5)}) == 5

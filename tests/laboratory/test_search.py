@@ -10,10 +10,10 @@ from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
+from kahanmaps.laboratory.modular_points import exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.darboux import cofactors
-from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among, search_cofactors
+from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.products import candidates
@@ -75,23 +75,6 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
         search(laboratory.maps[0], profile, known, budget=Budget())
 
 
-def test_too_much_work_ends_the_search_with_the_degree_before(monkeypatch):
-    laboratory = Laboratory(recurrence(*FOURTH_ORDER))
-    known = laboratory.cofactors()
-    over = denominators_among(candidates(laboratory, known, Budget()), 4)
-    every = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget())
-    assert (every.cofactor_degree, len(every.spaces)) == (5, 2)
-    monkeypatch.setattr(cofactors, "_MAX_WORK", 5_000)
-    some = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget())
-    assert (some.cofactor_degree, some.spaces) == (3, [])
-    assert (every.cut, some.cut) == ("", "")
-    late = search_cofactors(laboratory.maps[0], known, over, [], 2, 6, Budget(700))
-    assert (late.cofactor_degree, late.spaces) == (2, [])  # no relation before degree 3, and nothing to try
-    assert late.cut == (
-        "polynomials of degree 3 and more with known cofactors were not all tried: the budget was spent (--effort)"
-    )
-
-
 # The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.
 def pencil_at(prime, values):
     a, eps = values
@@ -124,35 +107,3 @@ def test_coefficients_are_interpolated():
     found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
     assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
     assert found.reason == ""
-
-
-def test_special_values_are_passed_over():
-    def now_and_then(prime, values):
-        if values[0] % 3 == 0:
-            raise NoPoint("not here")
-        return None if values[1] % 3 == 0 else pencil_at(prime, values)
-
-    found = closed_forms(MODEL, now_and_then, ["x", "y"], ["a"], "symbol", budget=Budget())
-    assert format_polynomial(found.bases[0][0]) == "x*a^2 + 3*eps - 1"
-
-
-def test_no_value_anywhere_and_no_budget_are_told():
-    nowhere = closed_forms(MODEL, lambda prime, values: None, ["x", "y"], ["a"], "symbol", budget=Budget())
-    assert (nowhere.bases, bool(nowhere.reason)) == (None, True)
-    late = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget(0))
-    assert (late.bases, late.reason) == (None, "the budget was spent after 0 values (--effort)")
-
-
-def test_eps_by_weight_and_numbers():
-    support = exponents_up_to(1, 2)
-
-    def at(prime, _):
-        half = (prime + 1) // 2
-        return [DarbouxSpace(1, 2, [[{(0,): half, (2,): 1}.get(m, 0) for m in support]])]
-
-    model = at(2**61 - 1, ())
-    assert (
-        format_polynomial(closed_forms(model, at, ["x"], [], "by weight", budget=Budget()).bases[0][0])
-        == "2*x^2*eps^2 + 1"
-    )
-    assert format_polynomial(closed_forms(model, at, ["x"], [], "not", budget=Budget()).bases[0][0]) == "2*x^2 + 1"

@@ -1,6 +1,5 @@
 """Two processes find what one finds; what goes wrong in the second is done again in the first, and it ends with it."""
 
-import json
 import os
 import signal
 import subprocess
@@ -32,12 +31,6 @@ def apart(name, look=where, *, is_apart=True):
     return Part(name, look, of=Of.EVERY, is_apart=is_apart, json=lambda found: {name: found[name]})
 
 
-@pytest.mark.parametrize("name", ["euler_top", "hky"])
-def test_two_processes_find_what_one_finds_to_the_byte(name):
-    one, two = (json.dumps(analyze(load(name), processes=k).to_json()) for k in (1, 2))
-    assert one == two
-
-
 def test_parts_that_are_apart_are_done_elsewhere_in_their_order_and_the_others_here():
     parts = [apart("first"), apart("second", lambda run, **_: run.found["first"]), apart("third", is_apart=False)]
     found = analyze(load("harmonic"), parts=parts, processes=2)
@@ -54,14 +47,6 @@ def test_what_a_killed_process_did_not_do_is_done_here():
     found = analyze(load("harmonic"), parts=[apart("first"), apart("second", killed), apart("third")], processes=2)
     assert found["first"] != found["second"] == found["third"] == HERE
     assert found.skipped == []
-
-
-def test_where_no_process_can_be_made_all_is_done_here(monkeypatch):
-    def refused():
-        raise BlockingIOError("Resource temporarily unavailable")
-
-    monkeypatch.setattr("os.fork", refused)
-    assert analyze(load("harmonic"), parts=[apart("first")], processes=2)["first"] == HERE
 
 
 def test_a_part_that_gives_up_elsewhere_is_told_and_a_mistake_is_not_swallowed():

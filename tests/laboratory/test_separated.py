@@ -14,9 +14,9 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory import laboratory
-from kahanmaps.laboratory import laboratory as module
-from kahanmaps.laboratory.laboratory import Laboratory, separated
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory import laboratory as identities
+from kahanmaps.laboratory.laboratory import separated
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 PAPER = load("paper_m3").system
@@ -64,20 +64,3 @@ def test_what_is_not_preserved_is_refuted_there_too(monkeypatch):
     monkeypatch.setattr(module, "decide", lambda identity, seed: passed)
     assert lab.verdict_on(wrong)[0] is Certainty.REFUTED
     assert lab.verdict_on(I.function)[0] is Certainty.PROVED
-
-
-def test_what_is_no_shorter_than_what_was_too_long_is_not_expanded(monkeypatch):
-    tried = []
-
-    def judged(map_, function, eps, seed, *, is_density, factor, expands):
-        if expands:
-            tried.append((len(function.numerator), is_density))
-        return Certainty.SUPPORTED, Evidence("random points over GF(p)", "held")
-
-    monkeypatch.setattr(laboratory, "verdict_on", judged)
-    lab, names = Laboratory(load("euler_top")), [*load("euler_top").variables, "eps"]
-    two, three, four = (parse_rational_function("+".join(names[:k]), names) for k in (2, 3, 4))
-    for one in (three, four, three, two, four):
-        lab.verdict_on(one)
-    lab.verdict_on(four, is_density=True)
-    assert tried == [(3, False), (2, False), (4, True)]

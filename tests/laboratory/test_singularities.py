@@ -11,7 +11,6 @@ from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.singular import outcomes
 from kahanmaps.laboratory.singular.jets import (
@@ -61,19 +60,6 @@ def test_the_degrees_of_the_critical_locus_add_up():
             assert sum(h.degree * (h.multiplicity or 0) for h in run.hypersurfaces) == run.critical_degree
 
 
-@pytest.mark.parametrize(
-    ("rhs", "verdict", "degrees"),
-    [
-        (["y", "-x"], "no singularities", (1, 0)),
-        (["y^2", "0"], "not confined", (2, 3)),  # a shear: f' is nilpotent, the map a polynomial automorphism
-    ],
-)
-def test_simple_systems(rhs, verdict, degrees):
-    run = singularities(QuadraticSystem.from_text(["x", "y"], rhs), "1/7", steps=6)
-    assert (run.verdict, (run.map_degree, run.critical_degree)) == (verdict, degrees)
-    assert {h.polynomial for h in run.hypersurfaces} == ({"Z"} if degrees[1] else set())
-
-
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass", "lotka_volterra"])
 def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     system = load(name).system
@@ -118,12 +104,6 @@ def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():
     assert (run.stopped, run.hypersurfaces) == (True, whole.hypersurfaces[:1])
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         singularities(top, "1/7", effort=Budget(1e9), progress=stop)
-
-
-def test_large_dimensions_are_refused():
-    names = [f"x{k}" for k in range(7)]
-    with pytest.raises(InputError, match="expected at most 6"):
-        singularities(QuadraticSystem.from_text(names, [f"{name}^2" for name in names]), "1/7")
 
 
 # --- the series ------------------------------------------------------------------------------------------------------

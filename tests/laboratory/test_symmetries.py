@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from kahanmaps import KahanMap
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.small_systems import SolutionComponent
-from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux
@@ -159,19 +158,6 @@ def test_too_large_is_undecided_with_a_reason():
     large = linear_symmetries(QuadraticSystem.from_text(names, [f"{v}^2" for v in names]))
     assert [text.split(" are ")[0] for text in large.undecided] == ["infinitesimal symmetries", "signed permutations"]
     assert large.symmetries == []
-
-
-def test_no_budget():
-    assert not linear_symmetries(load("three_wave", {}).system, effort=Budget(0)).complete
-    lorenz = load("lorenz", {}).system
-    stopped, whole = linear_symmetries(lorenz, effort=Budget(0)), linear_symmetries(lorenz)
-    assert any("f(S x) = S f(x) were not solved: the budget was spent" in text for text in stopped.undecided)
-    assert stopped.searched == ["affine infinitesimal symmetries and scalings: all"]
-    assert whole.searched == [
-        *stopped.searched,
-        "signed permutations, with a translation: all",
-        "rational matrices S, without a translation: all",
-    ]
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,10 @@ from flint import fmpq, fmpz_poly
 
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth
 from kahanmaps.laboratory.singular.following import Range
-from kahanmaps.laboratory.singular.singularities import Patterns, singularities
+from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.laboratory.singular.written import Word, followed_map_by_map
 
 
@@ -79,15 +78,6 @@ def test_powers_have_every_kth_degree(name, k, square):
     assert f"a step is {k} maps" in found.text
 
 
-def test_maps_whose_own_forms_are_too_large_are_refused(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.singular.written._MAX_TERMS", 1)
-    with pytest.raises(InputError, match="found a composition of maps whose forms on projective space are too large"):
-        singularities(word("mcmillan", power=7), 1)
-    found = degree_growth(word("mcmillan", power=7), max_terms=3)
-    assert found.degrees == tuple(2 * (7 * n) ** 2 + 1 for n in range(4))
-    assert found.patterns.running == "the composition is too long for its singularities to be followed"
-
-
 def test_every_nth_coefficient_of_a_fraction():
     above, below = fmpz_poly([1, 2]), fmpz_poly([1, -3, 1, 5])
     values = coefficients((above, below), 40)
@@ -95,8 +85,3 @@ def test_every_nth_coefficient_of_a_fraction():
         assert coefficients(every_nth((above, below), n, first), 6) == values[first::n][:6]
     with pytest.raises(ArithmeticError, match="coefficients that are too large"):
         every_nth((fmpz_poly([1]), fmpz_poly([1, -2, -3])), 600)
-
-
-def test_limits_of_a_long_composition_count_single_maps():
-    run = singularities(word("lotka_volterra", power=9), "1/7", steps=30)
-    assert (run.verdict, run.text) == ("not confined", "not confined within 30 single maps")

@@ -17,13 +17,6 @@ def start_of(text, **roots):
     return parse_algebraic_point(text, {name: parse_root(root) for name, root in roots.items()}, {"c": fmpq(3)})
 
 
-def test_coordinates_are_polynomials_in_the_number():
-    point = start_of("[1, 1/2 + 3*t, t^3, c*t]", t="root of t^2 + 1")
-    assert isinstance(point, AlgebraicPoint)
-    assert list(map(str, point.over(point.root.number_field))) == ["1", "3*t + 1/2", "-t", "3*t"]
-    assert point.over(GF(5)) in ((1, 4, 3, 1), (1, 2, 2, 4))  # t = 2 or 3, and 1/2 is 3
-
-
 # The image of a point over Q(i) is a computation with pairs of rational numbers: here by hand, for x' = y, y' = -x.
 def test_a_step_from_a_point_over_the_gaussian_numbers():
     map_ = over_number_field(km.System("x' = y; y' = -x").map, I)

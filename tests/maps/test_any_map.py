@@ -16,16 +16,13 @@ from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
-from kahanmaps.display.systems import orbit_html
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.invariants.heights import height, height_growth
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.kahan import Kahan, KahanMap
-from kahanmaps.maps.orbits.iteration import Orbit
 from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -183,30 +180,6 @@ def test_a_polarised_map_solves_its_defining_equation(x, eps):
     again, c = over.step(x)
     assert again == b
     assert (c - a) / (4 * eps) == a * b * c + (a * b + b * c + c * a) / 3 + eps
-
-
-def test_maps_at_different_eps_compose_to_one_without_an_eps():
-    phi, psi = (KahanMap(LOTKA_VOLTERRA, eps) for eps in ("1/10", "1/7"))
-    both = phi @ psi
-    assert ((phi @ phi).eps, both.eps) == (phi.eps, None)
-    assert both.step([2, 3]) == phi.step(psi.step([2, 3]))
-    assert both.inverse.step(both.step([2, 3])) == both.point([2, 3])
-    assert "different eps" in repr(both)
-    assert "eps" not in orbit_html(Orbit(both, [2, 3], 2))
-    assert height_growth(both, [2, 3], 2).heights[1] == height(both.step([2, 3]))
-
-
-def test_what_cannot_be_composed_is_refused():
-    with pytest.raises(InputError, match="found no map to compose"):
-        composed_map((MAPS["kahan"], 0))
-    with pytest.raises(InputError, match="found maps of the dimensions 2, 3"):
-        composed_map(MAPS["kahan"], MAPS["adjusted"])
-    with pytest.raises(InputError, match="not birational"):
-        composed_map((SQUARES, -1))
-    with pytest.raises(InputError, match="5 maps whose formulas are too large to be multiplied out"):
-        _ = composed_map((MAPS["quartic"], 5)).rows
-    with pytest.raises(InputError, match="not birational"):
-        _ = composed_map((SQUARES, 2)).at(1).inverse
 
 
 # The door.

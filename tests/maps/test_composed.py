@@ -15,7 +15,6 @@ from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble
-from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.orbits.orbit import orbit
 
 F = load("lotka_volterra").map
@@ -113,11 +112,3 @@ def test_powers_of_one_map_have_its_time_step_so_many_times_and_products_of_fiel
     word = composed_map(*parts)
     assert word.time_steps == steps
     assert time_step(fmpq(1, 10), word) == (fmpq(steps, 5) if steps else None)
-
-
-def test_exponents_per_unit_of_time_are_those_of_the_map_whose_power_is_taken():
-    start = [[0.5, 0.25]]
-    once = lyapunov_exponents(F, start, "1/10", 600, transient=60)
-    cubed = lyapunov_exponents(composed_map((F, 3)), start, "1/10", 200, transient=20)
-    assert cubed.unit == pytest.approx(3 * once.unit)
-    assert cubed.mean == pytest.approx(once.mean, rel=1e-6)  # the same orbit, summed in another order

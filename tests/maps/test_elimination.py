@@ -80,14 +80,6 @@ def test_minors_with_common_content_are_solved_correctly(n, W, offered):
         assert divide(matrix, right, offered) == by_flint(matrix, right)
 
 
-@pytest.mark.parametrize("n", range(3, 9))
-def test_a_vanishing_pivot_makes_the_elimination_step_aside(n):
-    matrix = fmpz_mat(n, n, [int(i + j == n - 1) for i in range(n) for j in range(n)])  # the reversal
-    right = fmpz_mat(n, 1, list(range(n)))
-    assert solve_fraction_free(matrix, right, LONG_PRIME) is None
-    assert divide(matrix, right, LONG_PRIME).numerators == tuple(reversed(range(n)))
-
-
 # Of the six minors of order 3 the elimination looks at every second one and finds d in all of them; the others do not
 # contain it, so that the divisions by d are not exact.
 D = LONG_PRIME

@@ -5,7 +5,6 @@ orbits lie on elliptic curves, also on several in turn, and nowhere else; what i
 """
 
 from io import StringIO
-from itertools import pairwise
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -172,26 +171,6 @@ def test_a_start_on_a_curve_of_genus_0_or_of_finite_order_has_no_sequences():
     assert elliptic.elliptic_steps(pentagon, IntegerPoint.from_rationals((fmpq(1, 2), fmpq(2))), BITS) is None
 
 
-def test_an_orbit_ends_after_a_point_with_too_many_bits():
-    map_over = over("euler_top")
-    *within, beyond = rational_orbit.RationalOrbit(map_over, begin(map_over), max_bits=4000)
-    assert max(point.bits for point in within) <= 4000 < beyond.bits
-    # Of several factors only the first was taken.
-    assert len(list(rational_orbit.RationalOrbit(map_over**2, begin(map_over), max_bits=400))) < len(within) + 1
-
-
-def test_powers_step_by_the_sequences_of_the_map_itself():
-    map_over = over("mcmillan")
-    for power in (2, 12):
-        expected = single_steps(map_over**power, begin(map_over), 120 // power)
-        points, orbit = walked(map_over**power, expected[0], 120 // power)
-        assert points == expected
-        assert orbit.relations is not None
-    both = over("weierstrass") @ over("weierstrass", "1/5")
-    assert len(elliptic._unit((both**3).factors)) == 2
-    assert elliptic.elliptic_steps(both, begin(both), BITS) is None
-
-
 @pytest.mark.parametrize("name", ["euler_top", "todd", "hky", "mcmillan", "clebsch_first_flow"])
 def test_points_that_are_not_wanted_are_left_out(name):
     map_over = over(name)
@@ -229,24 +208,3 @@ def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_
     expected = single_steps(map_over, begin(map_over), 50)
     at = [point.value for point in Orbit(map_over, START[:3], 50, wanted={50}.__contains__)]
     assert at[-1] == expected[-1]
-
-
-def test_numbers_that_are_too_long_are_looked_for_again_along_longer_points(monkeypatch):
-    asked = []
-
-    def counted(map_over, start, bits):
-        asked.append(bits)
-        return elliptic.elliptic_steps(map_over, start, bits)
-
-    monkeypatch.setattr(rational_orbit, "elliptic_steps", counted)
-    monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 100)
-    map_over = over("repaired_octahedral")
-    points, orbit = walked(map_over, begin(map_over), 40)
-    assert points == single_steps(map_over, begin(map_over), 40)
-    assert len(asked) > 1
-    assert all(later >= 4 * sooner for sooner, later in pairwise(asked))
-    assert points[orbit.since - 1].bits == asked[-1]
-    asked.clear()
-    monkeypatch.setattr(elliptic, "_MOST_PRIMES", 2)  # along longer points there would be no more
-    again, orbit = walked(map_over, begin(map_over), 40)
-    assert (again, orbit.relations, len(asked)) == (points, None, 1)

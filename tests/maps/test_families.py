@@ -10,7 +10,6 @@ import pytest
 
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
-from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.maps.residues.families import NOWHERE, Family
 
 THREE_LINES = """variables = ["x", "y"]
@@ -72,12 +71,3 @@ def test_an_iterate_that_exists_nowhere_is_told(kernel):
     vanishing = 'variables = ["x"]\nparameters.a = 1\n[bilinear]\nequations = ["a*(X - x) = eps*a*x*X"]'
     found = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
     assert found.tolist() == [[1, 1], [NOWHERE, NOWHERE]]
-
-
-def test_what_is_out_of_range_is_refused():
-    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
-    for prime in (2, 15, 8191 * 3, 8209):
-        with pytest.raises(InputError, match="expected an odd prime below 8192"):
-            Family(map_, prime)
-    with pytest.raises(BadPrime):
-        Family(map_with_symbols(parse_system(THREE_LINES.replace("+ x)", "+ x/7)")), ["g1"]), 7)

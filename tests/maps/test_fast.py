@@ -14,18 +14,14 @@ from itertools import pairwise
 from math import log2, nextafter
 
 import numpy as np
-import pytest
 from flint import fmpq
 from helpers import EULER_TOP
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, stream_orbit, to_float
-from kahanmaps.maps.orbits.iteration import OrbitEnd
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, to_float
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
 OSCILLATOR = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
 
 
@@ -50,15 +46,6 @@ def exact(number: float) -> fmpq:
     return fmpq(*number.as_integer_ratio())
 
 
-# One step.
-
-
-@pytest.mark.parametrize("eps", ["0", "1e-400"])
-def test_an_eps_that_rounds_to_zero_is_refused(eps):
-    with pytest.raises(InputError, match="eps is 0 in machine numbers"):
-        FloatOrbit(RICCATI, eps, [1], 1)
-
-
 # Orbits.
 
 
@@ -74,35 +61,10 @@ def test_the_method_has_order_two():
     assert max(abs(slope - 2) for slope in slopes) < 0.01  # the next term of the error is of order 4: h^2 <= 2^-8
 
 
-# Ends.
-
-
-def test_an_interrupted_orbit_ends_after_the_point_in_hand():
-    orbit = FloatOrbit(OSCILLATOR, "1/10", [1, 0], None)
-    for step, _ in orbit:
-        if step == 5:
-            orbit.interrupt()
-    assert orbit.end == OrbitEnd("interrupted", 5, "interrupted after step 5")
-
-
 # On disk.
 
 
 START = ["1", "1/2", "1/3"]
-
-
-def test_an_interrupted_orbit_leaves_a_whole_file(tmp_path):
-    orbit = FloatOrbit(EULER_TOP, "1/10", START, None, every=100, kernel="numpy")
-    seen = []
-
-    def progress(step: int) -> None:
-        seen.append(step)
-        if len(seen) == 2:
-            orbit.interrupt()
-
-    end = stream_orbit(orbit, tmp_path / "x.npy", progress=progress)
-    assert (end.status, end.steps) == ("interrupted", seen[-1])
-    assert len(np.load(tmp_path / "x.npy")) == seen[-1] // 100 + 1
 
 
 ENDLESS = """

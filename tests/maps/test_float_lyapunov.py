@@ -8,8 +8,6 @@ import pytest
 from flint import fmpq_mat
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
@@ -98,26 +96,3 @@ def test_a_time_limit_keeps_the_complete_portions():
     whole = lyapunov_exponents(system, starts, "1/100", 1536)
     assert found.exponents == pytest.approx(whole.exponents, abs=1e-9)
     assert np.isnan(found.half).all()
-
-
-@pytest.mark.parametrize(
-    ("starts", "steps", "eps", "words"),
-    [
-        ([[1.0]], 10, "1/10", "expected rows of 2 finite numbers"),
-        ([[1.0, math.inf]], 10, "1/10", "finite"),
-        (np.empty((0, 2)), 10, "1/10", "at least one"),
-        ([[1.0, 1.0]], 1, "1/10", "at least 2"),
-        ([[1.0, 1.0]], 10, "0", "eps = 0"),
-    ],
-)
-def test_wrong_use_is_refused(starts, steps, eps, words):
-    with pytest.raises(InputError, match=words):
-        lyapunov_exponents(load("harmonic").system, starts, eps, steps)
-
-
-def test_the_exponents_of_a_map_without_a_time_step_are_per_step():
-    baker = parse_system('variables = ["x", "y"]\n[map]\nimage = ["3*x", "y/2"]').map
-    found = lyapunov_exponents(baker, np.array([[1e-9, 1.0]]), 1, 20)
-    assert found.mean == pytest.approx([math.log(3), -math.log(2)])
-    assert found.unit == 1.0
-    assert found.log_volume == pytest.approx([math.log(1.5)])

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from flint import acb, arb, fmpq, fmpq_poly
+from flint import acb, arb, fmpq_poly
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.floats.blocks import _sine, _Unclear, planar_blocks
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -63,18 +63,6 @@ def test_block_integrals_do_not_drift(name):
         # denominator of the integral are larger than their quotient by the cube and the square of the distance.
         assert (drift.largest <= 1e-8 * (1 + abs(drift.initial))).all()
         assert (drift.last <= drift.largest).all()
-
-
-def test_block_integrals_are_those_of_the_exact_normal_form():
-    form = FORMS["three real roots"]
-    start = [fmpq((-1) ** k * (k + 2), 20 * (k + 1)) for k in range(6)]
-    X, Y = form.coordinates(start)
-    eps = fmpq(1, 10)
-    root = fmpq(-2)
-    value = form.h(X, Y)(root) / (1 + eps**2 * form.D(X, Y)(root))
-    drift = ensemble("three real roots", [start], kernel="numpy").drift[0]
-    assert drift.name == "h/(1 + eps^2 D) at t = -2"
-    assert drift.initial[0] == pytest.approx(to_floats([value])[0], rel=1e-11)
 
 
 @over_kernels

@@ -5,8 +5,6 @@ in arrays where it is too long for that; kernels, threads, company, portions and
 bit, hostile orbits among them; each way to end has its status and its step, which other orbits do not notice.
 """
 
-import pickle
-
 import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
@@ -185,19 +183,6 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     assert (one.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
 
 
-@over_kernels
-def test_an_ensemble_goes_on_after_pickling_and_its_points_stay_as_they_were(kernel):
-    orbits = FloatEnsemble(EULER_TOP, "1/10", np.array([[1.0, 0.5, 0.25]]), kernel=kernel)
-    orbits.advance(10)
-    before, copy = orbits.x, pickle.loads(pickle.dumps(orbits))
-    kept = before.copy()
-    for it in (orbits, copy):
-        it.advance(10)
-    same(orbits, copy)
-    assert np.array_equal(before, kept)
-    assert not np.array_equal(before, orbits.x)
-
-
 # Ends.
 
 
@@ -240,26 +225,6 @@ def test_an_overflow_ends_one_orbit_and_leaves_the_others(kernel):
     assert np.isnan(orbits.x[0]).all()
     orbits.advance(10)
     assert orbits.failed_at[0] == 18
-
-
-@pytest.mark.parametrize("count", [1, 20], ids=["one by one", "in arrays"])
-@pytest.mark.parametrize("most", [NONE_WRITTEN, FAST_WRITTEN])
-def test_long_steps_end_as_those_that_are_written_out(count, most, monkeypatch):
-    """The chain beside x' = x^2, eps = 1/2: x~ = x/(1 - x)."""
-    system = QuadraticSystem.from_text([*CHAIN.variables, "x"], [*map(str, CHAIN.rhs), "x^2"])
-    starts = np.zeros((5 * count, 9))
-    starts[:, 8] = [0.25, 1 / 2, 1.0, 1 - 2.0**-45, -0.5] * count
-    starts[4::5, :8] = 1e300 * np.arange(1, 9)
-
-    def ends():
-        orbits = FloatEnsemble(system, "1/2", starts, kernel="numpy")
-        orbits.advance(2)
-        return orbits.failed_at.tolist(), orbits.status.tolist(), orbits.near_singular[:4].tolist()
-
-    expected = ends()
-    assert set(expected[1]) == {"completed", "singular", "overflow"}
-    monkeypatch.setattr(steps, "MAX_OPERATIONS", most)
-    assert ends() == expected
 
 
 # Choices and refusals.

@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 import kahanmaps.maps.inverse as module
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import SystemFileError
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.inverse import NotBirational, TooLarge, inverse_rows, why_not_birational
 
@@ -74,19 +72,3 @@ def test_elimination_ends_where_it_grows_too_large(monkeypatch):
     monkeypatch.setattr(module, "_MOST_TERMS", 1)
     with pytest.raises(TooLarge, match="give it as well"):
         inverse_rows(rows)
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ('image = ["x^2", "y"]', "at least 2 preimages"),
-        ('image = ["1", "y"]', "det dPhi is 0 everywhere"),
-        ('image = ["y", "x", "x"]', "found 3 functions, expected 2"),
-        ('image = ["y", "x + y^2"]\ninverse = ["y - x^2", "-x"]', "does not lead back"),
-    ],
-)
-def test_a_wrong_file_gets_one_clear_line(text, sentence):
-    with pytest.raises(SystemFileError) as caught:
-        parse_system(f'variables = ["x", "y"]\n[map]\n{text}')
-    [line] = str(caught.value).splitlines()[1:]
-    assert sentence in line

@@ -191,12 +191,6 @@ def test_the_map_has_no_value_exactly_where_its_determinant_vanishes(field, pair
     assert (step_or_none(phi, x) is None) is (phi.determinant(x) == 0)
 
 
-def test_a_singular_step_names_the_point_and_eps():
-    with pytest.raises(SingularStep, match=r"at the point 1,2 for eps = 1/2") as caught:
-        KahanMap(QuadraticSystem.from_text(["x", "y"], ["x^2", "0"]), "1/2").step([1, 2])
-    assert (caught.value.point, caught.value.eps) == ((1, 2), fmpq(1, 2))
-
-
 # The door.
 
 

@@ -52,10 +52,3 @@ def test_a_table_has_the_values_of_integrals_and_none_at_a_pole(arithmetic):
     assert rows[1]["p"] is not None
     if arithmetic in ("exact", "mod:101"):
         assert len({row["F1"] for row in rows}) == 1
-
-
-def test_a_full_disk_is_named(tmp_path):
-    for form in ("csv", "jsonl", "npz", "npy"):
-        found = km.orbit(TOP, [1, 2, 3], "1/10", 50_000 if form == "npy" else 3, arithmetic="float")
-        with pytest.raises(OSError, match="/dev/full"):
-            found.write("/dev/full", form)

@@ -128,16 +128,6 @@ def test_an_orbit_ends_before_its_numbers_exceed_the_budget():
     assert beyond.digits > 500
 
 
-# Precision.
-
-
-def test_balls_that_have_grown_too_wide_end_the_orbit():
-    orbit = Orbit(KahanMap(HENON_HEILES, "1/10", RR(30)), ["1/5", "1/7", 0, "1/3"], 10_000)
-    delivered = sum(1 for _ in orbit)
-    assert (orbit.end.status, orbit.end.steps) == ("precision", delivered - 1)
-    assert "more bits" in orbit.end.message
-
-
 # Interrupted.
 
 
@@ -220,19 +210,6 @@ def test_iterates_are_points_of_the_orbit(name, field, backward):
     iterates = Orbit(phi, start, at=[27, 0, 3, 26, 3], normal_form=normal_form, backward=backward)
     assert [(point.step, point.text) for point in iterates] == [(n, points[n]) for n in (0, 3, 26, 27)]
     assert iterates.end == OrbitEnd("completed", 27, "4 iterates reached directly")
-
-
-def test_iterates_stop_where_numbers_would_be_too_long():
-    normal_form, system = structure_and_system("m = 2")
-    iterates = Orbit(
-        KahanMap(system, "1/10"), [1, 2, 3, 4], at=[5, 10**5, 10**6], normal_form=normal_form, max_digits=1000
-    )
-    assert [point.step for point in iterates] == [5]
-    assert [point.step for point in iterates.first] == [5]
-    assert "more than the budget of 1000" in iterates._repr_html_()
-    assert (iterates.end.status, iterates.end.steps) == ("budget", 5)
-    assert iterates.end.message.startswith("step 100000 cannot be reached: step ")
-    assert "more than the budget of 1000 (--max-digits)" in iterates.end.message
 
 
 def test_an_iterate_in_flight_is_given_up_when_a_signal_asks_for_it():

@@ -10,20 +10,17 @@ from collections import Counter
 from math import lcm
 
 import pytest
-from flint import fmpq, fmpq_poly, fmpz, fq_default_ctx
+from flint import fmpq, fmpz, fq_default_ctx
 from helpers import together
 from planar_helpers import STARTS, Finite, planar_system, planes_over, structure_and_system
 
 from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.family.draw import draw_with_chi
-from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.division import PeriodicLevels
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic
 from kahanmaps.maps.normal_form.periods import (
     PeriodKind,
     period_of,
-    period_over_rationals,
     plane_period,
     plane_period_over_rationals,
     poles,
@@ -205,14 +202,6 @@ def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
             assert (found.status, found.period, found.meets_pole) == ("periodic", step, met)
             return
     assert found.status in ("aperiodic", "undefined") or (met and found.meets_pole)
-
-
-def test_random_rational_orbits_are_proved_not_to_be_periodic():
-    for chi in ([2, -3, 1], [-2, 0, 1]):
-        form = normal_form(draw_with_chi(fmpq_poly(chi), seed=3))
-        found = period_over_rationals(form, "1/10", ["1/2", "-1/3", 0, 1])
-        assert (found.status, found.period) == ("aperiodic", None)
-        assert "orders" in found.text
 
 
 # Levels with a period: division polynomials.

@@ -43,21 +43,6 @@ def test_the_points_are_those_of_plain_gcds(cubic, start):
     assert walked(block, 25) == by_gcds(block, 25)
 
 
-@pytest.mark.parametrize("steps", [2, 3, 4, 5, 8, 13, 21])
-@pytest.mark.parametrize(
-    "name",
-    [
-        "a pole at step 2",
-        "a pole at step 5",
-        "delta = 1, a pole at step 3",
-    ],
-)
-def test_an_orbit_ends_before_its_pole(name, steps):
-    cubic, start = STARTS[name]
-    block = integer_block(cubic, before(cubic, start, steps))
-    assert walked(block, 40) == by_gcds(block, 40)
-
-
 # The n-th point.
 
 
