@@ -13,7 +13,6 @@ from kahanmaps.errors import (
     UnknownName,
     bounded,
     quoted,
-    reading,
 )
 
 
@@ -33,16 +32,6 @@ def test_every_error_is_bounded_and_what_can_be_read_is_left_alone():
     for text in ("", "found 'x', expected 'y'", f"there is no file {'/folder' * 40}", "a\nb\n"):
         assert bounded(text) == text
     assert quoted("\x1b[31m" + "y" * 100) == repr("\x1b[31m" + "y" * 35 + "...")  # nothing for a terminal to obey
-
-
-def test_an_unexpected_error_carries_the_name_of_what_was_read():
-    with pytest.raises(TypeError) as caught, reading("a.toml"):
-        raise TypeError("a surprise")
-    assert caught.value.__notes__ == ["a.toml"]
-    for error in (InputError("expected"), OSError(2, "no"), MemoryError()):
-        with pytest.raises(type(error)) as known, reading("a.toml"):
-            raise error
-        assert not hasattr(known.value, "__notes__")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from cli_helpers import COMMAND, Outcome, time_is_over
 
 from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.version import __version__
 
 TOP = "analyze euler_top"
 STATUSES = {"proved", "supported", "explained", "measured", "undecided", "note"}
@@ -52,32 +51,6 @@ def test_the_report_as_text(kahanmaps):
         "Superintegrable (proved): 2 independent integrals in dimension 3, so that orbits lie on curves; quadratic "
         "growth, dynamical degree 1 (explained). It is Liouville integrable, with the Poisson tensor P1 (proved).",
     )
-
-
-def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
-    found = kahanmaps(f"{TOP} --json --seed 5 --symbolic a2,eps").json
-    assert found["document"]["name"] == "euler_top"
-    assert {line["status"] for line in found["statements"]} <= STATUSES
-    assert {"section": "growth", "status": "explained", "text": "d_n = 2*n^2 + 1"} in found["statements"]
-    assert [run["verdict"] for run in found["singularities"]] == ["confined", "confined"]
-    expected = {
-        "version": __version__,
-        "parameters": {"a1": "1", "a2": "-2", "a3": "1"},
-        "symbols": ["a2"],
-        "eps": "every",
-        "convention": "eps is the paper's epsilon, the time step is 2 eps",
-        "seed": 5,
-        "effort": 1,
-        "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
-        "equivalent": None,  # it is one of the catalogue
-        "skipped": [],
-        "interrupted": False,
-    }
-    assert {key: found[key] for key in expected} == expected
-    verdict = found["verdict"]
-    assert (verdict["integrability"], verdict["integrals"], verdict["growth"]) == ("integrable", 2, "quadratic")
-    assert (verdict["integrals_exact"], verdict["sense"], verdict["ground"]) == (True, "superintegrable", "proved")
-    assert "The integrals and densities are for every a2, all else is for the given values." in verdict["sentence"]
 
 
 def test_text_json_and_markdown_say_the_same(once):

@@ -3,8 +3,6 @@
 The tasks that go wrong are those of tests/experiments/fault_tasks.py.
 """
 
-import csv
-import io
 import json
 import re
 import shutil
@@ -123,16 +121,6 @@ def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
     assert not Path("study.db").exists()
 
 
-def test_all_mistakes_of_a_spec_are_told_and_nothing_is_begun(batch):
-    done = batch("run", SPACE.replace("family-space", "familyspace").replace('system = "family"', "sistem = 1"))
-    assert done.status == 2
-    assert "study.toml: " in done.err
-    assert "experiments.space.task: there is no task 'familyspace'" in done.err
-    assert "did you mean family-space?" in done.err
-    assert "experiments.space.sistem: unknown key" in done.err
-    assert not Path("study.db").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -181,16 +169,6 @@ def test_a_task_can_be_redone_from_what_show_prints(batch):
     again = task_kind(data["task"]).perform(system_from(data["system"], documents.__getitem__), data["options"])
     assert again.pop("verdict") == data["verdict"]
     assert again == data["result"]
-
-
-def test_export_writes_a_table_or_lines_to_a_file_or_out(batch, space):
-    rows = list(csv.DictReader(io.StringIO(batch("export --db study.db --csv").out)))
-    assert [(row["m"], row["dimension"]) for row in rows] == [("2", "8")] * 3 + [("3", "12")] * 3
-    batch("export --db study.db -o study.csv")  # the ending says which
-    assert list(csv.DictReader(io.StringIO(Path("study.csv").read_text()))) == rows
-    records = batch("export --db study.db --jsonl --stable").records
-    assert [record["record"] for record in records] == ["header", *["result"] * 6, "end"]
-    assert "seconds" not in records[1]
 
 
 def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):

@@ -69,22 +69,6 @@ def test_system_files_and_folders_are_offered_and_no_other_file(offered, folder)
     assert offered("kahanmaps orbit n", folder) == [name for name in names() if name.startswith("n")]
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "kahanmaps orbit broken.toml -p ",
-        "kahanmaps orbit nowhere.toml -p ",
-        "kahanmaps orbit nowhere/x",
-        "kahanmaps orbit euler_top --eps x --steps",
-        "kahanmaps orbit 'unfinished",
-        "kahanmaps nonsense --st",
-        "kahanmaps orbit ~nobody/",
-    ],
-)
-def test_nothing_is_said_where_the_line_is_wrong(asked, folder, line):
-    assert asked(line, folder).err == ""
-
-
 def test_nothing_that_computes_is_loaded():
     code = (
         "import sys\nfrom kahanmaps_cli.main import main\nmain([])\n"

@@ -191,10 +191,6 @@ def test_a_reader_that_has_left_changes_no_exit_status(kahanmaps, unread, least_
     assert (kahanmaps(line).status, unread(line)) == (status, status)
 
 
-def test_an_orbit_ends_early_when_its_reader_leaves(unread):
-    assert unread("orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007") == 3
-
-
 # Disks and limits
 
 

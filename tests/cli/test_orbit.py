@@ -22,18 +22,6 @@ TOP = "orbit euler_top --start 1,1/2,-1/3 --eps 1/10"
 LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
 
 
-def test_an_inline_system_may_be_written_as_equations(kahanmaps):
-    rest = "--start 1,2 --eps 1/10 --steps 3"
-    plain = kahanmaps(f"orbit --vars x,y --rhs x*y --rhs=-x {rest}").out
-    for system in (
-        "--rhs \"x' = x*y; y' = -x\"",
-        '--rhs "dx/dt = x*y" --rhs "dy/dt = -x"',
-        "--vars x,y --rhs 'x*y; -x'",
-    ):
-        assert kahanmaps(f"orbit {system} {rest}").out == plain
-    assert "or --rhs \"x' = x*y; y' = -x\"" in kahanmaps(f"orbit --rhs x*y {rest}").err
-
-
 def test_a_start_and_parameters_may_be_written_as_people_paste_them(kahanmaps):
     rest = "--eps 1/10 --steps 2"
     plain = kahanmaps(f"orbit 'dx/dt = a*x - x*y, dy/dt = x*y - b*y' -p a=2 -p b=1/3 --start 1,-1/2 {rest}")

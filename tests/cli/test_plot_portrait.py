@@ -71,12 +71,6 @@ def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, 
     assert "1 of 2 levels of modified_H have no curve in the window" in outcome.err
 
 
-def test_points_outside_are_counted_on_standard_error_and_in_the_picture(kahanmaps, drawn):
-    outcome = kahanmaps(f"{PLOT} --vars x,y --rhs x --rhs y --eps 1/4 --start 1,1 --steps 40")
-    assert "points lie outside the window" in outcome.err
-    assert drawn[0][1]["note"] == f"{drawn[0][0].left_out} points outside"
-
-
 def test_ctrl_c_ends_a_portrait_without_a_picture(kahanmaps, drawn, monkeypatch, tmp_path):
     """Also where the orbits are complete already, as those of one portion are."""
     monkeypatch.setattr(Progress, "__call__", lambda self, sentence: signal.raise_signal(signal.SIGINT))

@@ -28,16 +28,6 @@ def test_print_shows_what_the_command_prints_below_its_heading(kahanmaps, result
     assert f"{result()}\n" == kahanmaps(words).out.split("\n", 1)[1]
 
 
-def test_print_shows_the_part_of_one_value_of_what_is_printed_for_several(kahanmaps):
-    out = kahanmaps("singularities weierstrass --eps 1/3").out.replace("det(I - eps f')", "denominator")
-    assert str(km.singularities("weierstrass", "1/3")).split("\n", 1)[1] in out
-    census = str(km.cycles("weierstrass", "1/7", 101))
-    assert census.split("\nlength")[0] in kahanmaps("cycles weierstrass --eps 1/7 --prime 101").out
-    period = km.orbit_period(km.system_normal_form(km.load("paper_m2").system).form, "1/10", [1, 2, 3, 4], 101)
-    out = kahanmaps("period paper_m2 --eps 1/10 --start 1,2,3,4 --arithmetic mod:101").out
-    assert str(period).split("\t")[1].split("\n")[0] in out
-
-
 def test_rows_are_tables():
     darboux, run = km.darboux_polynomials("lotka_volterra", 1), km.singularities("weierstrass", "1/3")
     assert darboux.rows()[0] == {"cofactor": "C[x]", "polynomial": "x", "verdict": "proved"}

@@ -80,19 +80,6 @@ def test_a_store_that_is_closed_or_opened_to_be_read_refuses_to_write(path):
         store.status()
 
 
-def test_a_database_of_the_second_format_is_read_and_written(path):
-    planned(path, 1, 2, records=[ok(1)])
-    with closing(sqlite3.connect(path)) as other, other:
-        for table in ("experiment", "result"):
-            other.execute(f"ALTER TABLE {table} ADD COLUMN checksum INTEGER")
-        other.execute("PRAGMA user_version = 2")
-        other.execute("PRAGMA journal_mode = WAL")
-    with Store.open(path) as store:
-        store.add([ok(2)])
-        assert [row.record for row in store.rows()] == [ok(1), ok(2)]
-    assert os.listdir(path.parent) == [path.name]
-
-
 # A full disk, kills
 
 

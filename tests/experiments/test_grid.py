@@ -10,10 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.grid import Grid, RationalRange, read_values
-from kahanmaps.experiments.options import VOCABULARY
+from kahanmaps.experiments.grid import Grid, RationalRange
 
-EPS, STEPS, METHOD = (VOCABULARY[name] for name in ("eps", "steps", "method"))
 HUGE = 10**18
 
 
@@ -31,12 +29,6 @@ def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
         values.append(first)
         first += step
     return values
-
-
-def mistakes(option: Any, raw: Any) -> list[tuple[tuple[int, ...], str]]:
-    values, found = read_values(option, raw)
-    assert values is None
-    return found
 
 
 # Ranges
@@ -94,31 +86,6 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     found = RationalRange(first, last, step)
     assert len(found) == len(expected)
     assert [fraction(value) for value in found] == expected
-
-
-# Values of an option
-
-
-@pytest.mark.parametrize(
-    ("option", "raw", "expected"),
-    [
-        (STEPS, "1/2..1 step 1/2", [((), "found 1/2, expected a whole number from 0 to 1000000000")]),
-        (EPS, [], [((), "found an empty list, expected at least one value")]),
-        (EPS, [1, 0, "x"], [(2, "found 0"), (3, "found 'x'")]),
-        (EPS, "-1..1", [((), "found 0, expected another number")]),
-        (EPS, ["0.1", "1/10"], [(2, "found '1/10', the same value as in place 1: expected it once")]),
-        (STEPS, "0..4 step 3/2", [((), "found 3/2, expected a whole number")]),
-        (STEPS, "-5..5", [((), "found -5, expected a whole number")]),
-        (STEPS, "0..1e10 step 1e9", [((), "found 10000000000, expected a whole number")]),
-        (EPS, ["1..4e18", "5e18..9e18"], [((), "found more values than anybody can want")]),
-        (METHOD, "1..2", [((), "found '1..2', expected one of")]),
-    ],
-)
-def test_wrong_values_are_told_with_their_places(option, raw, expected):
-    found = mistakes(option, raw)
-    assert [place for place, _ in found] == [place if place == () else (place,) for place, _ in expected]
-    for (_, sentence), (_, words) in zip(found, expected, strict=True):
-        assert sentence.startswith(words)
 
 
 # Grids

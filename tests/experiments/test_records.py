@@ -45,23 +45,6 @@ def test_keys_stay_the_same_from_version_to_version():
     assert (TASK.key, FILE.key) == ("9bb970790bd9ee91d5fab53e891129a2", "c6de480710a5912168ac18d97b312d9f")
 
 
-@pytest.mark.parametrize(
-    ("task", "name", "value"),
-    [
-        (TASK, "eps", "1/10"),
-        (TASK, "start", None),
-        (TASK, "m", 2),
-        (TASK, "parameters.a", None),
-        (FILE, "parameters.a", "2"),
-        (FILE, "m", None),
-        (Task("verify-universal", None, {"m": 3}), "parameters.a", None),
-        (Task("a", {"family": {"seed": 1}}, {"seed": 2}), "seed", 2),  # the option comes first
-    ],
-)
-def test_a_task_tells_its_options_and_the_pieces_of_its_system(task, name, value):
-    assert task.value(name) == value
-
-
 @given(tables, st.none() | tables, st.sampled_from(Outcome))
 def test_a_record_is_made_again_from_its_json(versions, result, outcome):
     record = Record("key", outcome, result, "proved", "message", "stderr", 0.1, 10**12, "host", versions, "2026-01-02")

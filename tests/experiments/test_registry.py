@@ -84,16 +84,6 @@ def test_a_task_is_done_with_what_its_options_stand_for():
     assert {name: asked[name] for name in expected} == expected
 
 
-def test_an_option_that_is_none_is_told_with_a_suggestion():
-    with pytest.raises(TypeError, match="task a-task: stpes is not an option; did you mean steps"):
-        task("a-task")(lambda stpes: {})
-
-
-def test_two_tasks_cannot_have_one_name():
-    with pytest.raises(TypeError, match="there are two tasks of the name orbit"):
-        task("orbit")(lambda seed=0: {"mine": seed})
-
-
 def test_an_unknown_task_is_told_with_the_known_ones_and_a_suggestion():
     with pytest.raises(InputError) as caught:
         task_kind("orbot")

@@ -68,14 +68,6 @@ def test_a_wrong_system_is_told_once_with_its_key(folder, monkeypatch, system, e
     assert told.startswith(sentence.replace("FOLDER", str(folder)))
 
 
-@pytest.mark.parametrize("name", ["a b", "", "a/b", "ä", "a" * 81, "\\u001b[31m", "a\\nb"])
-def test_a_name_of_an_experiment_is_short_and_plain(name):
-    ((key, sentence),) = mistakes(LORENZ.replace(".a]", f'."{name}"]') + "axes = {eps = 1}")
-    assert key.startswith("experiments.")
-    assert key.isprintable()
-    assert sentence == "expected a name of at most 80 letters, digits and the characters _ . + -"
-
-
 def test_nothing_in_a_message_is_obeyed_by_a_terminal():
     text = LORENZ + 'axes = {"\\u001b[31m" = 1, eps = "\\u001b[1m"}\nzip = [["eps", "\\u001b[0m"]]\n"\\u0007" = 1'
     text += '\n[experiments.b]\ntask = "\\u001b[1m"\nsystem = "\\u001b[1m"'
@@ -151,8 +143,3 @@ def test_every_document_is_a_spec_or_a_list_of_mistakes(tmp_path_factory, text):
     else:
         assert isinstance(spec, Spec)
         assert all(Task.from_text(e[0].text) == e[0] for e in spec.experiments)
-
-
-def test_a_system_file_is_told_from_a_spec():
-    with pytest.raises(SpecError, match="a system file is for the other commands"):
-        parse_spec('variables = ["x"]\n[system]\nrhs = ["x"]\n')

@@ -261,15 +261,6 @@ def test_of_two_results_of_a_task_the_right_one_is_kept(path, mine, theirs, kept
         assert [row.record for row in store.rows(missing=True)] == [kept]
 
 
-def test_attempts_come_along_and_do_not_grow_when_merged_again(path):
-    source = planned(path.with_name("source.db"), 1, 2, records=[failed(1), failed(1), ok(1), failed(2), failed(2)])
-    planned(path, 1, 2, records=[failed(1)])
-    with Store.open(path) as store:
-        for _ in range(2):
-            store.merge(source)
-            assert [store.find(task(number).key)[0].attempts for number in (1, 2)] == [4, 2]
-
-
 def test_an_experiment_defined_in_two_ways_stops_the_merge_and_nothing_is_changed(path):
     source = path.with_name("source.db")
     with Store.open(source, create=True) as store:

@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.display.experiments import summary_markdown
-from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Outcome, Record, Row, Task
 from kahanmaps.experiments.results.summary import QUANTILES, summarise
 
@@ -90,25 +89,6 @@ def test_rows_are_grouped_by_options_parts_of_the_recipe_and_results():
         ("failed", "no"),
         ("ok", None),
     ]
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"by": ["dimensions"]}, r"unknown name 'dimensions', did you mean dimension\? names to group by: dim"),
-        (
-            {"by": ["zzz"]},
-            r"unknown name 'zzz'; names to group by: dimension, document, eps, experiment, height, m, me",
-        ),
-        ({"values": ["heigth"]}, r"unknown name 'heigth', did you mean height\? names of numbers: height, peak"),
-        ({"values": ["status"]}, "unknown name 'status'"),  # a text in all of the rows
-        ({"values": ["seconds"], "stable": True}, "unknown name 'seconds'"),
-    ],
-)
-def test_a_mistaken_name_is_reported_with_those_that_exist(options, message):
-    rows = [row({"dimension": "d", "height": 3, "status": "done"}, of=task(eps="1/10"))]
-    with pytest.raises(InputError, match=message):
-        summarise(rows, **options)
 
 
 # What is made of it

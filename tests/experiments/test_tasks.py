@@ -23,7 +23,6 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.heights import height_growth
-from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits.iteration import Orbit
@@ -144,21 +143,6 @@ def test_heights_are_those_of_the_library(system, steps, growth):
     result = perform("heights", system, eps="1/10", steps=steps)
     assert result["growth"] == found["kind"] == growth
     assert (result["heights"], result["constant"], result["reached"]) == (found["heights"], found["constant"], steps)
-
-
-def test_an_ensemble_is_that_of_the_library():
-
-    found = perform("ensemble", load("lorenz"), eps="1/10", orbits=50, box="1/2", steps=300, seed=4)
-    run = FloatEnsemble(load("lorenz").system, "1/10", starts_in_box(50, 3, 0.5, 4), kernel="numpy")
-    run.advance(300)
-    assert [found[word] for word in ("completed", "overflow", "singular")] == [
-        (run.status == word).sum() for word in ("completed", "overflow", "singular")
-    ]
-    assert 0 < found["completed"] < 50
-    assert found["largest_drift"] is None  # nothing is known to be conserved
-    # Rounding errors of 200 steps are 10^-9 here.
-    found = perform("ensemble", MEMBER, eps="1/10", orbits=20, steps=200)
-    assert (found["method"], found["completed"], 0 < found["largest_drift"] < 1e-6) == ("normal-form", 20, True)
 
 
 @pytest.mark.parametrize("prime", [None, 10007])

@@ -12,7 +12,6 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.singular.singularities import Patterns
 
 # In dimension 3 singularities come last.
@@ -124,23 +123,7 @@ def test_the_flow_of_a_polarised_map_is_part_of_the_report():
     assert [line for line in found.skipped if "flow" in line] == []
 
 
-def test_integrals_of_members_are_counted_where_the_flow_is_looked_at():
-    def none(run, **_):
-        found = find_integrals(run.bare)
-        return replace(found, integrals=(), profile=replace(found.profile, nullities=()), by_theorems=0)
-
-    parts = [replace(part, look=none) if part.name == "integrals" else part for part in ANALYSES]
-    parts = [part for part in parts if part.result in ("hamiltonian", "normal_form", "integrals", "flow")]
-    assert analyze(load("paper_m2"), parts=parts).flow.without_limit == 2
-
-
 # Degenerate systems
-
-
-def test_where_the_map_has_no_value():
-    found = analyze(system("x", "x"), eps=1)
-    assert (found.conclusion.kind, found.to_json()["verdict"]["integrals"]) == ("singular", None)
-    assert found.conclusion.sentence.startswith("The map is nowhere defined")
 
 
 def lines_of(found, title):

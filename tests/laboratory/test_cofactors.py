@@ -2,9 +2,7 @@
 
 import pytest
 from helpers import DIMENSION
-from search_helpers import system
 
-from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -16,7 +14,6 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_factors,
     determinant_polynomial,
     points_needed,
-    search_cofactors,
 )
 
 SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4]
@@ -47,14 +44,3 @@ def test_polynomials_with_a_given_cofactor():
     assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
     assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]
     assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
-
-
-def test_the_search_ends_when_enough_is_known():
-    laboratory = Laboratory(system("x y", "x", "y"))
-    map_, known = laboratory.maps[0], laboratory.cofactors()
-    found = search_cofactors(map_, known, [], [], 1, 3, Budget())
-    [step], [[space]] = found.steps, found.spaces
-    assert (step.product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
-    assert search_cofactors(map_, known, [], [space], 1, 3, Budget()).spaces == []
-    assert search_cofactors(map_, known, [], [], 1, 3, Budget(0)).spaces == []
-    assert search_cofactors(map_, known, [], [], 0, 3, Budget()).spaces == []

@@ -1,15 +1,12 @@
 """Growth of maps that are given by formulas: exceptional hypersurfaces by the affine Jacobian, and published rates."""
 
 import pytest
-from flint import fmpq
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import written
-from kahanmaps.laboratory.singular.outcomes import Hypersurface
 from kahanmaps.laboratory.singular.singularities import singularities
-from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.projective import homogeneous_map
 
@@ -19,7 +16,6 @@ def by_formulas(variables: str, image: str):
     return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
 
 
-POLES = [Hypersurface(f"b*c*d*e - {k}") for k in (5, 6)]
 DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
 
 
@@ -56,13 +52,6 @@ def test_the_hypersurfaces_of_a_map_of_dimension_5_are_written():
     run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1)
     assert (str(run.verdict), run.critical_degree) == ("confined", 24)
     assert [(h.polynomial, h.multiplicity) for h in run.hypersurfaces] == [(x, 6) for x in "edcb"]
-
-
-def test_exceptional_hypersurfaces_are_named_over_eps_by_the_affine_jacobian():
-    map_ = by_formulas("a,b,c,d,e", "b; c; d; (e + eps)/c; 2/(b*c*d*e - 2*eps) - a")
-    names = {h.polynomial: h.generic for h in with_eps(map_, fmpq(3), POLES)}
-    assert names["b*c*d*e - 6"] == "b*c*d*e - 2*eps"
-    assert names["b*c*d*e - 5"] == ""
 
 
 @pytest.mark.parametrize(

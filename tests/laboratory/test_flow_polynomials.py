@@ -3,7 +3,6 @@
 import random
 
 import pytest
-from flint import fmpq
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import monomials, primitive_part, ring
@@ -14,7 +13,8 @@ from kahanmaps.laboratory.laboratory import is_kept_by_flow
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
-from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials, gradings
+from kahanmaps.laboratory.laboratory import is_kept_by_flow
+from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -156,26 +156,3 @@ def test_conjugate_lines_leave_no_degree_open():
         assert ([format_polynomial(P) for P in found.functions], found.degree) == (["x^3 - 2*y^3"], 3)
     found = flow_polynomials(load("paper_m3").system, 1)
     assert ([format_polynomial(P) for P in found.functions], found.degree) == (["x1 - x5"], 1)
-
-
-@pytest.mark.parametrize(
-    ("variables", "rhs", "weights"),
-    [
-        ("x y", ["x*y", "y^2 - x^2"], [(1, 1)]),
-        ("x y", ["y", "x^2"], [(2, 3)]),
-        ("x y z", ["x*z", "-y*z", "x*y"], [(1, -1, 0), (2, 0, 1)]),
-        ("x y", ["y", "x^2 + x"], []),
-    ],
-)
-def test_the_weights_of_a_field(variables, rhs, weights):
-    made = field(variables, *rhs)
-    assert gradings(made) == weights
-    context = made.rhs[0].context()
-    for w in weights:  # f(2^w x) is 2^(w + degree) f(x)
-        scales = [fmpq(2) ** e for e in w]
-        moved = [
-            f.compose(*(c * x for c, x in zip(scales, context.gens(), strict=True)), ctx=context) for f in made.rhs
-        ]
-        ratios = [g.leading_coefficient() / f.leading_coefficient() for f, g in zip(made.rhs, moved, strict=True)]
-        assert [f * ratio for f, ratio in zip(made.rhs, ratios, strict=True)] == moved
-        assert len({ratio / c for ratio, c in zip(ratios, scales, strict=True)}) == 1

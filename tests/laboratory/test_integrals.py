@@ -184,15 +184,6 @@ def test_integrals_are_counted_by_theorems_orbits_and_formulas(
     assert found.count_text == text
 
 
-@pytest.mark.parametrize(
-    ("codimensions", "settled"), [((0,), False), ((0, 1, 1), False), ((0, 1, 1, 1), True), ((0, 0, 1, 2), False)]
-)
-def test_orbits_have_settled_where_the_last_of_several_degrees_showed_no_more(codimensions, settled):
-    profile = Profile(3, codimensions, codimensions, None, True, True)
-    assert (profile.is_settled, profile.degree, profile.with_known) == (settled, len(codimensions), 0)
-    assert profile.first_degree == next((d for d, k in enumerate(codimensions, 1) if k), None)
-
-
 def test_formulas_with_symbols_that_depend_at_the_values_of_the_file_say_so():
     said = "at a1 = 0, a2 = 0, a3 = 1 only 1 of the 2 formulas is independent"  # x2 and x3 are both constant there
     symbols = ["a1", "a2", "a3"]

@@ -18,7 +18,6 @@ from search_helpers import system as file_from
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load
-from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions, doubt_of_heights
@@ -34,11 +33,8 @@ from kahanmaps.laboratory.singular.outcomes import (
     outcome_of,
 )
 from kahanmaps.laboratory.singular.singularities import (
-    MAX_DIGITS,
     Patterns,
     _patterns,
-    can_be_written,
-    patterns,
     patterns_of,
     singularities,
 )
@@ -140,15 +136,6 @@ def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
     assert run.text == "some confined, others not within 1000 steps"
     assert singularities(resonant(k), "1/7", steps=k - 1).text == f"not confined within {k - 1} steps"
     assert len(next(h for h in run.hypersurfaces if h.status == CONFINED).steps) == k + 2
-
-
-@pytest.mark.parametrize("name", ["mcmillan", "todd"])
-def test_random_points_have_the_degrees_of_polynomials_for_explicit_maps(name, monkeypatch):
-    """Of equations that are not linear in the old point, nor is that of the inverse."""
-    map_ = load(name).map
-    written = patterns(map_, None)
-    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.WRITTEN_DIMENSION", 1)
-    assert patterns(map_, None).series == written.series != ()
 
 
 def test_two_eps_that_differ_leave_the_patterns_open():
@@ -257,20 +244,6 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
             continue
         assert (found.status, found.degree, len(set(found.primes))) == (NOT_CONTRACTED, 2, 2)
         assert [(step.common, step.rank) for step in found.steps] == [(0, 2)] * 4
-
-
-def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
-    eps = fmpq(1, 7 * 10**MAX_DIGITS + 1)
-    top = load("euler_top").system
-    with pytest.raises(
-        InputError, match=r"found numbers of about 1000. digits in eps and the system, .* at most 10000"
-    ):
-        singularities(top, eps)
-    found = degree_growth(top, eps)
-    assert (found.patterns.lengths, found.patterns.running) == ((3,), "")
-    assert [found.recurrence.predict(n) for n in (5, 50)] == [51, 5001]
-    four = load("paper_m2").system
-    assert [can_be_written(four, fmpq(1, 3**k), Budget(1e6)) for k in (100, 400)] == [True, False]
 
 
 def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():

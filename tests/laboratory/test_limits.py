@@ -171,21 +171,3 @@ def test_a_polarised_map_may_lose_an_integral():
     assert (found.limits, found.lost) == ((), 1)
     assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, found.others[0].function)
     assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, found.others[0].function)
-
-
-@pytest.mark.parametrize(
-    ("formula", "leading"),
-    [
-        ("(x^4 + 2*y^2)/(1 + eps*x_1)", "x^4 + 2*y^2"),
-        ("1/(3 + 6*eps*(x^2*x_1^2 + y^2 + y_1^2))", "x^4 + 2*y^2"),  # a number first
-        ("(x_1 - x)/eps - 2*y + 2*eps*x^3", None),  # 0 as far as is known
-        ("(x_1 - x)*eps*(x^4 + 2*y^2)/(x_1 - x)/eps", "x^4 + 2*y^2"),
-    ],
-)
-def test_leading_terms_are_those_along_solutions(formula, leading):
-    search = integrals_of_duffing()
-    names = [*search.file.variables, "eps"]
-    made = replace(search.integrals[0], function=parse_rational_function(formula, names))
-    found = flow_and_map(replace(search, integrals=(made,)))
-    assert [format_rational_function(one.leading) for one in found.limits] == ([] if leading is None else [leading])
-    assert (found.without_limit, len(found.others)) == ((0, 0) if leading else (1, 1))

@@ -79,12 +79,3 @@ def test_commuting_systems_over_a_number_field_are_found_and_commute():
         found("t' = a*t^2", "root of t^2 - 2")
     with pytest.raises(InputError, match="expected a quadratic vector field without eps"):
         km.find_commuting("lyness")
-
-
-def test_analyze_says_once_what_is_not_done_over_a_number_field():
-    found = km.analyze(km.System("x' = y; y' = a*x^2 - 1", a="root of t^2 - 2"))
-    assert found.conclusion.sentence.startswith("Integrable (proved): 1 independent integral")
-    assert len(found.skipped) == 1
-    assert found.skipped[0].startswith("over the number field QQ[t]/(t^2 - 2): Hamiltonian structure, the commuting")
-    assert "only 0, f and -f commute" in dict(found.sections)["commuting systems"][0].text
-    assert found.to_json()["parameters"] == {}

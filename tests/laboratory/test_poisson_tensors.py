@@ -4,13 +4,11 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from flint import fmpq
 from helpers import random_point
 from search_helpers import random_system, system
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
@@ -89,28 +87,6 @@ def test_integrals_and_casimirs_of_the_euler_top():
     assert found.pencil is PROVED  # tri-Hamiltonian
     assert found.note == "they are compatible: every combination of them is a Poisson tensor (proved)"
     assert all(holds_exactly(load("euler_top"), one, "-2/3") for one in found.tensors)
-
-
-def test_of_more_integrals_than_can_be_in_involution_a_largest_choice_is():
-    found = find_poisson(nested(4))
-    assert len(found.integrals) == 3  # superintegrable: rank 4, so that two at most are in involution
-    one = found.tensors[0]
-    assert (one.in_involution, one.involution, one.is_liouville_integrable) == (("I1", "I2"), PROVED, True)
-    file, x = nested(4), random_point(4, 3)
-    P = one.tensor.value(QQ, fmpq(1, 10), x)
-    slopes = []
-    for integral in found.integrals:
-        f, place = integral.function, (*x, fmpq(1, 10))
-        N, D = f.numerator, f.denominator
-        slopes.append([
-            (evaluate(N.derivative(k), QQ, place) * evaluate(D, QQ, place)
-             - evaluate(D.derivative(k), QQ, place) * evaluate(N, QQ, place)) for k in range(file.dim)
-        ])  # fmt: skip
-
-    def bracket(i, j):
-        return sum(slopes[i][a] * P[a, b] * slopes[j][b] for a in range(4) for b in range(4))
-
-    assert bracket(0, 1) == 0 != bracket(1, 2)
 
 
 ROTATION = system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x")  # about w = (1, 2, 3)

@@ -20,7 +20,6 @@ from kahanmaps.laboratory.scan.members import Scanned
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, _goes_on, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
-from kahanmaps.maps.residues import families
 
 THREE_LINES = """variables = ["x", "y"]
 parameters = { g1 = 1, g2 = 1 }
@@ -107,15 +106,6 @@ def test_the_conditions_of_lotka_volterra_in_space_are_found():
         assert conditions[one].growth.growth is Growth.QUADRATIC
         assert conditions[one].dimension == 1
     assert not any(found.left)
-
-
-def test_a_scan_needs_no_numba(monkeypatch):
-    asked = {"primes": (11, 13, 17), "terms": 2}
-    compiled = scan(parse_system(THREE_LINES), ["g1"], **asked)
-    monkeypatch.setattr(families, "choose_kernel", lambda kernel, long: "numpy")
-    slow = scan(parse_system(THREE_LINES), ["g1"], **asked)
-    assert compiled.components
-    assert (slow.text, slow.sweeps) == (compiled.text, compiled.sweeps)
 
 
 def planar(first, second, *names):

@@ -90,13 +90,6 @@ def pencil_at(prime, values):
 MODEL = pencil_at(2**61 - 1, (12345, 67890))
 
 
-def test_the_space_that_shares_numbers_is_taken_of_those_that_look_alike():
-    other, same, wanted = [
-        DarbouxSpace(1, 1, [[1, int(nmod(above, p) / 7)]]) for above, p in ((3, 101), (4, 101), (4, 10**9 + 7))
-    ]
-    assert module._most_alike([other, same], [wanted], 101, 10**9 + 7) == [same]
-
-
 def closed_forms(model, spaces_at, variables, symbols, eps_enters, budget):
     """What a laboratory makes of spaces that are given by the prime and the values, and not found on maps."""
     laboratory = SimpleNamespace(map_for=lambda *place: place, symbols=symbols, root=None, seed=0)

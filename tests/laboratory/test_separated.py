@@ -8,8 +8,6 @@ from helpers import points
 from hypothesis import given
 
 from kahanmaps import KahanMap
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
@@ -35,13 +33,6 @@ def test_the_map_is_the_same_in_both_coordinates(z):
 
     eps = fmpq(1, 7)
     assert x(KahanMap(THERE.system, eps).step(z)) == KahanMap(PAPER, eps).step(x(z))
-
-
-@given(points(6))
-def test_a_function_has_the_same_values(z):
-    I = parse_rational_function("(x1^2*x4 - 3*x6 + eps)/(x2*x3 - x5 + 7)", [*load("paper_m3").variables, "eps"])
-    x = tuple((THERE.T * fmpq_mat(6, 1, list(z))).entries())
-    assert I.value(QQ, [*x, fmpq(2, 3)]) == THERE.function(I).value(QQ, [*z, fmpq(2, 3)])
 
 
 @pytest.mark.parametrize("name", ["paper_m3_irreducible", "clebsch_first_flow", "euler_top", "henon_heiles"])

@@ -7,7 +7,6 @@ import kahanmaps as km
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.roots import AlgebraicPoint, parse_algebraic_point, parse_root
 from kahanmaps.checks.claims import Certainty
-from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import over_number_field
 
 I = parse_root("root of t^2 + 1")
@@ -48,10 +47,3 @@ def test_a_check_tries_its_claims_along_such_an_orbit():
     assert (held.verdict, refuted.verdict) == (Certainty.PROVED, Certainty.REFUTED)
     assert "held exactly at 4 points of an orbit" in held.also[-1].summary
     assert "fails at step 0 of an exact orbit" in refuted.also[-1].summary
-
-
-def test_a_map_with_another_number_is_refused():
-    file = km.load("euler_top", a1="root of t^2 - 2")
-    assert over_number_field(file.map, file.map.root) is file.map
-    with pytest.raises(InputError, match="expected the same algebraic number"):
-        over_number_field(file.map, I)

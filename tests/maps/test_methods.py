@@ -3,7 +3,6 @@
 import pytest
 from planar_helpers import structure_and_system
 
-from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.orbits.methods import choose_method
 
@@ -48,19 +47,3 @@ def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, normal_form
     found = choose_method(wish, arithmetic, normal_form, at)
     assert found.name == expected
     assert found.text == f"method {expected}: {found.reason}"
-
-
-@pytest.mark.parametrize(
-    ("wish", "arithmetic", "normal_form", "at", "words"),
-    [
-        ("fastest", "exact", SPLIT, None, "expected one of generic, normal-form, doubling"),
-        ("doubling", "exact", NONE, (3,), "needs a normal form, and there is none: H is not"),
-        ("normal-form", "float", NONE, None, "needs a normal form"),
-        ("doubling", "exact", SPLIT, None, "the method doubling is for --at"),
-        ("doubling", "float", SPLIT, (3,), "the method doubling is for --at"),
-        ("normal-form", "mod", SPLIT, None, "modulo P there are the methods generic and doubling"),
-    ],
-)
-def test_what_cannot_be_had_is_refused(wish, arithmetic, normal_form, at, words):
-    with pytest.raises(InputError, match=words):
-        choose_method(wish, arithmetic, normal_form, at)
