@@ -4,9 +4,8 @@ import pytest
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.modular_points import ModularMap, exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import Lift, Lifted
-from kahanmaps.laboratory.modular_points import ModularFlow
 
 PRIME = 2**61 - 1
 

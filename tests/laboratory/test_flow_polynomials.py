@@ -13,7 +13,6 @@ from kahanmaps.laboratory.laboratory import is_kept_by_flow
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limit import flow_polynomials as searched
-from kahanmaps.laboratory.laboratory import is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 from kahanmaps.systems.polynomial import PolynomialField

@@ -13,8 +13,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.documents.files import read_system
-from kahanmaps.invariants.phase_functions import ModifiedHamiltonian
-from kahanmaps.invariants.phase_functions import DeterminantDensity
+from kahanmaps.invariants.phase_functions import DeterminantDensity, ModifiedHamiltonian
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
     ConstantStructures,
     constant_structures,

@@ -10,9 +10,9 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.laboratory import laboratory as identities
-from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory import laboratory as module
 from kahanmaps.laboratory.laboratory import verdict_on
+from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])

@@ -15,7 +15,6 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.laboratory import is_kept_by_flow
 from kahanmaps.laboratory.preserve.limit.limits import flow_and_map
 
 THREE_LINES = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["3*x*(x+2*y) + 6*x*y", "-(y*(x+2*y) + 3*x*y)"]')

@@ -12,9 +12,8 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory import laboratory as identities
-from kahanmaps.laboratory.laboratory import separated
+from kahanmaps.laboratory import laboratory as module
+from kahanmaps.laboratory.laboratory import Laboratory, separated
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 PAPER = load("paper_m3").system
