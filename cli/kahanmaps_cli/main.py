@@ -23,11 +23,12 @@ from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
 from kahanmaps_cli.screen.progress import as_typed, say
 from kahanmaps_cli.screen.streams import have_standard_streams, leave_nothing_to_flush, output_was_lost
 from kahanmaps_cli.screen.terminal import colour_option
+from kahanmaps_cli.signals import INTERRUPTED
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL = 0, 1, 2, 3, 70
 
 COMPLETION = "_KAHANMAPS_COMPLETE"  # set by the shell that asks what may follow
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+INTERRUPTED = 130  # the exit status
+
 
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
     """Set a handler for one signal, and return the one before; the next signal ends the process, handled or not.

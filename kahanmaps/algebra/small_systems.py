@@ -25,13 +25,12 @@ from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly, fmpz_mpoly_c
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count
 
 MAX_BASIS = 120  # polynomials of a Groebner basis
 MAX_TERMS = 400  # of one of them
 MAX_BITS = 4_000  # of a coefficient
 MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored, which takes some 20 ms then
-SPENT = "the budget was spent (--effort)"
 MAX_PARTS = 400  # points, families and unsolved parts together
 MAX_QUOTIENT = 130  # dimension of the quotient ring, so the number of solutions over the complex numbers
 

@@ -20,6 +20,7 @@ from typing import Any
 from kahanmaps.errors import InputError
 
 LEAST_EFFORT, MOST_EFFORT = -20, 40
+SPENT = "the budget was spent (--effort)"  # why a search ended early
 
 
 class _Counter(threading.local):
@@ -40,7 +41,7 @@ def counted() -> int:
 
 
 class Budget:
-    """Units of counted work that may be spent from now on.
+    """Units of counted work that may be spent from now on, in the thread that made it.
 
     >>> budget = Budget(100)
     >>> stages = budget.share([1, 3])

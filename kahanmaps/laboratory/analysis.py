@@ -18,8 +18,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from kahanmaps.algebra.printing import attributes, format_polynomial
-from kahanmaps.algebra.small_systems import SPENT
-from kahanmaps.algebra.work import Budget, units_at
+from kahanmaps.algebra.work import SPENT, Budget, units_at
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.displayed import Printed
 from kahanmaps.documents.inline import as_file

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import SPENT, decoupling, groebner, independent, normal_form, solve_system
-from kahanmaps.algebra.work import Budget, counted
+from kahanmaps.algebra.small_systems import decoupling, groebner, independent, normal_form, solve_system
+from kahanmaps.algebra.work import SPENT, Budget, counted
 
 RING = ring(["x", "y", "z"])
 x, y, z = RING.gens()

@@ -11,11 +11,10 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import symbols_and_eps
-from kahanmaps_cli.screen.progress import Search, say
+from kahanmaps_cli.screen.progress import SearchProgress, say
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import echo, formula, on_terminal, tell
-
-INTERRUPTED = 130
+from kahanmaps_cli.signals import INTERRUPTED
 
 
 @click.command("analyze")
@@ -56,7 +55,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
     report = _Report(as_json or markdown)
-    with Search({**options, "quiet": quiet}) as search:
+    with SearchProgress({**options, "quiet": quiet}) as search:
         report.progress = search
         try:
             lib.analyze(file, **asked, progress=search, reached=report)
@@ -95,7 +94,7 @@ class _Report:
 
     def __init__(self, is_silent: bool) -> None:
         self.found: lib.Analysis | None = None
-        self.progress: Search | None = None
+        self.progress: SearchProgress | None = None
         self._is_silent, self._told = is_silent, 0
 
     def __call__(self, found: lib.Analysis) -> None:

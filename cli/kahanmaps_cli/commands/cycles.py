@@ -8,7 +8,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
@@ -52,7 +52,7 @@ def command(system: str | None, **options: Any) -> int:
     if not options["primes"]:
         raise click.UsageError("missing --prime P, e.g. --prime 101")
 
-    def cell(file: lib.SystemFile, search: Search) -> Cell:
+    def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         runs = []
         limits = {name: options[name] for name in ("samples", "steps") if options[name] is not None}
         for prime in dict.fromkeys(options["primes"]):

@@ -9,7 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
@@ -73,7 +73,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 
-    def cell(file: lib.SystemFile, search: Search) -> Cell:
+    def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         found = measured(file, eps, options, search)
         more = ", ..." if len(found.degrees) > _SHOWN else ""
         line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
@@ -108,7 +108,9 @@ def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     tell(found.text)
 
 
-def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth, search: Search) -> dict[str, Any]:
+def _record(
+    file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth, search: SearchProgress
+) -> dict[str, Any]:
     time_step = lib.eps_record(found.eps, file.map)["time_step"]
     return record_of(
         "degrees",

@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import print_list
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 
 
 @click.command("find-commuting")
@@ -44,7 +44,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = opt.load_system(system, {**options, "quiet": quiet})
     seed, error_bits = options["seed"], options["error_bits"]
     settings = lib.Settings(seed=seed, error_bits=error_bits)
-    with Search({**options, "quiet": quiet}) as search:
+    with SearchProgress({**options, "quiet": quiet}) as search:
         found = lib.find_commuting(
             file.system if file.map.root is None else file.map,
             options["shape"],

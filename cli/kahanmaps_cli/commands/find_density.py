@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 
 
 @click.command("find-density")
@@ -34,7 +34,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
     """
     require_one_form(options)
-    with Search(options) as search:
+    with SearchProgress(options) as search:
         file = opt.load_system(system, options)
         settings = asked(options, "flow", "max_degree")
         if options["flow"] and options["as_toml"]:

@@ -19,7 +19,7 @@ from kahanmaps_cli.runs.search import (
     search_options,
     symbols_and_eps,
 )
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import formula, tell
 from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
@@ -71,7 +71,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     require_one_form(options)
 
-    def cell(file: lib.SystemFile, search: Search) -> Cell:
+    def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
         found = lib.find_integrals(file, **asked(options, "max_degree"), progress=search)
@@ -90,7 +90,7 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError(f"{instead} goes with --json, not with --toml and --latex")
     if instead:
         return (_bases if options["sets"] else _darboux)(system, options)
-    with Search(options) as search:
+    with SearchProgress(options) as search:
         file = opt.load_system(system, options)
         find = partial(lib.find_integrals, file, **asked(options, "max_degree"), progress=search)
         if options["flow"]:
@@ -121,7 +121,7 @@ def _count(found: Any) -> str:
 
 
 def _darboux(system: str | None, options: dict[str, Any]) -> int:
-    with Search(options) as search:
+    with SearchProgress(options) as search:
         file, degree = opt.load_system(system, options), options["darboux"]
         found = lib.darboux_polynomials(file, degree, **asked(options, "flow"), progress=search)
     if options["as_json"]:
@@ -136,7 +136,7 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
     if options["symbolic"]:
         raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
     eps = symbols_and_eps(options)[1]
-    with Search(options) as search:
+    with SearchProgress(options) as search:
         file = opt.load_system(system, options)
         laboratory = lib.Laboratory(file, (), eps, options["seed"])
         rows: list[lib.Basis] = []

@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import effort_options, load_system, output_options, system_options
 from kahanmaps_cli.runs.search import print_list
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 
 
 @click.command("find-symmetry")
@@ -36,7 +36,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Exit status: 0 searched as said, 2 usage error, 3 a search was too large or the budget spent.
     """
     file = load_system(system, {**options, "quiet": quiet})
-    with Search({**options, "quiet": quiet}) as search:
+    with SearchProgress({**options, "quiet": quiet}) as search:
         found = lib.linear_symmetries(file.system, effort=options["effort"], progress=search)
     heading = f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved"
     return print_list("find-symmetry", heading, found, search, lib.Settings().context([file], **search.work), as_json)

@@ -10,7 +10,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
-from kahanmaps_cli.screen.progress import Progress, Search
+from kahanmaps_cli.screen.progress import Progress, SearchProgress
 from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import tell
 from kahanmaps_cli.screen.value_rows import Cell, table
@@ -76,7 +76,7 @@ def command(system: str | None, **options: Any) -> int:
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
-    def cell(file: lib.SystemFile, search: Search) -> Cell:
+    def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         found = surveyed(file, eps, options, search)
         undecided = f"undecided: {found.text}" if found.kind is lib.Growth.UNDECIDED else ""
         if not found.is_whole:
@@ -112,7 +112,9 @@ def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     tell(str(found))
 
 
-def _record(file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey, search: Search) -> dict[str, Any]:
+def _record(
+    file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey, search: SearchProgress
+) -> dict[str, Any]:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     steps = [str(step) for value in values if (step := lib.time_step(value, file.map)) is not None]
     asked = {**opt.given(options, "seed", "steps", "max_digits"), **search.work}

@@ -10,7 +10,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
-from kahanmaps_cli.screen.progress import Search, say
+from kahanmaps_cli.screen.progress import SearchProgress, say
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import on_terminal, print_table, tell
 
@@ -53,7 +53,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = opt.load_system(system, {**options, "quiet": quiet})
     eps = opt.eps_of(file, options)
     starts = requested_starts(file, options, count=_DEFAULT_STARTS)
-    with Search({**options, "quiet": quiet}) as search:
+    with SearchProgress({**options, "quiet": quiet}) as search:
         at = lib.rational(1) if eps is None else eps
         found = lib.lyapunov_exponents(file.map, starts, at, steps, transient=transient, progress=search)
     if as_json:

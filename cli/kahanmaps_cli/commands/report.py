@@ -13,7 +13,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
-from kahanmaps_cli.screen.progress import Search, say
+from kahanmaps_cli.screen.progress import SearchProgress, say
 
 _ONLY_FOR = {
     "symbolic": ("analyze",),
@@ -74,7 +74,7 @@ def command(system: str | None, **options: Any) -> int:
     is_named, is_drawn = _require_consistent(system, options)
     lib.page_template()  # what has to be installed is said before the work
     how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
-    with Search(options) as search:
+    with SearchProgress(options) as search:
         if options["source"] == "analyze":
             from kahanmaps_cli.runs.search import symbols_and_eps
 

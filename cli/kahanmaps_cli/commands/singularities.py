@@ -8,7 +8,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search, say
+from kahanmaps_cli.screen.progress import SearchProgress, say
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import formula, tell
 
@@ -56,7 +56,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     file = opt.load_system(system, {**options, "quiet": quiet})
-    with Search({**options, "quiet": quiet}) as search:
+    with SearchProgress({**options, "quiet": quiet}) as search:
         runs = [
             lib.singularities(file.map, value, **opt.given(options, "steps", "seed", "effort"), progress=search)
             for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))

@@ -15,7 +15,7 @@ from kahanmaps_cli.commands.degrees import degree_options, is_done, measured
 from kahanmaps_cli.commands.heights import height_options, require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawn, picture
-from kahanmaps_cli.screen.progress import Search
+from kahanmaps_cli.screen.progress import SearchProgress
 
 _MAX_BYTES = 64_000_000
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
@@ -34,7 +34,7 @@ _scale_option = click.option(
     degree_options,
     _scale_option,
 )
-def degrees(options: dict[str, Any], progress: Search) -> Drawn:
+def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawn:
     """Degrees of the iterates of maps, with the recurrence they satisfy.
 
     \b
@@ -97,7 +97,7 @@ def degrees(options: dict[str, Any], progress: Search) -> Drawn:
     height_options,
     _scale_option,
 )
-def heights(options: dict[str, Any], progress: Search) -> Drawn:
+def heights(options: dict[str, Any], progress: SearchProgress) -> Drawn:
     """Heights of exact orbits against the step: how fast the numbers grow.
 
     \b

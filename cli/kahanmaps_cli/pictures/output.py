@@ -16,7 +16,7 @@ from kahanmaps.errors import printable
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import ParameterKind, PointText
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
-from kahanmaps_cli.screen.progress import Search, as_typed, say
+from kahanmaps_cli.screen.progress import SearchProgress, as_typed, say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ class Drawn:
     status: int = 0
 
 
-Draw = Callable[[dict[str, Any], Search], Drawn]
+Draw = Callable[[dict[str, Any], SearchProgress], Drawn]
 
 
 def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click.Command]:
@@ -99,7 +99,7 @@ def picture(name: str, *options: Callable[[Any], Any]) -> Callable[[Draw], click
             style = options["style"] = lib.Style(**given)
             path, talks = options["output"], not options["quiet"]
             kind = lib.format_of(path, options["kind"])
-            with Search(options) as progress:
+            with SearchProgress(options) as progress:
                 drawn = draw(options, progress)
             if talks:
                 for sentence in drawn.talk:

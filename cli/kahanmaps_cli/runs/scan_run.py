@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from threading import Event
 from typing import Any, TypeVar
@@ -11,8 +12,8 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import quoted
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search, say
-from kahanmaps_cli.signals import interruptible
+from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.signals import INTERRUPTED, interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -42,7 +43,7 @@ def names_of(options: dict[str, Any]) -> list[str]:
     return names
 
 
-def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, Search]:
+def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, SearchProgress]:
     """The scan that a command line asks for, and the search that made it."""
     names = names_of(options)
     if opt.is_inline(options, system):
@@ -60,11 +61,14 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[l
         search(sentence)
 
     def interrupt() -> None:
-        if not has_begun.is_set():  # libraries and loops are loaded for seconds, and there is nothing to be kept
-            raise KeyboardInterrupt
+        if not has_begun.is_set():
+            # Loops are compiled, for ten seconds the first time, and nothing could be kept. What is raised within a
+            # callback of the compiler is lost.
+            os.write(2, b"interrupted\n")
+            os._exit(INTERRUPTED)
         interrupted.set()
 
-    with Search({**options, "quiet": quiet}) as search, interruptible(interrupt):
+    with SearchProgress({**options, "quiet": quiet}) as search, interruptible(interrupt):
         found = lib.scan(
             file,
             names,
@@ -77,7 +81,7 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[l
     return found, search
 
 
-def ending(found: lib.Scan, search: Search) -> int:
+def ending(found: lib.Scan, search: SearchProgress) -> int:
     """The exit status, and a word where it is not 0 and nothing was said before."""
     if search.is_over:
         return 3
@@ -87,7 +91,7 @@ def ending(found: lib.Scan, search: Search) -> int:
     if not search.quiet:
         why = "interrupted" if is_interrupted else "the budget was spent (--effort)"
         say(f"stopped early: {why} before {', '.join(found.omitted)}")
-    return 130 if is_interrupted else 3
+    return INTERRUPTED if is_interrupted else 3
 
 
 def primes_of(text: str | None) -> list[int] | None:

@@ -9,7 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import Search, say
+from kahanmaps_cli.screen.progress import SearchProgress, say
 from kahanmaps_cli.screen.render import envelope, print_json
 from kahanmaps_cli.screen.terminal import formula, tell
 
@@ -58,7 +58,7 @@ def scope(found: Any) -> str:
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 
-def heading(name: str, found: Any, search: Search) -> dict[str, Any]:
+def heading(name: str, found: Any, search: SearchProgress) -> dict[str, Any]:
     """What is needed to redo a search, as plain data, and the work that it took."""
     return {
         **envelope(name),
@@ -72,7 +72,7 @@ def heading(name: str, found: Any, search: Search) -> dict[str, Any]:
     }
 
 
-def record(name: str, found: Any, search: Search, **more: Any) -> dict[str, Any]:
+def record(name: str, found: Any, search: SearchProgress, **more: Any) -> dict[str, Any]:
     """All that a search found, as plain data."""
     return {**heading(name, found, search), **found.to_json(), **more, "document": dict(found.file.document)}
 
@@ -80,7 +80,7 @@ def record(name: str, found: Any, search: Search, **more: Any) -> dict[str, Any]
 def print_search(
     name: str,
     found: Any,
-    search: Search,
+    search: SearchProgress,
     options: dict[str, Any],
     formulas: Iterable[tuple[str, Any, str]],
     count: str = "",
@@ -107,7 +107,9 @@ def print_search(
             tell(f"note\t{text}")
 
 
-def print_list(name: str, heading: str, found: Any, search: Search, context: dict[str, Any], as_json: bool) -> int:
+def print_list(
+    name: str, heading: str, found: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
+) -> int:
     """A list that is complete unless it says otherwise, below its heading or as JSON; the exit status."""
     if as_json:
         print_json({"command": name, **context, **found.to_json()})

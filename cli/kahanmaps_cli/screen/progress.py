@@ -109,7 +109,7 @@ class Progress:
         self.clear()
 
 
-class Search(Progress):
+class SearchProgress(Progress):
     """The progress of a search that --seconds ends, and the units of work that it takes.
 
     The options are "quiet" and, as far as a command has them, "effort" and "seconds"; `since` is when the seconds

@@ -14,7 +14,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import KahanmapsError
 from kahanmaps_cli.options import load_system
-from kahanmaps_cli.screen.progress import Search, say
+from kahanmaps_cli.screen.progress import SearchProgress, say
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import tell
 
@@ -33,7 +33,7 @@ class Cell:
     undecided: str = ""
 
 
-def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, Search], Cell]) -> int:
+def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, SearchProgress], Cell]) -> int:
     """A line for each combination of values, without a range all that was found; in JSON a record each.
 
     A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
@@ -43,7 +43,7 @@ def table(system: str | None, options: dict[str, Any], found: Callable[[lib.Syst
     rows = rows_of(options["parameters"], system)
     if rows is None:
         file = load_system(system, options)
-        with Search(options) as search:
+        with SearchProgress(options) as search:
             cell = found(file, search)
         if options["as_json"]:
             print_json(cell.record())
@@ -57,7 +57,7 @@ def table(system: str | None, options: dict[str, Any], found: Callable[[lib.Syst
         name = ", ".join(f"{name} = {value}" for name, value in row)
         try:
             file = load_system(system, {**options, "parameters": row, "quiet": True})
-            with Search(options, began) as search:
+            with SearchProgress(options, began) as search:
                 cell = found(file, search)
         except KahanmapsError as error:
             refused.append((name, error))

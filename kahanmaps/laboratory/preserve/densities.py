@@ -17,7 +17,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_factored
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import latex
@@ -38,7 +38,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -299,7 +299,7 @@ def _search(
             tried = degree
     except NoPoint as error:
         return [], tried, str(error)
-    cut = "" if tried == top else f"polynomials of degree {tried + 1} and more were not tried: {BUDGET_SPENT}"
+    cut = "" if tried == top else f"polynomials of degree {tried + 1} and more were not tried: {SPENT}"
     return ([], tried, cut) if product is None else ([product], product.degree(dim), cut)
 
 

@@ -42,7 +42,7 @@ from kahanmaps.algebra.modular_matrices import (
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import chinese, simple_fraction
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count
 from kahanmaps.laboratory.modular_points import (
     Exponent,
     ModularMap,
@@ -52,7 +52,6 @@ from kahanmaps.laboratory.modular_points import (
     places_of,
     slope_values,
 )
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
@@ -241,7 +240,7 @@ def orbit_profile(
         ):
             cut = "too many unknowns"
         elif budget.is_spent:
-            cut = BUDGET_SPENT
+            cut = SPENT
         if cut:
             break
         progress(f"relations of degree {degree} along orbits")

@@ -19,7 +19,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, degree, ring, substitute
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
@@ -39,7 +39,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
     bases_of,
@@ -380,7 +380,7 @@ def integrals_of(
             at = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
             how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
             reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
-    if profile.cut and (profile.cut == BUDGET_SPENT or max_degree is not None or not profile.is_settled):
+    if profile.cut and (profile.cut == SPENT or max_degree is not None or not profile.is_settled):
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
     elif not profile.agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")
@@ -507,7 +507,7 @@ class _Collected:
         """Products of powers of known polynomials, and such that depend on time."""
         laboratory, origin = self._laboratory, "product of powers of known polynomials"
         if budget.is_spent:
-            self.cut.append(f"products of powers of known polynomials were not tried: {BUDGET_SPENT}")
+            self.cut.append(f"products of powers of known polynomials were not tried: {SPENT}")
             return
         try:
             products = products_of(laboratory, candidates(laboratory, cofactors, budget))

@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial, format_rational_function
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
@@ -38,7 +38,6 @@ from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, 
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.darboux.cofactors import SearchStep, SpaceSearch
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LIFTED_DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.preserve.search import bases_of
 from kahanmaps.maps.implicit import BirationalMap
 
@@ -208,7 +207,7 @@ def integrals_in_iterates(
         if len(known.rows) >= wanted:
             break
         if budget.is_spent:
-            cut = f"{lift.text} were not tried: {BUDGET_SPENT}"
+            cut = f"{lift.text} were not tried: {SPENT}"
             break
         for one, spaces in lifts_with_spaces(base, [lift]):
             progress(one.text)

@@ -14,7 +14,6 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.implicit import BirationalMap
 
-BUDGET_SPENT = "the budget was spent (--effort)"  # why a search ended early
 _CLOSES_WITHIN = 64  # points of an orbit: as many as relations of some degree take
 
 

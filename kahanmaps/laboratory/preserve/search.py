@@ -30,7 +30,7 @@ from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import RationalFunction, irreducible_factors, over_one_denominator, ring, substitute
 from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
@@ -54,7 +54,6 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     lifted_spaces,
 )
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.maps.kahan import KahanMapOver
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
@@ -157,7 +156,7 @@ def take_relations(
         if degree in found.searched:
             continue
         if budget.is_spent:
-            return f"relations of degree {degree} and more were not searched: {BUDGET_SPENT}"
+            return f"relations of degree {degree} and more were not searched: {SPENT}"
         progress(f"closed forms from the relations of degree {degree}")
         spaces = darboux_spaces(map_, degree, known, largest)
         if spaces is not None:
@@ -282,7 +281,7 @@ def bases_of(
             known = tell_apart(model, alike, names, laboratory.seed, budget, laboratory.root)
             if known is None:
                 why = f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
-                why = BUDGET_SPENT if budget.is_spent else why
+                why = SPENT if budget.is_spent else why
                 return [], f"integrals were found modulo primes, but no closed form: {why}"
             branches.setdefault(number, {})[kind] = known
 

@@ -19,14 +19,13 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_product
 from kahanmaps.algebra.small_systems import (
-    SPENT,
     SolutionComponent,
     groebner,
     normal_form,
     quotient_monomials,
     solve_system,
 )
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.kahan import SystemLike

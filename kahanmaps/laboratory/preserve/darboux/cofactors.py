@@ -28,13 +28,12 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField,
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_factors, substitute
 from kahanmaps.algebra.printing import format_polynomial, format_product
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, Lift, gradient_rank, gradients_of_ratios
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.laboratory.singular.jets import modulo
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.inverse import TooLarge
@@ -400,7 +399,7 @@ def search_cofactors(
     for degree in range(1, max_degree + 1):
         if independent >= wanted:
             break
-        cut = f"polynomials of degree {degree} and more with known cofactors were not all tried: {BUDGET_SPENT}"
+        cut = f"polynomials of degree {degree} and more with known cofactors were not all tried: {SPENT}"
         if budget.is_spent:
             return replace(found, cut=cut)
         orbit = relations_on_orbit(map_, degree)
@@ -458,7 +457,7 @@ def search_cofactors(
         work += 3 * points_needed(dim, degree) ** 2
         if budget.is_spent:
             cut = f"polynomials of degree {degree} and more with known cofactors up to numbers were not all tried"
-            return replace(found, cut=f"{cut}: {BUDGET_SPENT}")
+            return replace(found, cut=f"{cut}: {SPENT}")
         if work > 2 * _MAX_WORK:
             break
         product = replace(product, powers=(*product.powers, *[0] * len(denominators)))

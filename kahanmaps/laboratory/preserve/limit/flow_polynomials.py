@@ -36,11 +36,10 @@ from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.modular_matrices import combine, determinant, echelon, matrix, multiply, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.modular_points import ModularFlow, Point, Values, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.systems.polynomial import PolynomialField
 
 _MOST_MONOMIALS = 21  # of the degree that is gone to unasked, within a second
@@ -181,7 +180,7 @@ class _Search:
         joined: list[tuple[list[int], int]] = []  # residues of what is not lifted yet, and their moduli
         for prime in list(primes):
             if budget.is_spent:
-                return BUDGET_SPENT
+                return SPENT
             try:
                 flow = ModularFlow(self.field, prime, (), self.rng.getrandbits(64))
             except BadPrime:

@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import (
     ring,
 )
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.defaults import budget_for
@@ -40,7 +40,6 @@ from kahanmaps.laboratory.modular_points import Independent, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, densities_of
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, integrals_of
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 
@@ -154,9 +153,9 @@ class FlowAndMap:
             more = "other " * bool(self.limits or self.others)
             tried = f"relations along solutions up to degree {self.search.profile.degree}"
             found.append(("measured", f"no {more}rational integral of the flow shows in {tried}"))
-        if self.search is not None and self.search.profile.cut == BUDGET_SPENT:
+        if self.search is not None and self.search.profile.cut == SPENT:
             tried = f"relations of degree {self.search.profile.degree + 1} and more along solutions were not tried"
-            found.append(("undecided", f"of the flow: {tried}: {BUDGET_SPENT}"))
+            found.append(("undecided", f"of the flow: {tried}: {SPENT}"))
         if self.density is not None:
             found.append((str(self.density.verdict), f"the flow keeps dx/phi, phi = {self.density.text}"))
         elif self.density_search is not None and self.reason:

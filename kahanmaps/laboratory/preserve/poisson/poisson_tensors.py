@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import MAX_DIMENSION
@@ -52,7 +52,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.casimirs import casimir_candidates
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import BUDGET_SPENT, Search
+from kahanmaps.laboratory.preserve.results import Search
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -316,7 +316,7 @@ def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], budg
         laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed)
         tensors = tuple(_with_brackets(laboratory, one, integrals, budget) for one in tensors)
     if tensors and budget.is_spent:
-        cut = f"not all identities were multiplied out, or all Casimirs sought: {BUDGET_SPENT}"
+        cut = f"not all identities were multiplied out, or all Casimirs sought: {SPENT}"
         found = replace(found, reason="; ".join(filter(None, [found.reason, cut])))
     return replace(found, tensors=tensors, integrals=tuple(integrals))
 
