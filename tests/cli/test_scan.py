@@ -103,3 +103,19 @@ def test_ctrl_c_ends_it_with_what_was_seen(kahanmaps, monkeypatch):
     assert outcome.out.splitlines()[1:3] == ["slow\t2, 3\t1 members modulo 11", "slow\t2, 3\t1 members modulo 13"]
     assert re.match("open\t.* members modulo 17", outcome.out.splitlines()[-1])
     assert outcome.err.startswith("stopped early: interrupted before members modulo 17")
+
+
+def test_ctrl_c_before_anything_is_found_ends_the_process_at_once(kahanmaps, monkeypatch):
+    """As a compiler loses what is raised within its callbacks, nothing is raised."""
+
+    def interrupted(*_):
+        signal.raise_signal(signal.SIGINT)
+        raise AssertionError("the process went on")
+
+    def ended(status):
+        raise SystemExit(status)
+
+    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._terms", interrupted)
+    monkeypatch.setattr("os._exit", ended)
+    outcome = kahanmaps("scan zhukovski_volterra_2 --over a1")
+    assert (outcome.status, outcome.out) == (130, "")
