@@ -37,7 +37,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 GROUP = "Units of work"
 KINDS, PARTS = "kinds of work", "parts of analyze in dimension {}"
-LEAST = 0.02  # seconds below which a part of `analyze` says nothing
+LEAST = 0.2  # seconds below which a part of `analyze` says nothing
 PRIME = 2**61 - 1
 QUICK = ["euler_top", "weierstrass"]
 
