@@ -56,6 +56,13 @@ def test_the_outer_limit_goes_on_after_the_inner_one():
         two()
 
 
+def test_the_time_of_an_inner_limit_is_taken_from_the_outer_one():
+    with time_limit(20):
+        with time_limit(0.3), suppress(TimeLimit):
+            busy()
+        assert signal.getitimer(signal.ITIMER_REAL)[0] < 19.8
+
+
 @pytest.mark.parametrize("seconds", [0, -1, float("nan"), float("inf")])
 def test_other_times_are_refused(seconds):
     with pytest.raises(InputError, match="expected a positive number"), time_limit(seconds):

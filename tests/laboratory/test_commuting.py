@@ -212,3 +212,12 @@ def test_too_large_is_undecided_with_a_reason():
     assert (found.dimension, found.complete) == (31, False)
     found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
     assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)
+
+
+def test_where_little_work_does_not_find_all_quadratic_fields_the_linear_ones_are_given_and_it_is_said(monkeypatch):
+    f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
+    assert (commuting_systems(f).shape, commuting_systems(f).note) == ("quadratic", "")
+    monkeypatch.setattr("kahanmaps.laboratory.symmetry.commuting.QUICK_UNITS", 1)
+    found = commuting_systems(f)
+    assert (found.shape, found.complete) == ("linear", True)
+    assert "were tried first" in found.note
