@@ -1,0 +1,1 @@
+"""Proofs as scripts that other programs check: Coq (Rocq), PARI/GP and SymPy."""
