@@ -29,6 +29,10 @@ MAX_DIMENSION = 6
 MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten seconds for Coq
 
 
+class FalseClaim(InputError):
+    """A claim for which no certificate exists, as an exact computation refutes it."""
+
+
 @dataclass(frozen=True)
 class MapData:
     """A map by its equation: `rows` of (M | r), its determinant D, its adjugate and N = adj(M) r, polynomials over Z.
@@ -68,13 +72,17 @@ class ConservedFunction:
 
 @dataclass(frozen=True)
 class InvariantVolume:
-    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L; `derivative` is L, in the names and those of x~."""
+    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L; `derivative` is L, in the names and those of x~.
+
+    `is_free`: the identity holds for any two points, also if x~ is not the image of x, as for Hamiltonian systems.
+    """
 
     name: str
     numerator: fmpq_mpoly
     denominator: fmpq_mpoly
     degree: int
     derivative: tuple[tuple[fmpq_mpoly, ...], ...]
+    is_free: bool
 
     @property
     def formula(self) -> str:
@@ -118,24 +126,26 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
     """The identities that prove that the map conserves the function.
 
     Raises:
-        InputError: if it does not, or if the identities have too many terms.
+        FalseClaim: if it does not.
+        InputError: if the identities have too many terms.
     """
     P, Q = _coprime(function, data.names)
     k = max(degree_in(P, data.dim), degree_in(Q, data.dim))
     moved = [homogeneous_value(polynomial, k, data) for polynomial in (P, Q)]
     cofactors = [_quotient(image, polynomial) for image, polynomial in zip(moved, (P, Q), strict=True)]
     if cofactors[0] is None or cofactors[0] != cofactors[1]:
-        raise InputError(f"{name} is not conserved: no certificate can be written")
+        raise FalseClaim(f"{name} is not conserved: no certificate can be written")
     return ConservedFunction(name, P, Q, k, cofactors[0])
 
 
-def invariant_volume(data: MapData, phi: RationalFunction) -> InvariantVolume:
-    """The identity that proves that the map leaves the volume form dx/phi invariant.
+def invariant_volume(data: MapData, function: RationalFunction) -> InvariantVolume:
+    """The identity that proves that the map leaves the volume form dx/phi invariant, phi the function.
 
     Raises:
-        InputError: if it does not, or if the identity has too many terms.
+        FalseClaim: if it does not.
+        InputError: if the identity has too many terms.
     """
-    P, Q = _coprime(phi, data.names)
+    P, Q = _coprime(function, data.names)
     n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
     context = ring((*data.variables, *data.new, *data.names[n:]))
     letters = context.gens()
@@ -145,16 +155,24 @@ def invariant_volume(data: MapData, phi: RationalFunction) -> InvariantVolume:
         *entries, right = (entry.compose(*old, ctx=context) for entry in row)
         residuals.append(right - sum((e * y for e, y in zip(entries, new, strict=True)), context.constant(0)))
     derivative = tuple(tuple(residual.derivative(j) for j in range(n)) for residual in residuals)
+    at_old, at_new = ([F.compose(*at, ctx=context) for F in (P, Q)] for at in (old, [*new, *letters[2 * n :]]))
+    left = _times(_times(at_new[0], at_old[1]), data.determinant.compose(*old, ctx=context))
+    if left == _times(_times(at_old[0], at_new[1]), determinant(derivative)):
+        return InvariantVolume("volume", P, Q, k, derivative, True)
     # det L at x~ = N/D: D L(x, N/D) has polynomial entries, as L is of degree 1 in x~.
     point = [*data.numerators, *ring(data.names).gens()[n:]]
     entries = [[_at_numerators(entry, data, point) for entry in row] for row in derivative]
-    *_, last = kernel_minors([[*row, row[0] * 0] for row in entries], _times)
-    determinant = -last if n % 2 else last  # D^n det L
     left = _times(_times(homogeneous_value(P, k, data), Q), data.determinant ** (n + 1))
-    right = _times(_times(homogeneous_value(Q, k, data), P), determinant)
+    right = _times(_times(homogeneous_value(Q, k, data), P), determinant(entries))
     if left != right:
-        raise InputError("dx/phi is not invariant: no certificate can be written")
-    return InvariantVolume("phi", P, Q, k, derivative)
+        raise FalseClaim("dx/phi is not invariant: no certificate can be written")
+    return InvariantVolume("volume", P, Q, k, derivative, False)
+
+
+def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
+    """The determinant of a square matrix of polynomials. Raises InputError where it has too many terms."""
+    *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], _times)
+    return -last if len(matrix) % 2 else last  # the last of the signed minors
 
 
 def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmpq_mpoly:

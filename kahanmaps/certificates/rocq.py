@@ -191,14 +191,7 @@ class _Script:
             f"Definition num ({old} : R) : R := {self.text(claim.numerator)}.",
             f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.",
         ]
-        for label, polynomial in (("num", claim.numerator), ("den", claim.denominator)):
-            image = homogeneous_value(polynomial, power, self.data)
-            lines += self.moved(label, polynomial, power, self.text(image))
-        # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
-        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in claim.derivative]
-        lines += [
-            f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
-            f"Proof. cbv delta [volume {flat}] beta; ring. Qed.",
+        statement = [
             f"Theorem {theorem} :",
             f"  den {old} <> 0 -> den {new} <> 0 ->",
             f"  num {new} / den {new} = num {old} / den {old} * (volume / det).",
@@ -208,6 +201,20 @@ class _Script:
             "    by (field; split; [exact regular | assumption]).",
             "  apply equal_fractions; [assumption | apply Rmult_integral_contrapositive_currified; [assumption |"
             " exact regular] |].",
+        ]
+        if claim.is_free:
+            further = f"num den volume {flat}"
+            return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {self.expand(further)}", "Qed."]
+        for label, polynomial in (("num", claim.numerator), ("den", claim.denominator)):
+            image = homogeneous_value(polynomial, power, self.data)
+            lines += self.moved(label, polynomial, power, self.text(image))
+        # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
+        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in claim.derivative]
+        return [
+            *lines,
+            f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
+            f"Proof. cbv delta [volume {flat}] beta; ring. Qed.",
+            *statement,
             f"  apply (Rmult_eq_reg_r (det ^ {power + n})); [| apply pow_nonzero; exact regular].",
             f"  transitivity (num {new} * det ^ {power} * (den {old} * det * det ^ {n})); [ring |].",
             f"  transitivity (num {old} * (volume * det ^ {n}) * (den {new} * det ^ {power})); [| ring].",
@@ -215,7 +222,6 @@ class _Script:
             f"  {self.expand('num', 'den')}",
             "Qed.",
         ]
-        return lines
 
 
 def rocq_certificate(

@@ -160,7 +160,7 @@ def _script(
     def matrix(rows: Sequence[Sequence[str]]) -> str:
         return to.matrix.format(to.next_row.join(", ".join(row) for row in rows))
 
-    names = [letters[name] for name in data.names]
+    names = [letters[name] for name in (*data.names, *data.new)]
     lines = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
     lines.append(
         to.start.format(
@@ -188,13 +188,19 @@ def _script(
             for name in "PQ":
                 lines.append(_check(to, f"{label}: D^k {name}(N/D) = C {name}", f"image({name}h) == C*{name}"))
         else:
-            lines += [f"N{k} = N[{k if to is _PYTHON else k + 1}]" + ";" * (to is _GP) for k in range(n)]
-            entries = [[at_numerators(entry) for entry in row] for row in claim.derivative]
-            lines.append(f"L = {matrix(entries)}" + ";" * (to is _GP))
-            power = f"D{to.power}(n + 1)"
             lines.append(_check(to, "D = det M", "D == det(M)"))
-            identity = f"image(Ph)*Q*{power} == P*image(Qh)*det(L)"
-            lines.append(_check(to, f"{label}: phi(x~) det M = phi(x) det L(x, x~) at x~ = N/D", identity))
+            if claim.is_free:
+                entries = [[text(entry) for entry in row] for row in claim.derivative]
+                for name, polynomial in (("Py", claim.numerator), ("Qy", claim.denominator)):
+                    at_new = [letters[name] for name in (*data.new, *data.names[n:])]
+                    lines.append(to.definition.format(name, f"({polynomial_text(polynomial, at_new, '*', to.power)})"))
+                says, identity = "for any x and x~", "Py*Q*D == P*Qy*det(L)"
+            else:
+                lines += [f"N{k} = N[{k if to is _PYTHON else k + 1}]" + ";" * (to is _GP) for k in range(n)]
+                entries = [[at_numerators(entry) for entry in row] for row in claim.derivative]
+                says, identity = "at x~ = N/D", f"image(Ph)*Q*D{to.power}(n + 1) == P*image(Qh)*det(L)"
+            lines.append(f"L = {matrix(entries)}" + ";" * (to is _GP))
+            lines.append(_check(to, f"{label}: phi(x~) det M = phi(x) det L(x, x~) {says}", identity))
         lines.append("")
     lines.append(to.end)
     return "\n".join(lines) + "\n"
@@ -207,7 +213,7 @@ def _check(to: _Language, label: str, identity: str) -> str:
 def _letters(data: MapData) -> dict[str, str]:
     """Names of the letters that neither program uses for anything else: v_NAME, but for x, x1, ... and eps."""
     letters: dict[str, str] = {}
-    for name in data.names:
+    for name in (*data.names, *data.new):
         is_plain = re.fullmatch(r"[a-gi-z]|[a-z]\d+|eps", name) and name not in ("i", "j", "k", "n", "p", "r")
         text = name if is_plain else "v_" + re.sub(r"\W", "_", name)
         while text in letters.values():
