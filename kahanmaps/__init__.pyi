@@ -12,6 +12,7 @@ from .algebra.parsing import parse_point as parse_point
 from .algebra.parsing import parse_polynomial as parse_polynomial
 from .algebra.parsing import parse_rational_function as parse_rational_function
 from .algebra.work import Budget as Budget
+from .certificates.certificate import certificate as certificate
 from .checks.claims import Certainty as Certainty
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report

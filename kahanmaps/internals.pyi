@@ -25,6 +25,8 @@ from .algebra.work import Budget as Budget
 from .atomic_files import atomic_write as atomic_write
 from .atomic_files import resolved as resolved
 from .atomic_files import write_atomically as write_atomically
+from .certificates.certificate import certificate as certificate
+from .certificates.identities import FalseClaim as FalseClaim
 from .checks.claims import Certainty as Certainty
 from .checks.claims import Evidence as Evidence
 from .checks.claims import Finding as Finding

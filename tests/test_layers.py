@@ -22,7 +22,7 @@ FLOORS = [
     *("errors", "version", "sources", "displayed", "atomic_files", "processes", "hard_stop"),
     *("algebra", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
-    *("display", "languages", "plots", "reports"),
+    *("display", "languages", "certificates", "plots", "reports"),
     "internals",
 ]
 

@@ -214,6 +214,7 @@ km.find_symmetry("euler_top"), km.find_commuting("euler_top"), km.constant_struc
 km.affine_darboux("lorenz"), km.affine_integrals("lorenz"), km.tensor_structure("lorenz")
 km.find_family_structure_of("henon_heiles"), km.system_normal_form("paper_m2"), km.equivalent_system("lorenz")
 km.convert("euler_top", "latex")
+km.certificate("harmonic", "gp")
 km.load("euler_top").at("1/10")([1, 2, 3]) == km.load("euler_top")("1/10")([1, 2, 3])
 km.map("euler_top", time_step="1/5") @ km.map("lorenz", "1/10")
 np.array(km.map("euler_top", "1/10")([1, 2, 3]), dtype=float)

@@ -63,6 +63,7 @@ SECTIONS = {
     "Pictures and pages": {
         "plot": ("plot", "Pictures: portraits, invariant curves, drift, growth."),
         "report": ("report", "A page about a system, member or batch: one HTML file."),
+        "certificate": ("certificate", "Proofs that Coq (Rocq), PARI/GP or SymPy checks."),
         "convert": ("convert", "LaTeX, SymPy, PARI/GP, Maple, ... of a system, its map."),
     },
     "About": {

@@ -55,7 +55,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     if language == "toml":
         if options["parts"] or options["symbolic"] or options["name"]:
             raise click.UsageError("a system file holds the whole system: leave out --what, --symbolic and --name")
-        _write(file.to_toml(), file.name, language, output, quiet)
+        write_text(file.to_toml(), f"{file.name} for {language}", output, quiet)
         return
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
@@ -68,16 +68,17 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     words += [word for key in ("symbolic", "name") if options[key] for word in (f"--{key}", options[key])]
     how = {"name": options["name"], "symbols": symbols, "command": as_typed(words)}
     text = lib.convert(file, language, parts if options["parts"] else None, **how)
-    _write(text, file.name, language, output, quiet)
+    write_text(text, f"{file.name} for {language}", output, quiet)
 
 
-def _write(text: str, name: str, language: str, output: str | None, quiet: bool) -> None:
+def write_text(text: str, what: str, output: str | None, quiet: bool) -> None:
+    """Write a text to a file, with a line on standard error that says what it is, or to standard output."""
     if output is None or output == "-":
         click.echo(text, nl=False)
         return
     lib.write_atomically(output, text.encode())
     if not quiet:
-        say(f"{output}: {name} for {language}, {len(text.splitlines())} lines")
+        say(f"{output}: {what}, {len(text.splitlines())} lines")
 
 
 def _split(text: str) -> list[str]:

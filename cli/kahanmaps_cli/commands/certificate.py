@@ -1,0 +1,62 @@
+"""kahanmaps certificate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from kahanmaps import internals as lib
+from kahanmaps_cli.commands.convert import write_text
+from kahanmaps_cli.options import integral_option, load_system, quiet_option, system_options
+from kahanmaps_cli.screen.outputs import OutputFile
+from kahanmaps_cli.screen.progress import as_typed, say
+
+_CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certificate, which --help does not load
+
+
+@click.command("certificate")
+@system_options
+@click.option(
+    "--for", "checker", type=click.Choice(_CHECKERS), required=True, help="The program that checks the certificate."
+)
+@click.option(
+    "--claim",
+    "claims",
+    metavar="NAME",
+    multiple=True,
+    help="Certify this claim: an integral of the file, modified_hamiltonian, H0, H1, ..., or volume (default: all).",
+)
+@integral_option("Certify that this function of x and eps is an integral.", into="integrals")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@quiet_option
+def command(system: str | None, checker: str, output: str | None, quiet: bool, **options: Any) -> int:
+    """Write proofs about the map of SYSTEM that Coq (Rocq), PARI/GP or SymPy checks.
+
+    \b
+      kahanmaps certificate euler_top --for rocq -o euler_top.v        # then: coqc euler_top.v
+      kahanmaps certificate euler_top --for gp -o euler_top.gp         # then: gp -q euler_top.gp
+      kahanmaps certificate euler_top --for sympy -o certificate.py    # then: python certificate.py
+      kahanmaps certificate --vars x,y --image 'y; (3 + y)/x' --for gp --integral '(x+1)*(y+1)*(x+y+3)/(x*y)'
+
+    The script defines the map by its equation M(x, eps) x~ = r(x, eps), states that a function is an integral or that a
+    volume form is invariant, for every eps, and proves it by identities of polynomials, without kahanmaps. gp and
+    python print true for each identity, and end with a status that is not 0 if one does not hold.
+
+    Exit status: 0 the certificate is written, 1 a claim is false, 2 usage error.
+    """
+    file = load_system(system, {**options, "quiet": quiet})
+    integrals = {name or f"I{k}": text for k, (name, text) in enumerate(options["integrals"], 1)}
+    words = ["kahanmaps", "certificate", *([system] if system is not None else [])]
+    words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
+    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
+    words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
+    words += ["--for", checker, *(word for name in options["claims"] for word in ("--claim", name))]
+    words += [word for name, text in integrals.items() for word in ("--integral", f"{name}={text}")]
+    try:
+        text = lib.certificate(file, checker, options["claims"] or None, integrals or None, command=as_typed(words))
+    except lib.FalseClaim as error:
+        say(f"refuted: {error}")
+        return 1
+    write_text(text, f"{file.name}: a certificate for {checker}", output, quiet)
+    return 0
