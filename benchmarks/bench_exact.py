@@ -403,7 +403,8 @@ def over_fields(quick: bool = False) -> list[Row]:
         require_equal(chi, last, expected)
         split = min(split, normal_reduced(base, steps)[0])
         digits, others = (max(len(entry.str()) for pair in found for entry in pair) for found in (last, whole))
-        what = f"m = {base.m}, N = {steps}, chi = {chi}, last iterate of up to {digits:,} digits in numerator and denominator"
+        what = f"m = {base.m}, N = {steps}, chi = {chi}, "
+        what += f"last iterate of up to {digits:,} digits in numerator and denominator"
         rows.append(
             row(
                 FIELDS,
