@@ -6,7 +6,7 @@ maps in both orders at a rational point, and proves that they commute pairwise. 
 
 import kahanmaps as km
 
-member = km.draw_with_eigenvalues([1, -2, 3], seed=7)
+member = km.random_member_with_eigenvalues([1, -2, 3], seed=7)
 print("A has eigenvalues", ", ".join(str(factor.root) for factor in member.factors), "each twice")
 
 associated = list(member.associated())
