@@ -34,7 +34,7 @@ def for_the_converter(formula: str) -> str:
 def with_spaces(formula: str) -> str:
     """Return MathML with a space behind names of functions without brackets, and with small slashes and braces."""
     formula = re.sub(
-        r"(<mo>&ApplyFunction;</mo>\s*)(?!<mo|<mrow>\s*<mo)", r'\1<mspace width="0.1667em"></mspace>', formula
+        r"(<mo>&ApplyFunction;</mo>)(?!\s*<mo|\s*<mrow>\s*<mo)", r'\1<mspace width="0.1667em"></mspace>', formula
     )
     formula = formula.replace("<mo>/</mo>", '<mo lspace="0" rspace="0">/</mo>')
     return re.sub(r"<mo>([{}])</mo>", r'<mo stretchy="false">\1</mo>', formula)
@@ -50,8 +50,8 @@ def mathml(node: nodes.Node, as_block: bool) -> str:
 
 
 def inline_as_mathml(translator: Any, node: nodes.math) -> None:
-    """A formula in a line."""
-    translator.body.append(mathml(node, as_block=False))
+    """A formula in a line; a word joiner keeps it together with a comma or bracket behind it."""
+    translator.body.append(mathml(node, as_block=False) + "\u2060")
     raise nodes.SkipNode
 
 
