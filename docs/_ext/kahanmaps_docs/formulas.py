@@ -36,7 +36,7 @@ def with_spaces(formula: str) -> str:
     formula = re.sub(
         r"(<mo>&ApplyFunction;</mo>)(?!\s*<mo|\s*<mrow>\s*<mo)", r'\1<mspace width="0.1667em"></mspace>', formula
     )
-    formula = formula.replace("<mo>/</mo>", '<mo lspace="0" rspace="0">/</mo>')
+    formula = formula.replace('<mo stretchy="false">/</mo>', '<mo stretchy="false" lspace="0" rspace="0">/</mo>')
     return re.sub(r"<mo>([{}])</mo>", r'<mo stretchy="false">\1</mo>', formula)
 
 
