@@ -31,11 +31,12 @@ def for_the_converter(formula: str) -> str:
     return re.sub(r"(\\(?:tilde|hat) ?(?:\{(?:[^{}]|\{[^{}]*\})*\}|\\[a-zA-Z]+|\w))_", r"{\1{}}_", formula)
 
 
-def with_spaces(formula: str) -> str:
-    """Return MathML with a space behind names of functions without brackets, and with small slashes and braces."""
+def for_the_font(formula: str) -> str:
+    """Return MathML with a space between a function and its argument, and with small slashes, braces and bars."""
     formula = re.sub(
         r"(<mo>&ApplyFunction;</mo>)(?!\s*<mo|\s*<mrow>\s*<mo)", r'\1<mspace width="0.1667em"></mspace>', formula
     )
+    formula = formula.replace("\u02c9", "\u00af")  # a bar as an accent: the font has the second one only
     formula = formula.replace('<mo stretchy="false">/</mo>', '<mo stretchy="false" lspace="0" rspace="0">/</mo>')
     return re.sub(r"<mo>([{}])</mo>", r'<mo stretchy="false">\1</mo>', formula)
 
@@ -43,7 +44,7 @@ def with_spaces(formula: str) -> str:
 def mathml(node: nodes.Node, as_block: bool) -> str:
     """The formula of a node; of one that cannot be read its text, with a warning."""
     try:
-        return with_spaces(str(tex2mathml(for_the_converter(node.astext()), as_block=as_block)))
+        return for_the_font(str(tex2mathml(for_the_converter(node.astext()), as_block=as_block)))
     except MathError as error:
         LOGGER.warning("the formula %s cannot be read: %s", node.astext(), error, location=node)
         return str(nodes.literal(text=node.astext()))
