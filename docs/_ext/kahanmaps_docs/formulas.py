@@ -51,8 +51,8 @@ def mathml(node: nodes.Node, as_block: bool) -> str:
 
 
 def inline_as_mathml(translator: Any, node: nodes.math) -> None:
-    """A formula in a line; a word joiner keeps it together with a comma or bracket behind it."""
-    translator.body.append(mathml(node, as_block=False) + "\u2060")
+    """A formula in a line."""
+    translator.body.append(mathml(node, as_block=False))
     raise nodes.SkipNode
 
 
