@@ -47,7 +47,7 @@ from kahanmaps.experiments.results.records import (
     digest,
     encodable,
 )
-from kahanmaps.whole_files import resolved
+from kahanmaps.atomic_files import resolved
 
 # A change that older versions cannot read increases it. Format 2 is this one with two more columns, which nobody reads.
 FORMATS = (1, 2)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.whole_files import named, sync
+from kahanmaps.atomic_files import named, sync
 
 
 class NpyFile:
