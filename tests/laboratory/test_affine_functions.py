@@ -15,11 +15,7 @@ from kahanmaps.algebra.polynomials import evaluate, linear_combinations
 from kahanmaps.documents.files import read_system
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux import affine_functions
-from kahanmaps.laboratory.preserve.darboux.affine_functions import (
-    affine_darboux,
-    affine_integrals,
-    under_map,
-)
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, affine_integrals, under_map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

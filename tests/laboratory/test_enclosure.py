@@ -12,13 +12,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduced
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.enclosure import (
-    decimal,
-    degree_above,
-    enclose,
-    is_birational,
-    lower_bound,
-)
+from kahanmaps.laboratory.growth.enclosure import decimal, degree_above, enclose, is_birational, lower_bound
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 

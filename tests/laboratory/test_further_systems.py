@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 from analysis_helpers import Answer, differences, residues_of, verdict_of
 from check_helpers import (
-    combined_rows,
     determinant,
     function_value,
     kahan_jacobian,
@@ -101,7 +100,7 @@ def value_at(text, name, x, eps):
     if text == MODIFIED:
         return modified_value(file_of(name).hamiltonian, eps, x)
     if text == DETERMINANT:
-        return determinant(combined_rows(unit(len(x)), -eps, slope(file_of(name).system, x)))
+        return determinant(unit(len(x)) - eps * slope(file_of(name).system, x))
     return function_value(parsed(name, text), x, eps)
 
 

@@ -14,10 +14,7 @@ from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.documents.files import read_system
 from kahanmaps.invariants.phase_functions import DeterminantDensity, ModifiedHamiltonian
-from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
-    ConstantStructures,
-    constant_structures,
-)
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures, constant_structures
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem

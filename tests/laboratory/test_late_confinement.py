@@ -32,12 +32,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     Written,
     outcome_of,
 )
-from kahanmaps.laboratory.singular.singularities import (
-    Patterns,
-    _patterns,
-    patterns_of,
-    singularities,
-)
+from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

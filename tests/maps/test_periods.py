@@ -18,13 +18,7 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.division import PeriodicLevels
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic
-from kahanmaps.maps.normal_form.periods import (
-    PeriodKind,
-    period_of,
-    plane_period,
-    plane_period_over_rationals,
-    poles,
-)
+from kahanmaps.maps.normal_form.periods import PeriodKind, period_of, plane_period, plane_period_over_rationals, poles
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 from kahanmaps.maps.orbits.iteration import Orbit
