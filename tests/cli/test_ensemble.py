@@ -5,16 +5,12 @@ Starts come from text, .npy files, standard input or a seed; whatever is wrong w
 """
 
 import io
-import json
 import os
-import shlex
 import signal
-import subprocess
-import time
 
 import numpy as np
 import pytest
-from cli_helpers import COMMAND
+from cli_helpers import interrupted
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
 
@@ -88,17 +84,10 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
 
 def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**9} --random 5 --every 10 -o {path} --json"
-    process = subprocess.Popen(
-        [*COMMAND, *shlex.split(words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    while not path.exists() or path.stat().st_size < 2000:  # the first records are in the file
-        time.sleep(0.02)
-    process.send_signal(signal.SIGTERM)
-    out, err = process.communicate(timeout=60)
-    found = json.loads(out)
-    assert (process.returncode, found["status"]) == (130, "interrupted")
-    assert f"interrupted after step {found['steps_taken']}" in err
+    outcome = interrupted(f"{TOP} --steps {10**9} --random 5 --every 10 --json", path, signal.SIGTERM)
+    found = outcome.json
+    assert (outcome.status, found["status"]) == (130, "interrupted")
+    assert f"interrupted after step {found['steps_taken']}" in outcome.err
     assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 10 + 1, 5, 3)
 
 

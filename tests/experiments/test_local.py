@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 from helpers import quick
-from small_databases import exported
+from small_databases import exported, recorded, until
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Outcome, Record, Task, TaskLimits
@@ -89,10 +89,7 @@ def done(jobs: Sequence[Job], workers: int = 2, **settings: Any) -> dict[str, Re
 def pids_of(workers: LocalWorkers) -> list[int]:
     """The processes at work, once they wait for tasks or have one."""
     at_work = [worker for worker, _ in workers._running.values()]
-    deadline = time.monotonic() + 100
-    while not all(worker.is_ready for worker in at_work):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: all(worker.is_ready for worker in at_work))
     return [worker.process.pid for worker in at_work if worker.process is not None and worker.process.pid is not None]
 
 
@@ -105,10 +102,7 @@ def is_running(pid: int) -> bool:
 
 
 def wait_until_gone(pids: Sequence[int]) -> None:
-    deadline = time.monotonic() + 100
-    while any(map(is_running, pids)):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    until(lambda: not any(map(is_running, pids)))
 
 
 # What a task does to its worker
@@ -385,13 +379,9 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
     process = subprocess.Popen(
         [*command, "-q"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    deadline = time.monotonic() + 100
-    while not stored(tmp_path / "wild.db"):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    threads = Path(
-        f"/proc/{process.pid}/task"
-    )  # two workers, and the process with which Python keeps account of semaphores
+    until(lambda: recorded(tmp_path / "wild.db"))
+    # Two workers, and the process with which Python keeps account of semaphores.
+    threads = Path(f"/proc/{process.pid}/task")
     children = [int(pid) for file in threads.glob("*/children") for pid in file.read_text().split()]
     assert len(children) >= 2
     for pid in [process.pid, *children] if first == "parent" else [*children, process.pid]:
@@ -406,11 +396,3 @@ def test_a_signal_to_a_batch_and_all_its_processes_changes_no_result(tmp_path: P
     list(run(text, tmp_path / "wild.db", jobs=2))
     list(run(text, tmp_path / "calm.db", jobs=2))
     assert exported(tmp_path / "wild.db") == exported(tmp_path / "calm.db")
-
-
-def stored(db: Path) -> int:
-    try:
-        with Store.open(db, readonly=True) as store:
-            return sum(sum(one.outcomes.values()) for one in store.status())
-    except InputError:  # it is not there, or still empty
-        return 0
