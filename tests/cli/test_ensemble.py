@@ -15,9 +15,6 @@ from cli_helpers import interrupted
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
 
 
-# Starts
-
-
 STARTS = [[1.0, 0.5, -2.0], [0.25, 3.0, 1.0]]
 
 
@@ -51,9 +48,6 @@ def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
     assert drawn("--seed 3")[0].tolist() == pytest.approx([-0.828701666, -0.526379, 0.602548930], abs=1e-6)
 
 
-# Orbits
-
-
 def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     command = ("ensemble", pair, "--random 5 --eps 1/10 --steps 20 --kernel numpy --json")
     chosen, generic = kahanmaps(*command).json, kahanmaps(*command, "--method generic").json
@@ -66,9 +60,6 @@ def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     assert generic["drift"] == []
 
 
-# The file
-
-
 def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
     for more in ("", " --integral F1"):
@@ -79,9 +70,6 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
         assert two.dtype == np.float64
 
 
-# Interrupts
-
-
 def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
     outcome = interrupted(f"{TOP} --steps {10**9} --random 5 --every 10 --json", path, signal.SIGTERM)
@@ -89,9 +77,6 @@ def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     assert (outcome.status, found["status"]) == (130, "interrupted")
     assert f"interrupted after step {found['steps_taken']}" in outcome.err
     assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 10 + 1, 5, 3)
-
-
-# Wrong use
 
 
 def npy(array) -> bytes:

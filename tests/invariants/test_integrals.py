@@ -36,18 +36,12 @@ def with_points(draw, dims=(1, 2, 3), homogeneous=False, standard=False):
     return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
 
 
-# Modified H
-
-
 @given(with_points(), nonzero)
 def test_modified_h_is_what_its_formula_says(drawn, eps):
     hamiltonian, x = drawn
     expected = modified_value(hamiltonian, fraction(eps), exact(*x))
     assume(expected is not None)
     assert fraction(ModifiedHamiltonian(hamiltonian).value(QQ, eps, x)) == expected
-
-
-# The paper's H~
 
 
 @given(with_points(dims=(2, 4), homogeneous=True, standard=True), nonzero)
@@ -72,9 +66,6 @@ def test_an_integral_of_the_commutant_is_what_its_formula_says(power):
         matrix = matrix @ rows_of(member.A).T
     expected = np.dot(exact(*x), matrix @ image) / fraction(eps)
     assert fraction(CommutantIntegral(member.chosen.hamiltonian, member.A, power).value(QQ, eps, x)) == expected
-
-
-# Fields and singular points
 
 
 @over_exact_fields

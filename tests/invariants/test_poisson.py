@@ -46,9 +46,6 @@ def test_the_tensor_is_j_minus_eps_squared_jacobian_squared_j(drawn, eps):
     assert (rows_of(poisson_tensor(hamiltonian, QQ, eps, x)) == expected).all()
 
 
-# Transformation
-
-
 def sides(hamiltonian: CubicHamiltonian, eps: fmpq, x: tuple[fmpq, ...]) -> tuple[fmpq_mat, fmpq_mat]:
     """Both sides of the law at x and its image."""
     kahan = KahanMap(hamiltonian.system, eps)
@@ -71,9 +68,6 @@ def test_the_two_sides_are_the_law_for_dphi_multiplied_out(drawn, eps):
     moved = jacobian @ tensor(hamiltonian, step, here) @ jacobian.T
     assert (rows_of(left) == D @ moved @ D.T).all()
     assert (rows_of(right) == D @ tensor(hamiltonian, step, image) @ D.T).all()
-
-
-# The Jacobi identity
 
 
 def defects_by_differentiation(hamiltonian: CubicHamiltonian, eps: fmpq, x: tuple[fmpq, ...]) -> list[fmpq]:

@@ -121,9 +121,6 @@ def slow_unless(names, fast):
     return [name if name in fast else pytest.param(name, marks=pytest.mark.slow) for name in names]
 
 
-# The answers themselves
-
-
 @pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 2]))
 def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
     file, known = file_of(name), KNOWN[name]
@@ -152,9 +149,6 @@ def test_the_answers_count_their_independent_integrals(name):
     assert rank + (MODIFIED in known["integrals"]) == known["independent_integrals"] <= known["dim"]
 
 
-# Blind
-
-
 @pytest.mark.parametrize("name", slow_unless([name for name in FURTHER if name not in BOUNDED], FAST))
 def test_the_analysis_gives_the_answer(name):
     found = analysed(name)
@@ -169,9 +163,6 @@ def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
     growth = KNOWN[name]["growth"]
     assert found.conclusion.kind == ("linear" if affine else verdict_of(growth))
     assert found.skipped == []
-
-
-# What holds at one eps only
 
 
 SPECIAL = [(name, eps) for name, known in DEGENERATE.items() for eps in known["at_special_eps"]]
@@ -193,9 +184,6 @@ def test_special_eps(name, eps):
     assert defect in found.integrals.reason
     if special["defect"] == "no value":
         assert found.conclusion.kind == "singular"
-
-
-# Wrong answers are seen to be wrong
 
 
 @pytest.mark.parametrize("name", ["ishii", "zander_11m1_lines"])

@@ -77,9 +77,6 @@ def assert_order_on_the_cubic(block, point, order, at_infinity):
             assert not cubic.is_zero(cubic.multiple(order // int(prime), T))
 
 
-# Large fields.
-
-
 @pytest.mark.parametrize("prime", [2**31 - 1, 2**40 - 87, 2**61 - 1, pytest.param(2**89 - 1, marks=pytest.mark.slow)])
 def test_in_a_large_prime_field_n_T_is_zero_and_no_smaller_multiple_is(prime):
     field, rng = Finite(prime), random.Random(3)
@@ -110,9 +107,6 @@ def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happe
     assert answers[True, False] == 0
 
 
-# The parts.
-
-
 @pytest.mark.parametrize(("prime", "degree"), [(1009, 1), (1000003, 1), (37, 2), (11, 3)])
 def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(prime, degree):
     field, rng = Finite(prime, degree), random.Random(prime)
@@ -127,9 +121,6 @@ def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(p
         curve.a2, curve.a4 = a2, a4
         assert curve.multiple(points, (x, (((x + a2) * x + a4) * x + a6).sqrt())) is None
         assert abs(points - field.q - 1) <= 2 * field.q**0.5
-
-
-# Members.
 
 
 @pytest.mark.parametrize(
@@ -153,9 +144,6 @@ def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pol
         ends[orbit.end.status] += 1
     assert ends["periodic"] > 0
     assert period_of(normal_form, "1/10", [1, 2, 3, 4]).status == "aperiodic"
-
-
-# Over the rationals.
 
 
 # h, and a point (u, v) of one of the few levels that have a period over Q.
@@ -196,9 +184,6 @@ def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
             assert (found.status, found.period, found.meets_pole) == ("periodic", step, met)
             return
     assert found.status in ("aperiodic", "undefined") or (met and found.meets_pole)
-
-
-# Levels with a period: division polynomials.
 
 
 RATIONAL = {5: fmpq(32, 27), 6: fmpq(28, 27), 9: fmpq(8, 9), 12: fmpq(80, 81)}
