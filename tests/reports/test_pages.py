@@ -10,6 +10,7 @@ import pytest
 from fontTools.pens.boundsPen import BoundsPen
 from fontTools.ttLib import TTFont
 from page_helpers import Page, letters_of_formulas, letters_of_the_font, require_sound
+from search_helpers import analysis_of
 
 import kahanmaps as km
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
@@ -25,15 +26,15 @@ from kahanmaps.reports.report import formulas_of, report_html, write_report
 EVIL = "<script>alert(1)</script>"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def volterra():
-    return km.analyze(km.load("lotka_volterra"))
+    return analysis_of("lotka_volterra")
 
 
 @pytest.fixture(scope="module")
-def drawn(volterra):
+def drawn():
     """The page with its pictures."""
-    return report_html(volterra, command="kahanmaps report lotka_volterra")
+    return report_html(analysis_of("lotka_volterra"), command="kahanmaps report lotka_volterra")
 
 
 @pytest.fixture(scope="module")
