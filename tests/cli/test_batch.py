@@ -171,7 +171,7 @@ def test_a_task_can_be_redone_from_what_show_prints(batch):
     assert again == data["result"]
 
 
-def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
+def test_different_results_of_one_task_are_reported_and_those_of_the_target_are_kept(batch):
     from kahanmaps.experiments.results.records import Outcome as Word
     from kahanmaps.experiments.results.records import Record, Task, TaskLimits
     from kahanmaps.experiments.results.store import Store

@@ -258,7 +258,7 @@ def test_a_module_that_the_workers_lack_is_one_error_and_not_a_record_for_each_t
 # Workers and schedulers that come and go
 
 
-def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own):
+def test_every_record_is_returned_once_although_a_worker_and_its_nanny_are_killed(own):
     first = own.worker()
     own.worker()
     jobs = jobs_of(60, sleep=0.05)
@@ -273,7 +273,7 @@ def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own
     assert all(record.is_ok for record in records)
 
 
-def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own):
+def test_a_killed_scheduler_is_reported_at_once_without_waiting(own):
     own.worker(nanny=False)
     with closing(own.workers()) as workers:
         workers.submit(jobs_of(1, sleep=600)[0])
@@ -349,7 +349,7 @@ def test_what_is_killed_on_a_cluster_changes_nothing(own, study):
 # Before there is a cluster
 
 
-def test_an_address_where_nobody_listens_is_told_in_a_sentence():
+def test_an_address_where_no_scheduler_answers_is_refused_in_a_sentence():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
@@ -365,12 +365,12 @@ def test_an_address_where_nobody_listens_is_told_in_a_sentence():
         ("udp://127.0.0.1:8786", "no dask scheduler answers"),
     ],
 )
-def test_an_address_that_cannot_be_one_is_told_in_a_sentence(address, sentence):
+def test_a_malformed_address_is_refused_in_a_sentence(address, sentence):
     with pytest.raises(InputError, match=sentence):
         ClusterWorkers(address, str, connect_seconds=0.3)
 
 
-def test_a_missing_installation_is_told_with_the_command_that_repairs_it(monkeypatch):
+def test_a_missing_installation_is_reported_with_the_command_that_repairs_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'kahanmaps\[cluster\]'"):
         ClusterWorkers("tcp://127.0.0.1:8786", str)

@@ -63,7 +63,7 @@ def test_a_range_is_exact(text, values):
         ("0..1 step 1e-5000", "more values than anybody can want"),
     ],
 )  # fmt: skip
-def test_a_wrong_range_is_told_in_a_sentence(text, words):
+def test_a_wrong_range_is_refused_in_a_sentence(text, words):
     with pytest.raises(InputError) as caught:
         RationalRange.from_text(text)
     assert words in str(caught.value)

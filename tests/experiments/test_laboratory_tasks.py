@@ -153,7 +153,7 @@ def test_exponents_are_those_of_the_library():
         ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found 1 steps after 0, expected at least 2"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
     with pytest.raises(InputError, match=words):
         perform(name, system, **asked)
 

@@ -144,7 +144,7 @@ def faulty(fault_tasks) -> dict[int, Record]:
         (STARTER, Outcome.OK, ""),
     ],
 )
-def test_what_a_task_does_to_its_worker_is_told_of_this_task_alone(faulty, order, outcome, message):
+def test_a_fault_is_reported_for_the_task_that_caused_it_alone(faulty, order, outcome, message):
     record = faulty[order]
     assert record.outcome is outcome
     assert message in record.message
@@ -173,7 +173,7 @@ def test_what_a_task_has_started_ends_with_its_worker(faulty):
     wait_until_gone([faulty[STARTER].result["pid"]])
 
 
-def test_a_task_that_hangs_is_killed_when_its_time_is_over_and_what_was_printed_before_is_not_told():
+def test_a_task_that_hangs_is_killed_at_its_time_limit_and_keeps_no_earlier_output():
     chatter, hang, other = fault(CHATTER), fault(HANG, limits=TaskLimits(time=0.2)), fault(HANG, 0)
     records = done([chatter, hang, other], workers=1)
     record = records[hang.task.key]
@@ -194,7 +194,7 @@ def test_a_task_that_hangs_is_killed_when_its_time_is_over_and_what_was_printed_
         (ValueError("cannot allocate memory"), False),  # somebody's words, not the system's
     ],
 )
-def test_an_error_that_comes_of_a_want_of_memory_is_told_as_such(error, is_memory):
+def test_an_error_caused_by_lack_of_memory_is_reported_as_such(error, is_memory):
     caused, met = InputError("found no numbers"), ValueError("no value")
     caused.__cause__, met.__context__ = error, error
     for raised in (error, caused, met):
@@ -302,7 +302,7 @@ def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_k
     assert not any(map(is_running, pids))
 
 
-def test_workers_that_cannot_start_are_told_once(monkeypatch: pytest.MonkeyPatch):
+def test_workers_that_cannot_start_are_reported_once(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("KAHANMAPS_TASKS", "no_such_module_anywhere")
     with pytest.raises(WorkersError, match="no_such_module_anywhere"):
         done([pause(1, seed) for seed in range(5)])

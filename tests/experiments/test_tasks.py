@@ -163,6 +163,6 @@ def test_a_period_is_that_of_the_library(prime):
         ("period", MEMBER, {"eps": "1/7", "prime": 7}, "the prime 7 divides the denominator of 1/7"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
     with pytest.raises(InputError, match=words):
         perform(name, system, **asked)

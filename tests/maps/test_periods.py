@@ -156,7 +156,7 @@ PERIODIC_OVER_Q = [
 
 
 @pytest.mark.parametrize(("h", "start", "period"), PERIODIC_OVER_Q)
-def test_a_rational_orbit_of_period_5_or_6_comes_back(h, start, period):
+def test_a_rational_orbit_of_period_5_or_6_closes(h, start, period):
     block = PlanarBlock(*(fmpq(c) for c in h))
     u, v = (QQ.convert(value) for value in start)
     found = plane_period_over_rationals(block, (u, v, fmpq(1)))

@@ -187,7 +187,7 @@ def test_a_refuted_claim_stands_open_and_a_control_does_not():
     assert 'open="open"' not in html
 
 
-def test_a_claim_is_whole_on_a_page_and_what_is_too_long_is_told():
+def test_a_page_shows_whole_claims_and_the_length_of_what_is_cut():
     numbers = tuple(f"{k}{'7' * 300}" for k in range(1, 13))
     witness = Witness(numbers, numbers[0], numbers, numbers, "left", "right", vectors=dict.fromkeys("abcdef", numbers))
     also = tuple(Evidence("exact", f"a further reason, number {k}") for k in range(9))
@@ -202,7 +202,7 @@ def test_a_claim_is_whole_on_a_page_and_what_is_too_long_is_told():
     assert "(7000 characters)" in page.text
 
 
-def test_a_second_system_its_eps_and_an_orbit_cut_short_are_told():
+def test_a_page_names_the_second_system_its_eps_and_an_orbit_that_ended_early():
     top = km.load("euler_top")
     page = require_sound(report_html(km.check_commute(top, top, km.Settings(eps="1/10"), eps2="1/7"), pictures=False))
     assert "euler_top, euler_top, eps = 1/10 (time step 2 eps = 1/5), second map at eps2 = 1/7" in page.text
